@@ -21,6 +21,7 @@ nav-sim calibrate out/paper_section5/III --estimator all --seed 1 -o out/paper_s
 # 100 runs with each model in the filter (a state for each AR1 and random walk), on the same errors and GNSS noise; the filters'
 # own standard deviations relative to AWV on clean recordings are the paper's Table I.
 cat > out/paper_section5/study.toml <<'END'
+# nav-sim demo --samples 524284
 [run]
 trajectory = "../../trajectories/land_vehicle.toml"
 static = ["ninth"] # windows of one more clean recording are the errors of the simulated INS

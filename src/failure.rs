@@ -34,62 +34,25 @@ pub(crate) struct Help {
     text: Cow<'static, str>,
 }
 
-/// Advice that several readers give.
+/// Advice that several readers give; with an option, for commands that have it.
 pub(crate) mod help {
-    use super::Help;
-    use std::borrow::Cow;
-
-    const fn of(option: &'static str, text: &'static str) -> Help {
-        Help {
-            option: Some((option, true)),
-            text: Cow::Borrowed(text),
-        }
-    }
-
-    const fn without(option: &'static str, text: &'static str) -> Help {
-        Help {
-            option: Some((option, false)),
-            text: Cow::Borrowed(text),
-        }
-    }
-
-    const fn always(text: &'static str) -> Help {
-        Help {
-            option: None,
-            text: Cow::Borrowed(text),
-        }
-    }
-
-    pub(crate) const COLUMN_NAMES: Help = of("columns", "name all columns with --columns");
-    pub(crate) const REMOVE_LINE: Help = always("remove the line");
-    pub(crate) const OUTPUT: Help = always("choose another output with --out");
-    pub(crate) const FORCE: Help = always("name another place for it, or replace it with --force");
-    pub(crate) const START_FILES: Help = always("start from the files that nav-sim init makes");
-    pub(crate) const CHANNELS: Help = of("axes", "leave the axis out with --axes");
-    pub(crate) const FEWER_CHANNELS: Help = of("axes", "take fewer signals at a time with --axes");
-    pub(crate) const GAPS: Help = of(
+    pub(crate) const COLUMN_NAMES: (&str, &str) = ("columns", "name all columns with --columns");
+    pub(crate) const OUTPUT: &str = "choose another output with --out";
+    pub(crate) const CHANNELS: (&str, &str) = ("axes", "leave the axis out with --axes");
+    pub(crate) const GAPS: (&str, &str) = (
         "gaps",
         "--gaps split takes the stretches between as recordings of their own; --gaps ignore takes the samples as evenly \
          spaced (stamped late, none lost)",
     );
-    pub(crate) const GAPS_ELSEWHERE: Help = without(
+    pub(crate) const GAPS_ELSEWHERE: (&str, &str) = (
         "gaps",
         "wv and calibrate read it with --gaps split or --gaps ignore; fuse bridges gaps of up to 5 s",
     );
-    pub(crate) const RATE: Help = of("rate-hz", "give the rate with --rate-hz");
-    pub(crate) const WRONG_RATE: Help = of("rate-hz", "leave --rate-hz out, or correct it");
-    pub(crate) const SKIP: Help = of("skip-s", "a smaller --skip-s");
-    pub(crate) const ORIGIN: Help = of("origin", "give --origin LAT_DEG,LON_DEG,H_M");
-    pub(crate) const ORIGIN_ELSEWHERE: Help = without(
-        "origin",
-        "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M",
-    );
-    pub(crate) const FIX_SIGMA: Help = of(
+    pub(crate) const WRONG_RATE: (&str, &str) = ("rate-hz", "leave --rate-hz out, or correct it");
+    pub(crate) const FIX_SIGMA: (&str, &str) = (
         "gnss-sigma",
         "give them for all fixes with --gnss-sigma POS[:VEL]",
     );
-    pub(crate) const TOPIC: Help = always("--topic NAME names one (nav-sim inspect lists them)");
-    pub(crate) const STAMP: Help = of("stamp", "--stamp log takes the times of arrival");
 }
 
 /// Where in a file.
@@ -301,21 +264,31 @@ impl Failure {
 
     /// With advice, beside what it has.
     pub(crate) fn or_hint(self, text: impl Into<Cow<'static, str>>) -> Self {
-        let (option, text) = (None, text.into());
-        self.or(Help { option, text })
+        self.or(None, text)
     }
 
     /// The same, if there is any.
     pub(crate) fn or_hint_if(self, text: Option<String>) -> Self {
-        match text {
-            Some(text) => self.or_hint(text),
-            None => self,
-        }
+        text.into_iter().fold(self, Self::or_hint)
     }
 
-    /// With further advice, perhaps for commands that have an option.
-    pub(crate) fn or(mut self, help: Help) -> Self {
-        self.help.push(help);
+    /// With further advice for commands that have an option.
+    pub(crate) fn or_option(self, (option, text): (&'static str, &'static str)) -> Self {
+        self.or(Some((option, true)), text)
+    }
+
+    /// With further advice for commands that have no such option.
+    pub(crate) fn or_without(self, (option, text): (&'static str, &'static str)) -> Self {
+        self.or(Some((option, false)), text)
+    }
+
+    fn or(
+        mut self,
+        option: Option<(&'static str, bool)>,
+        text: impl Into<Cow<'static, str>>,
+    ) -> Self {
+        let text = text.into();
+        self.help.push(Help { option, text });
         self
     }
 

@@ -1,11 +1,16 @@
 //! Requests in: JSON with the names of the commands' options.
 
-use crate::answer::Answer;
 use crate::error;
 use crate::work::work;
-use nav_sim::app::Failure;
+use nav_sim::app::{Answer as _, Answered, Context, Failure};
+use nav_sim::commands::batch::{BatchRequest, Outcome};
+use nav_sim::document::Importance;
+use numpy::PyArray1;
 use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
 use std::ffi::OsString;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 /// What `command` answers to a request. `hidden`: a directory that no text shows.
 #[pyfunction]
@@ -29,7 +34,11 @@ pub(crate) fn answer(
         .iter()
         .map(|doubt| error::shown(doubt, &hidden))
         .collect();
-    Ok(Answer::new(answered, hidden, warnings))
+    Ok(Answer {
+        answered,
+        hidden,
+        warnings,
+    })
 }
 
 /// JSON as TOML.
@@ -48,4 +57,168 @@ pub(crate) fn toml(py: Python<'_>, json: &str) -> PyResult<String> {
 #[pyfunction]
 pub(crate) fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
     py.detach(|| nav_sim::cli::run(words))
+}
+
+// What a request comes to.
+
+/// Characters of a line of a summary.
+const WIDTH: usize = 120;
+
+/// The answer to a request: as the command prints, draws and writes it.
+#[pyclass(frozen, module = "nav_sim._native")]
+pub(crate) struct Answer {
+    answered: Answered,
+    /// Directory of what came as arrays, which no text shows.
+    hidden: String,
+    /// Doubts about the input.
+    #[pyo3(get)]
+    warnings: Vec<String>,
+}
+
+impl Answer {
+    /// A text without the directory of what came as arrays. JSON writes the backslashes of Windows twice.
+    fn shown(&self, text: &str) -> String {
+        if self.hidden.is_empty() {
+            return text.to_owned();
+        }
+        text.replace(&self.hidden.replace('\\', "\\\\"), "")
+            .replace(&self.hidden, "")
+    }
+}
+
+#[pymethods]
+impl Answer {
+    /// As JSON.
+    fn json(&self) -> String {
+        self.shown(&self.answered.json)
+    }
+
+    /// As the terminal shows it.
+    fn summary(&self, py: Python<'_>) -> String {
+        py.detach(|| {
+            let document = &self.answered.document;
+            let text = document.terminal(WIDTH);
+            let spoken = document.spoken(false).map(|note| match note.importance {
+                Importance::Warning => format!("\nwarning: {}", note.text),
+                _ => format!("\nnote: {}", note.text),
+            });
+            self.shown(&(text.trim_end().to_owned() + &spoken.collect::<String>()))
+        })
+    }
+
+    /// Its verdict, a line each.
+    fn verdict(&self) -> Vec<String> {
+        let lines = self.answered.document.verdict.lines.iter();
+        lines.map(|line| self.shown(line)).collect()
+    }
+
+    /// As a page of its own.
+    fn html(&self, py: Python<'_>) -> String {
+        py.detach(|| self.shown(&self.answered.document.html()))
+    }
+
+    /// Names of the files that the command writes.
+    fn names(&self) -> Vec<String> {
+        let names = self.answered.files.iter().map(|(name, _)| name.clone());
+        names.collect()
+    }
+
+    /// The text of one of them.
+    fn text(&self, py: Python<'_>, name: &str) -> PyResult<String> {
+        let found = self.answered.files.iter().find(|(own, _)| own == name);
+        let missing = || error::refused(py, &format!("there is no {name} in this answer"));
+        found.map(|(_, text)| self.shown(text)).ok_or_else(missing)
+    }
+
+    /// Why the command would end with exit code 3.
+    #[getter]
+    fn unmet(&self) -> Option<String> {
+        let unmet = self.answered.unmet.as_ref();
+        unmet.map(|unmet| self.shown(&unmet.to_string()))
+    }
+}
+
+// Studies: cells that survive and spread over machines.
+
+/// Computes what is missing of a study, or of a shard of it, and merges when nothing is: the answer, if nothing is
+/// missing; and what was warned of.
+#[pyfunction]
+#[pyo3(signature = (study, directory, shard, time_limit_s, progress, threads=None))]
+pub(crate) fn study_run(
+    py: Python<'_>,
+    study: PathBuf,
+    directory: PathBuf,
+    shard: Option<(u64, u64)>,
+    time_limit_s: Option<f64>,
+    progress: Option<&Bound<'_, PyAny>>,
+    threads: Option<usize>,
+) -> PyResult<(Option<Answer>, Vec<String>)> {
+    if let Some((index, count)) = shard.filter(|(index, count)| index >= count) {
+        let message = format!("shard: {index} of {count} is none, such as (0, 2) and (1, 2)");
+        return Err(error::refused(py, &message));
+    }
+    let limit = time_limit_s.and_then(|s| Duration::try_from_secs_f64(s).ok());
+    let (outcome, warnings) = work(py, progress, threads, move |meter| {
+        let deadline = limit.and_then(|limit| Instant::now().checked_add(limit));
+        deadline.map(|end| meter.deadline.set(end));
+        let request = BatchRequest {
+            study,
+            out: Some(directory),
+            shard,
+            states: vec!["all".to_owned()],
+            ..BatchRequest::default()
+        };
+        let outcome = request.run(&|_| None, &Context::new(meter, None));
+        (outcome, meter.warnings())
+    })?;
+    let outcome = outcome.and_then(|outcome| match outcome.unmet() {
+        Some(failure) if matches!(outcome, Outcome::Stopped { .. }) => Err(failure),
+        _ => Ok(outcome),
+    });
+    let answer = match outcome.map_err(|e| error::of_failure(py, &e, ""))? {
+        Outcome::Merged(answer) => {
+            let answered = Answered {
+                json: serde_json::to_string(&*answer).unwrap_or_default(),
+                document: answer.document(),
+                files: Vec::new(),
+                unmet: answer.unmet(),
+            };
+            Some(Answer {
+                answered,
+                hidden: String::new(),
+                warnings: warnings.clone(),
+            })
+        }
+        _ => None,
+    };
+    Ok((answer, warnings))
+}
+
+// Tables of text as columns.
+
+/// A CSV with a header: numbers as arrays, where a cell without one is NaN; other columns as lists of texts.
+#[pyfunction]
+pub(crate) fn columns<'py>(py: Python<'py>, text: &str) -> PyResult<Bound<'py, PyDict>> {
+    let read = || {
+        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        let names = reader.headers()?.clone();
+        let rows = reader.records().collect::<Result<Vec<_>, _>>()?;
+        Ok::<_, csv::Error>((names, rows))
+    };
+    let (names, rows) = py
+        .detach(read)
+        .map_err(|e| pyo3::exceptions::PyValueError::new_err(e.to_string()))?;
+    let number = |cell: &str| match cell {
+        "" => Some(f64::NAN),
+        cell => cell.parse().ok(),
+    };
+    let table = PyDict::new(py);
+    for (k, name) in names.iter().enumerate() {
+        let cells = || rows.iter().filter_map(|row| row.get(k));
+        match cells().map(number).collect::<Option<Vec<f64>>>() {
+            Some(values) => table.set_item(name, PyArray1::from_vec(py, values))?,
+            None => table.set_item(name, PyList::new(py, cells().collect::<Vec<_>>())?)?,
+        }
+    }
+    Ok(table)
 }

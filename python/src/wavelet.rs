@@ -9,13 +9,6 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Scale by scale.
-struct Variances {
-    wv: Vec<f64>,
-    edof: Vec<f64>,
-    ends: Vec<(f64, f64)>,
-}
-
 /// Confidence of the intervals.
 const CONFIDENCE: f64 = 0.95;
 
@@ -35,13 +28,7 @@ pub(crate) fn wavelet<'py>(
     })?;
     let found = found.map_err(|e| error::refused(py, &format!("x: {e}")))?;
     let columns = PyDict::new(py);
-    let (low, high) = found.ends.into_iter().unzip();
-    for (name, values) in [
-        ("wv", found.wv),
-        ("edof", found.edof),
-        ("ci_low", low),
-        ("ci_high", high),
-    ] {
+    for (name, values) in found {
         columns.set_item(name, PyArray1::from_vec(py, values))?;
     }
     Ok(columns)
@@ -61,50 +48,47 @@ fn without_mean(mut samples: Vec<f64>) -> Vec<f64> {
     samples
 }
 
-fn values(robust: &[RobustVariance]) -> Vec<f64> {
-    robust.iter().map(|r| r.value).collect()
-}
+/// Scale by scale.
+type Columns = [(&'static str, Vec<f64>); 4];
 
 fn variances(
     signal: &[f64],
     scales: Option<u32>,
     efficiency: Option<f64>,
-) -> Result<Variances, WaveletError> {
+) -> Result<Columns, WaveletError> {
     let levels = scales.unwrap_or_else(|| default_levels(signal.len()));
     let tuning = efficiency
         .map(|efficiency| Tuning::new(efficiency))
         .transpose()?;
-    let (wv, coverage) = if signal.iter().any(|x| x.is_nan()) {
+    let values = |robust: Vec<RobustVariance>| robust.iter().map(|r| r.value).collect();
+    let mut coverage = vec![1.0; levels as usize];
+    let wv: Vec<f64> = if signal.iter().any(|x| x.is_nan()) {
         let found = gappy(signal, levels, &tuning.unwrap_or_default())?;
-        (
-            if tuning.is_some() {
-                values(&found.robust)
-            } else {
-                found.classical
-            },
-            found.coverage,
-        )
+        coverage = found.coverage;
+        match efficiency {
+            Some(_) => values(found.robust),
+            None => found.classical,
+        }
     } else {
-        let wv = match &tuning {
+        match &tuning {
+            Some(tuning) => values(both(signal, levels, tuning)?.1),
             None => haar::classical(signal, levels)?,
-            Some(tuning) => values(&both(signal, levels, tuning)?.1),
-        };
-        (wv, vec![1.0; levels as usize])
+        }
     };
     // As the command has them: of the samples that are there, and no fewer than one.
-    let classical = (1..)
-        .zip(&coverage)
-        .map(|(level, covered)| (interval::edof_eta3(signal.len(), level) * covered).max(1.0));
-    let edof: Vec<f64> = match efficiency {
-        None => classical.collect(),
-        Some(efficiency) => classical
-            .map(|edof| interval::edof_robust(edof, efficiency))
-            .collect(),
+    let edof = |(level, covered): (u32, &f64)| {
+        let eta3 = (interval::edof_eta3(signal.len(), level) * covered).max(1.0);
+        efficiency.map_or(eta3, |efficiency| interval::edof_robust(eta3, efficiency))
     };
-    let ends = wv
-        .iter()
-        .zip(&edof)
+    let edof: Vec<f64> = (1..).zip(&coverage).map(edof).collect();
+    let ends = wv.iter().zip(&edof);
+    let (low, high) = ends
         .map(|(wv, edof)| interval::interval(*wv, *edof, CONFIDENCE))
-        .collect();
-    Ok(Variances { wv, edof, ends })
+        .unzip();
+    Ok([
+        ("wv", wv),
+        ("edof", edof),
+        ("ci_low", low),
+        ("ci_high", high),
+    ])
 }

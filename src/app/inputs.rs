@@ -118,7 +118,7 @@ pub(crate) fn expect_turn_on(
     context: &Context<'_>,
 ) {
     let set = expected_turn_on(initial, &file.turn_on.unwrap_or_default());
-    tell_turn_on("the filter expects", &set, path, context);
+    tell_turn_on("the filter expects", set, path, context);
 }
 
 /// Gives the true IMU the turn-on bias that the model of its errors states, where settings are silent; a 0 is a setting.
@@ -129,16 +129,16 @@ pub(crate) fn make_turn_on(
     context: &Context<'_>,
 ) {
     let set = made_turn_on(imu, &file.turn_on.unwrap_or_default());
-    tell_turn_on("the true IMU has", &set, path, context);
+    tell_turn_on("the true IMU has", set, path, context);
 }
 
-fn tell_turn_on(who: &str, set: &[(Sensor, f64)], path: &Path, context: &Context<'_>) {
-    for (sensor, sigma) in set {
-        let (shown, sigma, unit) = (path.display(), readable(*sigma), sensor.unit());
-        let text = format!(
+fn tell_turn_on(who: &str, set: [Option<f64>; 2], path: &Path, context: &Context<'_>) {
+    for (sensor, sigma) in Sensor::ALL.into_iter().zip(set) {
+        let Some(sigma) = sigma else { continue };
+        let (shown, sigma, unit) = (path.display(), readable(sigma), sensor.unit());
+        context.remark(format!(
             "{shown}: {who} a turn-on bias of {sigma} {unit} ({sensor}, standard deviation)"
-        );
-        context.remark(text);
+        ));
     }
 }
 
@@ -312,36 +312,23 @@ pub(crate) fn no_filter(
 }
 
 /// Lets the filter expect the turn-on bias of its model; settings win. What was set.
-pub(crate) fn expected_turn_on(
-    initial: &mut InitialSettings,
-    stated: &TurnOn,
-) -> Vec<(Sensor, f64)> {
-    set_turn_on(
-        [
-            &mut initial.accel_bias_sigma_m_s2,
-            &mut initial.gyro_bias_sigma_rad_s,
-        ],
-        stated,
-    )
+pub(crate) fn expected_turn_on(initial: &mut InitialSettings, stated: &TurnOn) -> [Option<f64>; 2] {
+    [
+        fill(&mut initial.accel_bias_sigma_m_s2, stated, Sensor::Accel),
+        fill(&mut initial.gyro_bias_sigma_rad_s, stated, Sensor::Gyro),
+    ]
 }
 
 /// Gives the true IMU the turn-on bias of the model that makes its errors; settings win, a 0 too. What was set.
-pub(crate) fn made_turn_on(imu: &mut ImuSettings, stated: &TurnOn) -> Vec<(Sensor, f64)> {
-    set_turn_on(
-        [
-            &mut imu.turn_on_bias_accel_m_s2,
-            &mut imu.turn_on_bias_gyro_rad_s,
-        ],
-        stated,
-    )
+pub(crate) fn made_turn_on(imu: &mut ImuSettings, stated: &TurnOn) -> [Option<f64>; 2] {
+    [
+        fill(&mut imu.turn_on_bias_accel_m_s2, stated, Sensor::Accel),
+        fill(&mut imu.turn_on_bias_gyro_rad_s, stated, Sensor::Gyro),
+    ]
 }
 
-/// Fills in the settings of both sensors that are not given.
-fn set_turn_on(settings: [&mut Option<f64>; 2], stated: &TurnOn) -> Vec<(Sensor, f64)> {
-    let settings = Sensor::ALL.into_iter().zip(settings);
-    let set = settings.filter_map(|(sensor, setting)| {
-        let sigma = stated.sigma(sensor).filter(|_| setting.is_none())?;
-        Some((sensor, *setting.insert(sigma)))
-    });
-    set.collect()
+fn fill(setting: &mut Option<f64>, stated: &TurnOn, sensor: Sensor) -> Option<f64> {
+    let sigma = stated.sigma(sensor).filter(|_| setting.is_none());
+    *setting = setting.or(sigma);
+    sigma
 }

@@ -3,14 +3,12 @@
 mod command;
 mod context;
 pub(crate) mod inputs;
-mod manifest;
-mod outputs;
+
 pub mod reading;
 
 pub(crate) use crate::failure::Refuse;
 pub use crate::failure::{Failure, Result};
 pub use crate::io::input::Input;
-pub use command::{Answer, Answered, Asked, Command, Out, OutputFile, answered};
+pub use command::{Answer, Answered, Asked, Command, Manifest, Out, OutputFile, answered};
 pub(crate) use command::{argument, is_path, is_repeated};
 pub use context::{Context, DEFAULT_SEED, Front};
-pub use manifest::Manifest;

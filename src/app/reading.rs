@@ -57,7 +57,7 @@ pub struct RecordingRequest {
     #[arg(long, value_parser = parse::words::<Gaps>(GAPS), default_value_t = Gaps::Keep)]
     pub gaps: Gaps,
     /// Signals to use: all, accel, gyro, x, accel.x, … (repeatable or comma-separated; default: all)
-    #[arg(long, value_name = "AXES", value_delimiter = ',')]
+    #[arg(long, value_name = "AXES", value_delimiter = ',', value_parser = channel_set)]
     pub axes: Vec<ChannelSet>,
 }
 
@@ -106,23 +106,14 @@ impl FromStr for Skip {
     }
 }
 
-/// The axes that one word of `--axes` stands for.
-#[derive(Debug, Clone)]
-pub struct ChannelSet {
-    /// The signals.
-    pub channels: Vec<Channel>,
-}
+/// The axes that one word of `--axes` stands for: all, those of a sensor (`accel`), an axis of both (`x`), one (`accel.x`).
+pub type ChannelSet = Vec<Channel>;
 
-impl FromStr for ChannelSet {
-    type Err = String;
-
-    /// `all`, a sensor (`accel`), an axis of both sensors (`x`) or one channel (`accel.x`).
-    fn from_str(word: &str) -> Result<Self, String> {
-        let channels = Channel::named(word);
-        match channels.is_empty() {
-            true => Err("not all, accel, gyro, x, y, z, or one channel such as accel.x".into()),
-            false => Ok(Self { channels }),
-        }
+pub(crate) fn channel_set(word: &str) -> Result<ChannelSet, &'static str> {
+    let channels = Channel::named(word);
+    match channels.is_empty() {
+        true => Err("not all, accel, gyro, x, y, z, or one channel such as accel.x"),
+        false => Ok(channels),
     }
 }
 
@@ -177,7 +168,7 @@ impl ReadingRequest {
 
 impl RecordingRequest {
     fn channels(&self) -> impl Iterator<Item = &Channel> {
-        self.axes.iter().flat_map(|set| &set.channels)
+        self.axes.iter().flatten()
     }
 
     /// The sensor whose signals alone are asked for.

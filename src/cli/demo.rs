@@ -1,13 +1,10 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
 use super::{Cli, Common, Failure, Session};
-use crate::app::{Answer, Front, inputs};
+use crate::app::{Answer, Front};
 use crate::commands::batch::{BatchRequest, Outcome};
-use crate::io::atomic::Written;
-use crate::io::{atomic, model_file};
-use crate::report;
-use clap::Parser;
-use serde::{Deserialize, Serialize};
+use crate::io::atomic;
+use clap::{Parser, value_parser};
 use std::path::{Component, Path};
 
 /// Run the case study of Minaretzis et al. 2024, Section V, on a virtual IMU: calibrate with three estimators
@@ -17,8 +14,8 @@ use std::path::{Component, Path};
 /// recordings of a virtual consumer IMU (scenario I), the same with replaced points, vibrations and steps (II), and with two
 /// abnormal recordings of each sensor (III); AWV, SR-AWV and DR-AWV on each; a study of Monte-Carlo navigation with errors from
 /// windows of one more clean recording and two outages of 90 s, the filter with a state for each AR1 and random walk as in the
-/// paper; the ASEE of each filter relative to AWV in scenario I. If interrupted, the same command continues: demo.json in the
-/// directory says how far it is.
+/// paper; the ASEE of each filter relative to AWV in scenario I. If interrupted, the same command makes recordings and models anew
+/// and goes on with the study.
 #[derive(clap::Args)]
 #[command(before_help = "\
 Examples:
@@ -26,11 +23,12 @@ Examples:
   nav-sim demo --seed 1 --print -o study
   nav-sim demo --seed 1 --print > paper_section5.sh")]
 pub(crate) struct Args {
-    /// Samples of each recording (default: 87 minutes, as in the paper; short ones do not show its ordering)
-    #[arg(long, value_name = "T", default_value_t = 524_284)]
+    /// Samples of each recording, at least the 900 s of the drive (default: 87 minutes, as in the paper; short ones do not
+    /// show its ordering)
+    #[arg(long, value_name = "T", default_value_t = 524_284, value_parser = value_parser!(u64).range(90_000..=1_000_000_000))]
     samples: u64,
     /// Monte-Carlo runs with each model
-    #[arg(long, value_name = "N", default_value_t = 100)]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u64).range(1..=1_000_000))]
     runs: u64,
     /// Print the commands, run nothing
     #[arg(long)]
@@ -42,88 +40,38 @@ pub(crate) struct Args {
 
 const IMU: &str = "calib_data/consumer_mems.toml";
 const TRAJECTORY: &str = "trajectories/land_vehicle.toml";
+/// Beginning of its study.
+const HEAD: &str = "# nav-sim demo --samples";
 const SCENARIOS: [&str; 3] = ["I", "II", "III"];
 const ESTIMATORS: [&str; 3] = ["awv", "sr-awv", "dr-awv"];
 
-/// How far a demo is: demo.json of its directory.
-#[derive(PartialEq, Serialize, Deserialize)]
-struct Progress {
-    version: String,
-    seed: u64,
-    samples: u64,
-    runs: u64,
-    commands_done: usize,
-}
-
-fn foreign(path: &Path) -> Failure {
-    let message = format!(
-        "{} is not of this command: it is not replaced",
-        path.display()
-    );
-    Failure::input(message).hint("choose another directory with --out, or move it away")
-}
-
-impl Progress {
-    /// What is there to go on with, or a beginning.
-    fn of(args: &Args, path: &Path, session: &Session) -> Result<Self, Failure> {
-        let there = std::fs::read_to_string(path).ok();
-        let there = there.map(|text| serde_json::from_str::<Self>(&text));
-        let begun = there.transpose().map_err(|_| foreign(path))?;
-        let mut new = Self {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            seed: session.context().seed_or(begun.as_ref().map(|b| b.seed)),
-            samples: args.samples,
-            runs: args.runs,
-            commands_done: begun.as_ref().map_or(0, |begun| begun.commands_done),
-        };
-        if begun.is_some_and(|begun| begun != new) {
-            if !session.common.force {
-                let path = path.display();
-                let message = format!("{path} is of a demo of another seed, size or version");
-                let hint = "name another directory with --out, or replace it with --force";
-                return Err(Failure::input(message).hint(hint));
-            }
-            new.commands_done = 0;
-        }
-        Ok(new)
-    }
-}
-
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let out = Path::new(&args.out);
-    let study = out.join("study.toml");
+    let (study, seed) = (out.join("study.toml"), session.context().seed_or(None));
+    let (text, commands) = (study_text(args, seed)?, commands(args, seed));
     if args.print {
-        let seed = session.context().seed_or(None);
-        let mut lines: Vec<String> = commands(args, seed).iter().map(|c| typed(c)).collect();
+        let mut lines: Vec<String> = commands.iter().map(|c| typed(c)).collect();
         let quoted = shell_quoted(&study.display().to_string());
         lines.push(format!(
-            "cat > {quoted} <<'END'\n{}END\nnav-sim batch {quoted} -o {}",
-            study_text(args, seed)?,
+            "cat > {quoted} <<'END'\n{text}END\nnav-sim batch {quoted} -o {}",
             shell_quoted(&args.out)
         ));
         session.result(lines.join("\n"));
         return Ok(());
     }
-    refuse_the_impossible(args, session)?;
-    let path = out.join("demo.json");
-    let _own = atomic::claim_file(&path, [])?;
+    let force = session.common.force;
     let page = out.join("report.html");
-    let _page = atomic::claim_result(&page, [], Written::Page, session.common.force)?;
-    let mut progress = Progress::of(args, &path, session)?;
-    let commands = commands(args, progress.seed);
-    if study.exists() && !path.exists() {
-        return Err(foreign(&study));
+    let _page = atomic::claim_file(&page, [])?;
+    let there = std::fs::read_to_string(&study).unwrap_or_else(|_| text.clone());
+    if there != text && !(force && there.starts_with(HEAD)) {
+        let message = format!("{} is of another demo, or of others", study.display());
+        let hint =
+            "name another directory with --out, or replace that of another demo with --force";
+        return Err(Failure::input(message).hint(hint));
     }
-    let done = progress.commands_done;
-    if done > 0 {
-        let (out, count, seed) = (&args.out, commands.len(), progress.seed);
-        session.say(format!(
-            "{out}: {done} of {count} commands are done, seed {seed}"
-        ));
-    }
-    atomic::write(&path, report::json(&progress))?;
-    session.begin("commands", (commands.len() - done) as u64);
-    for (i, command) in commands.iter().enumerate().skip(done) {
+    atomic::write(&study, text)?;
+    session.begin("commands", commands.len() as u64);
+    for command in &commands {
         session.context().detail(format!("$ {}", typed(command)));
         let words = std::iter::once("nav-sim").chain(command.iter().map(String::as_str));
         let cli = Cli::try_parse_from(words).map_err(Failure::input)?;
@@ -138,26 +86,23 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             is_muted: true,
             ..Session::default()
         })?;
-        progress.commands_done = i + 1;
-        atomic::write(&path, report::json(&progress))?;
         session.advance(1);
     }
     session.end();
-    atomic::write(&study, study_text(args, progress.seed)?)?;
     let request = BatchRequest {
         study,
         out: Some(out.to_owned()),
         states: ["pos_e_m", "roll_deg"].map(str::to_owned).to_vec(),
-        force: session.common.force,
+        force,
         ..BatchRequest::default()
     };
     let Outcome::Merged(found) = request.run(&|_| None, &session.context())? else {
         return Err(Failure::stopped("cells are in work elsewhere")
             .hint("the same command goes on where it was"));
     };
-    let found = found.comparisons.into_iter().next();
-    let found = found.ok_or_else(|| Failure::could_not("there is nothing to compare"))?;
-    session.show(&found, &found.document(), None);
+    if let Some(found) = found.comparisons.first() {
+        session.show(found, &found.document(), None);
+    }
     session.say(format!("all results: {}", page.display()));
     Ok(())
 }
@@ -171,16 +116,16 @@ fn study_text(args: &Args, seed: u64) -> Result<String, Failure> {
             .all(|part| matches!(part, Component::Normal(_)));
     let trajectory = match is_below {
         true => Path::new(&"../".repeat(out.components().count())).join(TRAJECTORY),
-        false => Path::new(TRAJECTORY)
-            .canonicalize()
-            .map_err(Failure::could_not)?,
+        false => std::path::absolute(TRAJECTORY).map_err(Failure::could_not)?,
     };
     let (trajectory, runs) = (
         toml::Value::from(trajectory.display().to_string()),
         args.runs,
     );
+    let samples = args.samples;
     Ok(format!(
-        "[run]
+        "{HEAD} {samples}
+[run]
 trajectory = {trajectory}
 static = [\"ninth\"] # windows of one more clean recording are the errors of the simulated INS
 model = \"models/{{scenario}}_{{estimator}}.toml\"
@@ -197,33 +142,6 @@ scenario = \"I\"
 estimator = \"awv\"
 "
     ))
-}
-
-/// Refuses no runs, and recordings in which no window is as long as the trajectory, before anything is made.
-fn refuse_the_impossible(args: &Args, session: &Session) -> Result<(), Failure> {
-    if args.runs == 0 {
-        return Err(
-            Failure::input("--runs 0: there is nothing to compare").hint("at least --runs 1")
-        );
-    }
-    let of_repository = |e: Failure| {
-        e.hint("the demo takes its IMU and its trajectory from the top of the repository: run it there")
-    };
-    let trajectory =
-        inputs::trajectory(Path::new(TRAJECTORY), &session.context()).map_err(of_repository)?;
-    let rate_hz = model_file::read(Path::new(IMU))
-        .map_err(of_repository)?
-        .model
-        .rate_hz;
-    let needed = ((trajectory.end_s() - trajectory.start_s()) * rate_hz).ceil();
-    if args.samples as f64 >= needed {
-        return Ok(());
-    }
-    let message = format!(
-        "--samples {}: the INS errors are windows of a recording, as long as the trajectory",
-        args.samples
-    );
-    Err(Failure::input(message).hint(format!("at least --samples {needed}")))
 }
 
 /// The commands, as words.

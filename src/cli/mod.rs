@@ -1,28 +1,27 @@
-//! The command line: one file per subcommand, each its `Args` and a `run(args, &Session)`.
-
-mod batch;
-mod completions;
-mod demo;
-mod drive;
-mod init;
-mod interrupt;
-mod man;
-mod schema;
-mod session;
-mod version;
-
-use crate::app::Asked;
-use crate::commands::trajectory::{TrajectoryArgs, TrajectoryCommand};
-use crate::commands::with_commands;
-use clap::error::ErrorKind;
-use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
-use drive::drive;
-use std::ffi::{OsStr, OsString};
-use std::io::Write;
-use std::process::ExitCode;
+//! The command line: what is parsed, and small commands; larger ones have files of their own.
 
 pub(crate) use crate::app::Failure;
+use crate::app::{Answer, Asked, Result};
+use crate::commands::batch::Study;
+use crate::commands::trajectory::{TrajectoryArgs, TrajectoryCommand};
+use crate::commands::with_commands;
+use crate::io::{contamination_file, fusion_files, model_file, trajectory_file};
+use clap::error::ErrorKind;
+use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
+use nav_sim_navigation::lanes::Level;
+use nav_sim_navigation::scenario::Scenario;
+use serde_json::json;
 pub(crate) use session::{Common, Format, Session};
+use std::env::consts::{ARCH, OS};
+use std::ffi::{OsStr, OsString};
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+mod batch;
+mod demo;
+mod interrupt;
+mod session;
 
 /// INS/GNSS navigation simulator with a robust stochastic-calibration front end.
 #[derive(Parser)]
@@ -61,10 +60,10 @@ enum Command {
     Trajectory(TrajectoryArgs),
     Batch(batch::Args),
     Demo(demo::Args),
-    Init(init::Args),
-    Schema(schema::Args),
-    Completions(completions::Args),
-    Man(man::Args),
+    Init(InitArgs),
+    Schema(SchemaArgs),
+    Completions(CompletionsArgs),
+    Man(ManArgs),
 }
 
 impl Command {
@@ -97,10 +96,10 @@ impl Command {
             },
             Self::Batch(args) => return batch::run(&args, session),
             Self::Demo(args) => return demo::run(&args, &session),
-            Self::Init(args) => init::run(&args, &session)?,
-            Self::Schema(args) => schema::run(&args),
-            Self::Completions(args) => completions::run(&args),
-            Self::Man(args) => man::run(&args)?,
+            Self::Init(args) => init(&args, &session)?,
+            Self::Schema(args) => schema(&args),
+            Self::Completions(args) => completions(&args),
+            Self::Man(args) => man(&args)?,
         };
         session.result(text);
         Ok(())
@@ -153,8 +152,9 @@ fn words(given: impl Iterator<Item = OsString>) -> Vec<OsString> {
 
 /// `--option` without a value.
 fn is_bare_option(word: &OsStr) -> bool {
-    let text = word.to_string_lossy();
-    text.len() > 2 && text.starts_with("--") && !text.contains('=')
+    let word = word.to_string_lossy();
+    let name = word.strip_prefix("--");
+    name.is_some_and(|name| !name.is_empty() && !name.contains('='))
 }
 
 /// Ends the program with help or version, or with the error in the words that requests by name get too.
@@ -195,7 +195,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
         return 2;
     }
     let words = words(given.iter().cloned());
-    let known = command().version(&*version::version(&lossy(&words)).leak());
+    let known = command().long_version(&*version().leak());
     let matches = known
         .try_get_matches_from(&words)
         .unwrap_or_else(|e| end(&e));
@@ -259,4 +259,185 @@ mod tests {
             "run a --p95-m=3 -.5 -- -3"
         );
     }
+}
+
+// `nav-sim completions`: completion scripts for shells.
+
+/// Print a completion script for a shell
+#[derive(clap::Args)]
+#[command(before_help = "\
+Examples:
+  nav-sim completions bash > nav-sim.bash
+  nav-sim completions zsh > _nav-sim
+  nav-sim completions fish > nav-sim.fish")]
+struct CompletionsArgs {
+    /// Which shell
+    #[arg(value_enum)]
+    shell: clap_complete::Shell,
+}
+
+fn completions(args: &CompletionsArgs) -> String {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut command(), "nav-sim", &mut script);
+    String::from_utf8_lossy(&script).into_owned()
+}
+
+// `nav-sim man`: manual pages.
+
+/// Print the manual page of a command (without a name: of nav-sim itself)
+#[derive(clap::Args)]
+#[command(before_help = "\
+Examples:
+  nav-sim man > nav-sim.1
+  nav-sim man run > nav-sim-run.1
+  nav-sim man compare > nav-sim-compare.1")]
+struct ManArgs {
+    /// Which command
+    command: Option<String>,
+}
+
+fn man(args: &ManArgs) -> Result<String, Failure> {
+    let mut page = Vec::new();
+    let mut root = command();
+    // hands the common flags down
+    root.build();
+    let of_command = match &args.command {
+        None => root,
+        Some(name) => {
+            let names = root.get_subcommands().map(clap::Command::get_name);
+            let known = names.collect::<Vec<_>>().join(", ");
+            let found = root.find_subcommand(name).cloned();
+            let unknown = format!("no command is named \"{name}\"");
+            let found = found.ok_or_else(|| Failure::input(unknown).hint(known))?;
+            found.display_name(format!("nav-sim-{name}"))
+        }
+    };
+    clap_mangen::Man::new(of_command)
+        .render(&mut page)
+        .map_err(Failure::could_not)?;
+    Ok(String::from_utf8_lossy(&page).into_owned())
+}
+
+// `nav-sim schema`: JSON schemas of the files people write.
+
+/// Print the JSON schema of a file that people write, for editors and checkers
+#[derive(clap::Args)]
+#[command(before_help = "\
+Examples:
+  nav-sim schema scenario > scenario.schema.json
+  nav-sim schema model | grep -c AR1
+  nav-sim schema study | grep -c description")]
+struct SchemaArgs {
+    /// Which file
+    #[arg(value_enum)]
+    of: Kind,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum Kind {
+    /// All settings of a run (`nav-sim run --scenario`)
+    Scenario,
+    /// A grid of experiments (`nav-sim batch`)
+    Study,
+    /// A noise model (what `nav-sim calibrate` writes)
+    Model,
+    /// Where and how a drive begins (`nav-sim fuse --initial`)
+    Initial,
+    /// A trajectory by what the vehicle does (`nav-sim run`)
+    Profile,
+    /// Errors put into recordings (`nav-sim synthesize --contaminate`)
+    Contamination,
+}
+
+fn schema(args: &SchemaArgs) -> String {
+    crate::report::json(&schema_of(args.of))
+}
+
+fn schema_of(of: Kind) -> serde_json::Value {
+    match of {
+        Kind::Scenario => schemars::schema_for!(Scenario).to_value(),
+        Kind::Study => schemars::schema_for!(Study).to_value(),
+        Kind::Model => model_file::schema(),
+        Kind::Initial => fusion_files::initial_schema(),
+        Kind::Profile => trajectory_file::profile_schema(),
+        Kind::Contamination => contamination_file::schema(),
+    }
+}
+
+#[cfg(test)]
+#[path = "schema_tests.rs"]
+mod schema_tests;
+
+// `nav-sim init`: a directory to start from.
+
+/// Make a directory with everything to start from: a commented file of every kind, trajectories, virtual IMUs
+///
+/// scenario.toml, imu.toml, motion.toml, contamination.toml, initial.toml and examples/quick_study.toml say
+/// what each key means. The others are those of the repository; the examples of every --help work inside the directory. Files
+/// that exist already are left alone.
+#[derive(clap::Args)]
+#[command(before_help = "\
+Examples:
+  nav-sim init study
+  nav-sim check study/scenario.toml study/calib_data/consumer_mems.toml
+  nav-sim run study/trajectories/land_vehicle.toml study/calib_data/consumer_mems.toml \\
+      --scenario study/scenario.toml --runs 8 -o study/out")]
+struct InitArgs {
+    /// Directory
+    #[arg(value_name = "DIR", default_value = ".")]
+    directory: PathBuf,
+}
+
+fn init(args: &InitArgs, session: &Session) -> Result<String, Failure> {
+    let (written, kept) = crate::init::write_start_files(&args.directory)?;
+    for path in &kept {
+        session.say(format!("kept {path}"));
+    }
+    Ok(match session.is_json() {
+        true => json!({ "schema_version": 1, "written": written, "kept": kept }).to_string(),
+        false => written.join("\n"),
+    })
+}
+
+// Runs a command on a terminal: claims outputs, runs, shows, writes.
+
+/// Does a command.
+fn drive<C: crate::app::Command>(asked: &Asked<C>, session: &Session) -> Result<()> {
+    let mut manifest = asked.manifest(session.common.seed)?;
+    manifest.command.clone_from(&session.given);
+    let _claims = asked.claim(&manifest, session.common.force)?;
+    let context = session.context().reading(manifest.inputs.clone());
+    let answer = asked.request.run(&context)?;
+    let document = answer.document();
+    let file = || match asked.out {
+        Some(_) => None,
+        None => answer.files().into_iter().next(),
+    };
+    let file = C::PRINTS_FILE.then(|| file().map_or_else(String::new, |f| f.parts.collect()));
+    session.show(&answer, &document, answer.text().or(file));
+    let written = asked.write(&answer, &document, manifest, &context)?;
+    if !written.is_empty() {
+        let names: Vec<_> = written.iter().map(|path| path.to_string_lossy()).collect();
+        session.say(format!("wrote {}", names.join(", ")));
+    }
+    answer.unmet().map_or(Ok(()), Err)
+}
+
+/// The version, what this program was built for, and what it uses here (`-V` is the version alone).
+fn version() -> String {
+    let number = env!("CARGO_PKG_VERSION");
+    let either = |is: bool, yes, no| if is { yes } else { no };
+    let library = either(cfg!(target_env = "musl"), "musl", "gnu");
+    let linked = either(cfg!(target_feature = "crt-static"), "static", "dynamic");
+    let profile = either(cfg!(debug_assertions), "debug", "release");
+    let level = Level::best();
+    let features = match (cfg!(feature = "pictures"), cfg!(feature = "parquet")) {
+        (true, true) => "pictures, parquet",
+        (true, false) => "pictures",
+        (false, true) => "parquet",
+        (false, false) => "none",
+    };
+    format!(
+        "{number}\nbuild         {profile}, {ARCH}-{OS}-{library}, {linked}\nvector units  {level}\nfeatures      {features}"
+    )
 }

@@ -31,7 +31,7 @@ pub(crate) struct Common {
     /// Show no progress, neither bars nor lines
     #[arg(long, global = true)]
     pub(crate) no_progress: bool,
-    /// Replace results of another kind, configuration or seed
+    /// Replace results of another configuration, other inputs or another seed
     #[arg(long, global = true)]
     pub(crate) force: bool,
     /// When to use colour

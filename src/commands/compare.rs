@@ -3,7 +3,6 @@
 use crate::app::{Answer, Command, Context, Failure, Manifest, Out, OutputFile, Refuse, Result};
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
-use crate::io::atomic::Written;
 use crate::report::csv::{csv, flat};
 use crate::report::verdict::{SPOKEN, axis_of, tone, verdict_counts};
 use crate::report::{in_order, json};
@@ -64,7 +63,6 @@ impl Command for Compare {
     type Answer = Comparison;
     const NAME: &'static str = "compare";
     const OUT: Out = Out::File {
-        kind: Written::Comparison,
         name: "comparison.json",
         help: "File to write, with a page (.html) beside it [default: comparison.json]",
     };
@@ -73,11 +71,8 @@ impl Command for Compare {
         true
     }
 
-    fn endings(&self) -> Vec<(Cow<'static, str>, Written)> {
-        vec![
-            ("".into(), Written::Comparison),
-            (".html".into(), Written::Page),
-        ]
+    fn endings(&self) -> Vec<Cow<'static, str>> {
+        vec!["".into(), ".html".into()]
     }
 
     fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {

@@ -2,7 +2,6 @@
 
 use crate::app::inputs::files;
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
-use crate::io::atomic::Written;
 use crate::io::datasheet::{CATALOGUE, Datasheet, Entry, Figure, Quantity, catalogued, read};
 use crate::io::model_file::{self, ModelFile};
 use crate::io::suggest::nearest;
@@ -54,7 +53,6 @@ impl Command for DatasheetArgs {
     type Answer = DatasheetAnswer;
     const NAME: &'static str = "datasheet";
     const OUT: Out = Out::File {
-        kind: Written::Datasheet,
         name: "model.toml",
         help: "Model file to write (default: to stdout)",
     };

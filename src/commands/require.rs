@@ -2,7 +2,6 @@
 
 use crate::app::inputs::{self, ScenarioArgs, files};
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Refuse, Result};
-use crate::io::atomic::Written;
 use crate::io::datasheet::{self, CATALOGUE, Datasheet};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::input::listed;
@@ -122,7 +121,6 @@ impl Command for Require {
     type Answer = RequireAnswer;
     const NAME: &'static str = "require";
     const OUT: Out = Out::File {
-        kind: Written::Required,
         name: "needed.toml",
         help: "Model file to write, of the required IMU",
     };

@@ -1,6 +1,6 @@
 //! `nav-sim synthesize`: replicate recordings of a noise model.
 
-use crate::app::reading::ChannelSet;
+use crate::app::reading::{ChannelSet, channel_set};
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
 use crate::io::model_file::{self, ModelFile};
 use crate::io::{contamination_file, recordings};
@@ -53,7 +53,7 @@ pub struct Synthesize {
         value_name = "AXES",
         value_delimiter = ',',
         default_value = "all"
-    )]
+    , value_parser = channel_set)]
     pub axes: Vec<ChannelSet>,
 }
 
@@ -179,7 +179,7 @@ impl Command for Synthesize {
 impl Synthesize {
     /// The channels to make: those asked for that the model has.
     fn wanted(&self, file: &ModelFile, context: &Context<'_>) -> Result<Vec<Channel>> {
-        let asked = |c: &Channel| self.axes.iter().any(|set| set.channels.contains(c));
+        let asked = |c: &Channel| self.axes.iter().any(|set| set.contains(c));
         let (missing, present): (Vec<Channel>, Vec<Channel>) = Channel::ALL
             .into_iter()
             .filter(asked)

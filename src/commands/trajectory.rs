@@ -1,9 +1,8 @@
 //! `nav-sim trajectory`: reference trajectories.
 
 use crate::app::{Answer, Asked, Command, Context, Failure, Out, OutputFile, Result, inputs};
-use crate::io::atomic::Written;
 use crate::io::scenario_file;
-use crate::io::trajectory_file::{self, Options, Rows, parse_origin};
+use crate::io::trajectory_file::{self, Instants, Options, parse_origin};
 use crate::parse;
 use crate::report::{gnss_csv, imu_csv, initial_toml};
 use nav_sim_document::{Document, Table, Tone};
@@ -117,7 +116,7 @@ impl Answer for TrajectoryTable {
 pub struct Convert {
     #[command(flatten)]
     source: Source,
-    /// Rows per second (default: of generate 100, of convert the rows of the input)
+    /// Instants per second (default: of generate 100, of convert the rows of the input)
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
     pub(crate) rate_hz: Option<f64>,
 }
@@ -126,7 +125,6 @@ impl Command for Convert {
     type Answer = TrajectoryTable;
     const NAME: &'static str = "trajectory convert";
     const OUT: Out = Out::File {
-        kind: Written::Trajectory,
         name: "trajectory.csv",
         help: "Table to write (.csv or .csv.gz); without it, standard output",
     };
@@ -139,7 +137,7 @@ impl Command for Convert {
 
     fn run(&self, context: &Context<'_>) -> Result<TrajectoryTable> {
         let (trajectory, _) = self.source.read(context)?;
-        let rows = self.rate_hz.map_or(Rows::Knots, Rows::Rate);
+        let rows = self.rate_hz.map_or(Instants::Knots, Instants::Rate);
         Ok(TrajectoryTable {
             schema_version: 1,
             start_s: trajectory.start_s(),
@@ -421,7 +419,7 @@ impl Command for Record {
             texts: [
                 imu_csv(&recording.imu),
                 gnss_csv(&recording.gnss),
-                trajectory_file::csv(&trajectory, Rows::Rate(10.0)),
+                trajectory_file::csv(&trajectory, Instants::Rate(10.0)),
                 initial_toml(trajectory.start_s(), &recording.start, &scenario.initial),
             ],
         })

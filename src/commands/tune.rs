@@ -2,7 +2,6 @@
 
 use crate::app::inputs::{self, SettingsArgs, files};
 use crate::app::{Answer, Command, Context, Failure, Input, Out, OutputFile, Result};
-use crate::io::atomic::Written;
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::{self, ModelFile, PROGRAM};
 use crate::parse;
@@ -73,7 +72,6 @@ impl Command for Tune {
     type Answer = TuneAnswer;
     const NAME: &'static str = "tune";
     const OUT: Out = Out::File {
-        kind: Written::Tuned,
         name: "tuned.toml",
         help: "Model file to write",
     };

@@ -4,7 +4,6 @@ use crate::app::inputs::listed;
 use crate::app::reading::{RecordingRequest, VarianceRequest};
 use crate::app::{Answer, Command, Context, Out, OutputFile, Result};
 use crate::commands::calibrate::{visit, without_warm_up};
-use crate::io::atomic::Written;
 use crate::io::recordings::ReadOptions;
 use crate::parse;
 use crate::report::curves::{Band, CONFIDENCE, SignalCurves, SignalsFile, recording_names};
@@ -56,7 +55,6 @@ impl Command for Wv {
     type Answer = SignalsFile;
     const NAME: &'static str = "wv";
     const OUT: Out = Out::File {
-        kind: Written::Signals,
         name: "curves.json",
         help: "Write the curves as JSON",
     };

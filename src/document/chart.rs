@@ -143,8 +143,6 @@ pub enum Mark {
     InnerBand(Vec<(f64, f64, f64)>),
     /// Points with error bars.
     Points(Vec<Interval>),
-    /// Bars from one value to another (x, from, to), on a linear axis.
-    Bars(Vec<(f64, f64, f64)>),
     /// A line at one value of y.
     Level(f64),
     /// The area between two values of y.

@@ -1,8 +1,10 @@
 //! A result as a document, before it is rendered.
 
-use crate::chart::Chart;
-use crate::picture::svg;
-use crate::table::Table;
+use crate::chart::{Chart, Size};
+use crate::draw::{Canvas, NARROW, SMALL, WIDE, draw, escape};
+use crate::picture::{CHART_STYLE, COLOURS, svg};
+use crate::table::{Cell, Table};
+use std::fmt::Write as _;
 
 /// Colour of a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -224,3 +226,304 @@ fn collect(blocks: &[Block], into: &mut Vec<Chart>) {
         }
     }
 }
+
+// Documents for a terminal.
+
+/// Notes that a terminal shows without being asked for more.
+pub const NOTES: usize = 3;
+/// Lines that a terminal shows without being asked for more, before the notes.
+const LINES: usize = 16;
+
+impl Document {
+    /// The verdict, and as much of the lead table as a screen has room for.
+    #[must_use]
+    pub fn terminal(&self, width: usize) -> String {
+        let verdict = self.verdict.lines.join("\n");
+        let lead = self.blocks.iter().find_map(|block| match block {
+            Block::Table {
+                table,
+                is_lead: true,
+            } => Some(table),
+            _ => None,
+        });
+        let Some(table) = lead else {
+            return verdict + "\n";
+        };
+        let mut shown = table.clone();
+        let room = LINES.saturating_sub(self.verdict.lines.len());
+        while shown.columns(width).lines().count() > room && shown.rows.len() > 1 {
+            shown.rows.pop();
+        }
+        let hidden = table.rows.len() - shown.rows.len();
+        let more = if hidden > 0 {
+            format!("  … {hidden} more rows (--verbose)\n")
+        } else {
+            String::new()
+        };
+        format!("{verdict}\n\n{}\n{more}", shown.columns(width))
+    }
+
+    /// All that can be said without figures.
+    #[must_use]
+    pub fn verbose(&self, width: usize) -> String {
+        let mut text = self.verdict.lines.join("\n") + "\n";
+        blocks(&self.blocks, width, &mut text);
+        text
+    }
+
+    /// The notes that a terminal shows, the most important first; all of them to those who ask for more.
+    pub fn spoken(&self, is_verbose: bool) -> impl Iterator<Item = &Note> {
+        let is_spoken = move |note: &&Note| is_verbose || note.importance < Importance::Detail;
+        self.notes()
+            .iter()
+            .filter(is_spoken)
+            .take(if is_verbose { usize::MAX } else { NOTES })
+    }
+}
+
+fn blocks(all: &[Block], width: usize, text: &mut String) {
+    for block in all {
+        match block {
+            Block::Section(title) => *text += &format!("\n{}\n", title.to_uppercase()),
+            Block::Heading(words) | Block::Text(words) => *text += &format!("\n{words}\n"),
+            Block::Facts(facts) => {
+                let lines = facts
+                    .iter()
+                    .map(|(name, value)| format!("\n  {name}: {value}"));
+                *text += &(lines.collect::<String>() + "\n");
+            }
+            Block::Table { table, .. } => *text += &format!("\n{}\n", table.columns(width)),
+            Block::Code(code) => *text += &format!("\n{}\n", code.trim_end()),
+            Block::Folded(title, inside) => {
+                *text += &format!("\n{title}\n");
+                blocks(inside, width, text);
+            }
+            Block::Charts(..) | Block::Links(_) => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod terminal_tests {
+    use crate::{Document, Importance, Table, Tone};
+
+    #[test]
+    fn a_screen_has_verdict_lead_and_three_notes() {
+        let mut document = Document::new(
+            "t",
+            Tone::Undecided,
+            ["undecided: 8 runs", "100 runs decide"],
+        );
+        let mut table = Table::new(["row"]);
+        (0..40).for_each(|k| table.row([k.to_string().into()]));
+        document.table(&Table::new(["other"]));
+        document.lead(table);
+        for k in 0..3 {
+            document.note(Importance::Detail, format!("detail {k}"));
+            document.note(Importance::Remark, format!("remark {k}"));
+        }
+        document.note(Importance::Warning, "last said, first told");
+        let text = document.terminal(100);
+        assert!(
+            text.starts_with("undecided: 8 runs\n100 runs decide\n\n  row\n  0\n"),
+            "{text}"
+        );
+        assert!(
+            text.ends_with("  12\n  … 27 more rows (--verbose)\n") && text.lines().count() <= 18,
+            "{text}"
+        );
+        let spoken: Vec<&str> = document.spoken(false).map(|n| n.text.as_str()).collect();
+        assert_eq!(spoken, ["last said, first told", "remark 0", "remark 1"]);
+        assert_eq!(document.spoken(true).count(), 7);
+        assert!(document.verbose(100).contains("\n  39\n"));
+    }
+}
+
+// Documents as pages: one self-contained HTML file each (no network, complete without scripts, for a screen, a phone,
+// paper, by day and by night). A page is a function of the document alone: same result, same bytes.
+
+const PAGE_STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+/// Tells our pages from those of others.
+const GENERATOR: &str = "<meta name=\"generator\" content=\"nav-sim\">";
+/// Characters beyond which a text in a table has more than one line.
+const LONG: usize = 40;
+
+impl Document {
+    /// The page.
+    #[must_use]
+    pub fn html(&self) -> String {
+        let title = escape(&self.title);
+        let tone = match self.verdict.tone {
+            Tone::Good => "good",
+            Tone::Undecided => "undecided",
+            Tone::Doubtful => "doubtful",
+            Tone::Bad => "bad",
+        };
+        let verdict = self
+            .verdict
+            .lines
+            .iter()
+            .map(|line| escape(line))
+            .collect::<Vec<_>>()
+            .join("<br>\n");
+        let mut body = format!("<h1>{title}</h1>\n<p class=\"verdict {tone}\">{verdict}</p>\n");
+        let (first, others) = self.notes().split_at(NOTES.min(self.notes().len()));
+        body += &notes(first);
+        if !others.is_empty() {
+            let (count, others) = (others.len(), notes(others));
+            let _ = writeln!(
+                body,
+                "<details><summary>Further notes: {count}</summary>\n{others}</details>"
+            );
+        }
+        self.blocks.iter().for_each(|b| block(b, &mut body));
+        format!(
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{GENERATOR}\n{VIEWPORT}\n\
+             <title>{title}</title>\n<style>\n{COLOURS}{CHART_STYLE}{PAGE_STYLE}</style>\n</head>\n<body>\n\
+             <main>\n{body}</main>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n"
+        )
+    }
+}
+
+const VIEWPORT: &str = "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">";
+
+fn notes(notes: &[Note]) -> String {
+    let item = |note: &Note| {
+        let class = if note.importance == Importance::Warning {
+            " class=\"warning\""
+        } else {
+            ""
+        };
+        format!("<li{class}>{}</li>\n", escape(&note.text))
+    };
+    match notes {
+        [] => String::new(),
+        _ => format!(
+            "<ul class=\"notes\">\n{}</ul>\n",
+            notes.iter().map(item).collect::<String>()
+        ),
+    }
+}
+
+fn block(block: &Block, html: &mut String) {
+    *html += &match block {
+        Block::Section(title) => format!("<h2>{}</h2>\n", escape(title)),
+        Block::Heading(title) => format!("<h3>{}</h3>\n", escape(title)),
+        Block::Text(words) => format!("<p>{}</p>\n", escape(words)),
+        Block::Facts(facts) => {
+            let fact = |(name, value): &(String, String)| {
+                format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value))
+            };
+            format!(
+                "<dl>\n{}</dl>\n",
+                facts.iter().map(fact).collect::<String>()
+            )
+        }
+        Block::Table { table, .. } => self::table(table),
+        Block::Charts(charts, caption) => {
+            // The head of a section stands for the title of its only chart.
+            let head = |chart: &Chart| format!("<h2>{}</h2>\n", escape(&chart.title));
+            let is_titled = matches!(&charts[..], [only] if html.ends_with(&head(only)));
+            let figures: String = charts
+                .iter()
+                .map(|chart| figure(chart, is_titled))
+                .collect();
+            let caption = match caption.as_str() {
+                "" => String::new(),
+                caption => format!("<figcaption>{}</figcaption>\n", escape(caption)),
+            };
+            match charts.iter().all(|chart| chart.size == Size::Small) {
+                true => format!("<div class=\"charts\">\n{figures}</div>\n{caption}"),
+                false => figures + &caption,
+            }
+        }
+        Block::Links(links) => {
+            let link = |(path, name): &(String, String)| {
+                format!(
+                    "<li><a href=\"{}\">{}</a></li>\n",
+                    escape(path),
+                    escape(name)
+                )
+            };
+            format!(
+                "<ul>\n{}</ul>\n",
+                links.iter().map(link).collect::<String>()
+            )
+        }
+        Block::Code(text) => format!("<pre>{}</pre>\n", escape(text)),
+        Block::Folded(title, blocks) => {
+            let mut inside = String::new();
+            blocks.iter().for_each(|b| self::block(b, &mut inside));
+            format!(
+                "<details><summary>{}</summary>\n{inside}</details>\n",
+                escape(title)
+            )
+        }
+    };
+}
+
+fn table(table: &Table) -> String {
+    let name = |(column, name): (usize, &String)| {
+        let class = if table.is_numeric(column) {
+            " class=\"number\""
+        } else {
+            ""
+        };
+        format!("<th{class}>{}</th>", escape(name))
+    };
+    let cell = |cell: &Cell| {
+        let class = match cell.is_number {
+            true => " class=\"number\"",
+            false if cell.text.chars().count() > LONG => " class=\"long\"",
+            false => "",
+        };
+        let pointer = match cell.pointer.as_str() {
+            "" => String::new(),
+            pointer => format!(" data-json=\"{}\"", escape(pointer)),
+        };
+        format!("<td{class}{pointer}>{}</td>", escape(&cell.text))
+    };
+    let row = |row: &Vec<Cell>| format!("<tr>{}</tr>\n", row.iter().map(cell).collect::<String>());
+    let head: String = table.head.iter().enumerate().map(name).collect();
+    let rows: String = table.rows.iter().map(row).collect();
+    format!(
+        "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody></table></div>\n"
+    )
+}
+
+fn figure(chart: &Chart, is_titled: bool) -> String {
+    let canvases: &[Canvas] = match chart.size {
+        Size::Small => &[SMALL],
+        Size::Full => &[WIDE, NARROW],
+    };
+    let drawn: String = canvases
+        .iter()
+        .filter_map(|canvas| drawing(chart, canvas))
+        .collect();
+    let title = match is_titled {
+        true => String::new(),
+        false => format!("<h3>{}</h3>\n", escape(&chart.title)),
+    };
+    let inside = match drawn.is_empty() {
+        true => "<p>No value to show.</p>\n",
+        false => &drawn,
+    };
+    format!("<figure>\n{title}{inside}</figure>\n")
+}
+
+fn drawing(chart: &Chart, canvas: &Canvas) -> Option<String> {
+    let (inside, height) = draw(chart, canvas)?;
+    let group = if chart.is_map { "map" } else { &chart.group };
+    Some(format!(
+        "<svg class=\"chart {}\" viewBox=\"0 0 {} {height}\" role=\"img\" aria-label=\"{}\" data-group=\"{}\">\n{inside}</svg>\n",
+        canvas.class,
+        canvas.width,
+        escape(&chart.title),
+        escape(group)
+    ))
+}
+
+#[cfg(test)]
+#[path = "page_tests.rs"]
+mod tests;

@@ -1,11 +1,7 @@
 //! Charts as SVG: layout, axes, stripes; for a screen and for a phone, so that text is never scaled.
 
-use crate::axis::{Ruler, extremes, is_shown, range, ticks};
-use crate::canvas::{Canvas, text};
-use crate::chart::{Chart, Mark, Panel, Scale, Stroke};
-use crate::escape::escape;
-use crate::legend::{Legend, text_width};
-use crate::marks::Frame;
+use crate::chart::{Axis, Chart, Interval, Mark, Panel, Scale, Series, Stroke};
+use crate::number::readable;
 use std::fmt::Write as _;
 
 /// Between panels, and at the right of all.
@@ -222,7 +218,7 @@ fn longest_name(chart: &Chart, canvas: &Canvas) -> Option<f64> {
 fn values(mark: &Mark) -> (Vec<f64>, Vec<f64>) {
     match mark {
         Mark::Line(points, _) => points.iter().copied().unzip(),
-        Mark::Band(points) | Mark::InnerBand(points) | Mark::Bars(points) => {
+        Mark::Band(points) | Mark::InnerBand(points) => {
             let ends = points.iter().flat_map(|&(x, a, b)| [(x, a), (x, b)]);
             ends.unzip()
         }
@@ -241,11 +237,9 @@ fn values(mark: &Mark) -> (Vec<f64>, Vec<f64>) {
 /// How far beyond the main curves a logarithmic axis follows others.
 const BEYOND: f64 = 30.0;
 
-/// What a panel shows: what is far beyond the main curves is cut, so that it does not flatten them. Bands, bars and
+/// What a panel shows: what is far beyond the main curves is cut, so that it does not flatten them. Bands and
 /// auxiliary lines may leave the panel.
 fn y_range(panel: &Panel) -> Option<(f64, f64)> {
-    let has_bars = panel.series.iter().any(|s| matches!(s.mark, Mark::Bars(_)));
-    let air = if has_bars { 0.0 } else { 0.04 };
     let is_log = panel.y.scale == Scale::Log;
     let main = panel.series.iter().flat_map(|s| match &s.mark {
         Mark::Points(points) if is_log => points.iter().map(|p| p.y).collect(),
@@ -264,5 +258,703 @@ fn y_range(panel: &Panel) -> Option<(f64, f64)> {
     };
     let ys = panel.series.iter().flat_map(|s| values(&s.mark).1);
     let shown = ys.filter(|y| is_shown(*y, is_log));
-    range(&panel.y, shown.map(|y| y.clamp(low, high)), air)
+    range(&panel.y, shown.map(|y| y.clamp(low, high)), 0.04)
+}
+
+// Ranges, ticks and their labels.
+
+/// From values to pixels along one axis.
+struct Ruler {
+    /// First and last value shown.
+    range: (f64, f64),
+    is_log: bool,
+    /// Pixels of the first and the last value.
+    pixels: (f64, f64),
+}
+
+impl Ruler {
+    fn at(&self, value: f64) -> f64 {
+        let along = |v: f64| if self.is_log { v.log10() } else { v };
+        let (low, high) = (along(self.range.0), along(self.range.1));
+        self.pixels.0 + (along(value) - low) / (high - low) * (self.pixels.1 - self.pixels.0)
+    }
+
+    /// The same, no farther than the ends.
+    fn within(&self, value: f64) -> f64 {
+        self.at(value.clamp(self.range.0, self.range.1))
+    }
+
+    /// `log 1e-3 100`, for the script.
+    fn data(&self) -> String {
+        let word = if self.is_log { "log" } else { "linear" };
+        format!("{word} {:e} {:e}", self.range.0, self.range.1)
+    }
+}
+
+/// Whether a value can be shown on an axis, which may be logarithmic.
+fn is_shown(value: f64, is_log: bool) -> bool {
+    value.is_finite() && (!is_log || value > 0.0)
+}
+
+/// What an axis shows: the values with some air, none without a value.
+fn range(axis: &Axis, values: impl Iterator<Item = f64>, air: f64) -> Option<(f64, f64)> {
+    if let Scale::Names(names) = &axis.scale {
+        return Some((-0.5, names.len() as f64 - 0.5));
+    }
+    let extra = axis.include.into_iter().flat_map(|(low, high)| [low, high]);
+    let shown = values
+        .chain(extra)
+        .filter(|v| is_shown(*v, axis.scale == Scale::Log));
+    let (low, high) = extremes(shown)?;
+    Some(match axis.scale {
+        Scale::Log => {
+            let air = if low == high {
+                2.0
+            } else {
+                (high / low).powf(air).max(1.0 + 2.0 * air)
+            };
+            (low / air, high * air)
+        }
+        _ if low == high => (
+            low - 0.1 * low.abs().max(1.0),
+            high + 0.1 * high.abs().max(1.0),
+        ),
+        _ => (low - air * (high - low), high + air * (high - low)),
+    })
+}
+
+/// Least and largest.
+fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    values.fold(None, |range, v| {
+        let (low, high) = range.unwrap_or((v, v));
+        Some((low.min(v), high.max(v)))
+    })
+}
+
+/// Places of an axis that have a label, and the labels; `most`: about how many.
+fn ticks(axis: &Axis, range: (f64, f64), most: usize) -> Vec<(f64, String)> {
+    match &axis.scale {
+        Scale::Names(names) => names
+            .iter()
+            .enumerate()
+            .map(|(k, name)| (k as f64, name.clone()))
+            .collect(),
+        Scale::Log if range.1 / range.0 >= 6.0 => decades(range, most),
+        _ => steps(range, most),
+    }
+}
+
+/// Powers of ten, with their halves and fifths where there are few.
+fn decades((low, high): (f64, f64), most: usize) -> Vec<(f64, String)> {
+    let exponents = low.log10().floor() as i32..=high.log10().ceil() as i32;
+    let spanned = (high / low).log10();
+    let factors: &[i32] = if spanned < 1.6 { &[1, 2, 5] } else { &[1] };
+    let every = (spanned / most as f64).ceil().max(1.0) as i32;
+    let all = exponents
+        .filter(|e| e.rem_euclid(every) == 0)
+        .flat_map(|e| {
+            factors
+                .iter()
+                .map(move |f| (f64::from(*f) * 10f64.powi(e), *f, e))
+        });
+    let shown: Vec<_> = all.filter(|(v, ..)| (low..=high).contains(v)).collect();
+    let is_plain = shown.iter().all(|(v, ..)| (1e-3..2e4).contains(v));
+    shown
+        .into_iter()
+        .map(|(v, f, e)| (v, if is_plain { plain(v) } else { power(f, e) }))
+        .collect()
+}
+
+/// Even steps of 1, 2 or 5 times a power of ten.
+fn steps((low, high): (f64, f64), most: usize) -> Vec<(f64, String)> {
+    let raw = (high - low) / most as f64;
+    let exponent = raw.log10().floor();
+    let choice = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .find(|m| m * 10f64.powf(exponent) >= raw * 0.999);
+    let step = choice.unwrap_or(10.0) * 10f64.powf(exponent);
+    let (first, last) = (
+        (low / step - 1e-9).ceil() as i64,
+        (high / step + 1e-9).floor() as i64,
+    );
+    let largest = low.abs().max(high.abs());
+    let label = |v: f64| match largest {
+        m if !(1e-4..1e6).contains(&m) => readable(v).replace('-', "−"),
+        _ => plain((v / step).round() * step),
+    };
+    (first..=last)
+        .map(|k| k as f64 * step)
+        .map(|v| (v, label(v)))
+        .collect()
+}
+
+/// A number without an exponent.
+fn plain(value: f64) -> String {
+    let rounded = format!("{value:.6}");
+    let short = rounded.trim_end_matches('0').trim_end_matches('.');
+    if short == "-0" {
+        "0".to_owned()
+    } else {
+        short.replace('-', "−")
+    }
+}
+
+/// `10⁻³` or `2·10⁻³`.
+fn power(factor: i32, exponent: i32) -> String {
+    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    let raised = |c: char| c.to_digit(10).map_or('⁻', |d| DIGITS[d as usize]);
+    let exponent: String = exponent.to_string().chars().map(raised).collect();
+    if factor == 1 {
+        format!("10{exponent}")
+    } else {
+        format!("{factor}·10{exponent}")
+    }
+}
+
+#[cfg(test)]
+mod marks_tests {
+    use super::*;
+
+    fn labels(axis: &Axis, range: (f64, f64)) -> Vec<String> {
+        ticks(axis, range, 8)
+            .into_iter()
+            .map(|(_, label)| label)
+            .collect()
+    }
+
+    #[test]
+    fn ticks_are_round_numbers() {
+        assert_eq!(
+            labels(&Axis::linear(""), (0.0, 900.0)),
+            ["0", "200", "400", "600", "800"]
+        );
+        assert_eq!(
+            labels(&Axis::linear(""), (-0.021, 0.02)),
+            ["−0.02", "−0.01", "0", "0.01", "0.02"]
+        );
+        assert_eq!(
+            labels(&Axis::log(""), (0.4, 12.0)),
+            ["0.5", "1", "2", "5", "10"]
+        );
+        assert_eq!(
+            labels(&Axis::log(""), (0.02, 3e3)),
+            ["0.1", "1", "10", "100", "1000"]
+        );
+        assert_eq!(
+            labels(&Axis::log(""), (3e-9, 2e-6)),
+            ["10⁻⁸", "10⁻⁷", "10⁻⁶"]
+        );
+        assert_eq!(
+            labels(&Axis::log(""), (0.9, 1.3))
+                .first()
+                .map(String::as_str),
+            Some("0.9")
+        );
+        assert_eq!(
+            labels(&Axis::names(vec!["a".into(), "b".into()]), (-0.5, 1.5)),
+            ["a", "b"]
+        );
+    }
+
+    #[test]
+    fn many_decades_are_labelled_now_and_then() {
+        let shown = ticks(&Axis::log(""), (1e-12, 1e3), 5);
+        assert_eq!(
+            shown
+                .iter()
+                .map(|t| t.0.log10().round())
+                .collect::<Vec<_>>(),
+            [-12., -9., -6., -3., 0., 3.]
+        );
+    }
+
+    #[test]
+    fn ends_of_the_range_are_ends_of_the_axis() {
+        let ruler = Ruler {
+            range: (1.0, 100.0),
+            is_log: true,
+            pixels: (200.0, 0.0),
+        };
+        assert_eq!(
+            (ruler.at(1.0), ruler.at(10.0), ruler.at(100.0)),
+            (200.0, 100.0, 0.0)
+        );
+        assert_eq!(ruler.within(1e9), 0.0);
+    }
+
+    #[test]
+    fn a_range_holds_what_can_be_shown() {
+        let values = [f64::NAN, -1.0, 0.0, 1.0, 100.0];
+        let (low, high) = range(&Axis::log(""), values.into_iter(), 0.0).unwrap();
+        assert_eq!((low, high), (1.0, 100.0));
+        assert_eq!(
+            range(
+                &Axis::linear("").including(-3.0, 5.0),
+                values.into_iter(),
+                0.0
+            ),
+            Some((-3.0, 100.0))
+        );
+        assert_eq!(range(&Axis::linear(""), [f64::NAN].into_iter(), 0.0), None);
+        let (low, high) = range(&Axis::linear(""), [2.0].into_iter(), 0.0).unwrap();
+        assert!(low < 2.0 && high > 2.0);
+    }
+}
+
+// Sizes that charts are drawn in, and text in them.
+
+/// A size to draw in.
+pub(crate) struct Canvas {
+    /// Class of the style sheet.
+    pub(crate) class: &'static str,
+    pub(crate) width: f64,
+    /// Usual height of a panel.
+    panel: f64,
+    /// Size of text.
+    pub(crate) font: f64,
+    /// About how many labels the x axis has.
+    labels: usize,
+    /// Most that a map may be high.
+    map: f64,
+}
+
+pub(crate) const WIDE: Canvas = Canvas {
+    class: "wide",
+    width: 960.0,
+    panel: 250.0,
+    font: 14.0,
+    labels: 10,
+    map: 480.0,
+};
+pub(crate) const NARROW: Canvas = Canvas {
+    class: "narrow",
+    width: 358.0,
+    panel: 200.0,
+    font: 12.0,
+    labels: 5,
+    map: 340.0,
+};
+pub(crate) const SMALL: Canvas = Canvas {
+    class: "small",
+    width: 310.0,
+    panel: 150.0,
+    font: 12.0,
+    labels: 5,
+    map: 260.0,
+};
+
+/// A text at a place; `anchor`: which part of it stands there.
+pub(crate) fn text(svg: &mut String, class: &str, (x, y): (f64, f64), anchor: &str, words: &str) {
+    let words = escape(words);
+    let _ = writeln!(
+        svg,
+        "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>"
+    );
+}
+
+// Text inside HTML and SVG.
+
+/// Text made safe inside HTML and SVG.
+#[must_use]
+pub fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}
+
+/// Whether a character turns the direction of what follows, and so shows a name as another (Unicode TR 36, sec. 2.1).
+#[must_use]
+pub const fn turns(c: char) -> bool {
+    matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+// The legend above the panels.
+
+/// Width of a text (pixels), rather too much: that of a wide typeface.
+fn text_width(text: &str, font: f64) -> f64 {
+    let width = |c: char| match c {
+        'i' | 'j' | 'l' | 'f' | 't' | 'r' | '.' | ',' | ':' | '(' | ')' | '|' | '/' | ' ' => 0.42,
+        'm' | 'w' | 'M' | 'W' | '%' | '−' => 0.95,
+        c if c.is_uppercase() => 0.72,
+        _ => 0.64,
+    };
+    font * text.chars().map(width).sum::<f64>()
+}
+
+const SWATCH: f64 = 24.0;
+const SPACE: f64 = 16.0;
+
+/// A name and all that has it; of stripes no series.
+struct Entry<'a> {
+    name: &'a str,
+    /// The first panel that shows it, and tells it.
+    panel: usize,
+    series: Vec<&'a Series>,
+}
+
+/// Names that are told. One name alone is told by the axis.
+struct Legend<'a>(Vec<Entry<'a>>);
+
+impl<'a> Legend<'a> {
+    fn of(chart: &'a Chart) -> Self {
+        let mut entries: Vec<Entry<'a>> = Vec::new();
+        for (panel, of_panel) in chart.panels.iter().enumerate() {
+            for series in &of_panel.series {
+                let is_beside = matches!(series.mark, Mark::Place(..) | Mark::Reading(..));
+                match entries.iter_mut().find(|e| e.name == series.name) {
+                    _ if series.name.is_empty() || is_beside => {}
+                    Some(entry) => entry.series.push(series),
+                    None => entries.push(Entry {
+                        name: &series.name,
+                        panel,
+                        series: vec![series],
+                    }),
+                }
+            }
+        }
+        let (name, stripes) = &chart.stripes;
+        if !stripes.is_empty() && !chart.is_map {
+            entries.push(Entry {
+                name,
+                panel: 0,
+                series: Vec::new(),
+            });
+        }
+        Self(entries)
+    }
+
+    /// The number of a name, of which the script knows what to hide.
+    fn key(&self, name: &str) -> usize {
+        let found = self.0.iter().position(|e| e.name == name);
+        found.unwrap_or(self.0.len())
+    }
+
+    /// Draws what one panel tells, beginning behind `title`, at the height `top`; returns where it ends.
+    pub(crate) fn draw(
+        &self,
+        panel: usize,
+        title: &str,
+        (left, top): (f64, f64),
+        canvas: &Canvas,
+        svg: &mut String,
+    ) -> f64 {
+        let line = canvas.font + 7.0;
+        text(svg, "name", (left, top + canvas.font), "start", title);
+        if self.0.len() < 2 {
+            return top + line;
+        }
+        let (mut x, mut y) = (left, top);
+        if !title.is_empty() {
+            x += text_width(title, canvas.font) + SPACE;
+        }
+        // the place of the next entry
+        let mut place = |name: &str| {
+            let width = SWATCH + 6.0 + text_width(name, canvas.font);
+            if x > left && x + width > canvas.width {
+                (x, y) = (left, y + line);
+            }
+            x += width + SPACE;
+            (x - width - SPACE, y)
+        };
+        let mut end = top;
+        let entries = self.0.iter().enumerate();
+        for (k, entry) in entries.filter(|(_, e)| e.panel == panel) {
+            let name = fitting(entry.name, canvas);
+            let (x, y) = place(&name);
+            let middle = y + 0.5 * line - 1.0;
+            let first = entry.series.first();
+            let class = first.map_or(String::new(), |s| format!("key {}", s.colour.class()));
+            let _ = write!(svg, "<g class=\"{class}\" data-k=\"{k}\">");
+            if entry.series.is_empty() {
+                let top = middle - 6.0;
+                let _ = write!(
+                    svg,
+                    "<rect class=\"outage\" x=\"{x:.1}\" y=\"{top:.1}\" width=\"{SWATCH}\" height=\"12\"/>"
+                );
+            }
+            let swatches = entry.series.iter().map(|s| &s.mark);
+            swatches.for_each(|mark| swatch(mark, (x, middle), svg));
+            text(svg, "", (x + SWATCH + 6.0, y + canvas.font), "start", &name);
+            *svg += "</g>\n";
+            end = y;
+        }
+        end + line
+    }
+}
+
+/// A name, without its middle if it is wider than the picture: ends tell names apart that begin alike.
+fn fitting(name: &str, canvas: &Canvas) -> String {
+    let share = (canvas.width - 2.0 * (SWATCH + SPACE)) / text_width(name, canvas.font);
+    let letters: Vec<char> = name.chars().collect();
+    if share >= 1.0 {
+        return name.to_owned();
+    }
+    let half = (0.5 * share * letters.len() as f64) as usize;
+    let half = half.saturating_sub(1);
+    let (before, after) = (&letters[..half], &letters[letters.len() - half..]);
+    before.iter().chain(&['…']).chain(after).collect()
+}
+
+/// A mark in small.
+fn swatch(mark: &Mark, (x, y): (f64, f64), svg: &mut String) {
+    let line = format!("M{x:.1} {y:.1}h{SWATCH}");
+    let square = format!("M{x:.1} {:.1}h{SWATCH}v12h-{SWATCH}Z", y - 6.0);
+    let (class, d) = match mark {
+        Mark::Line(_, stroke) => (stroke.class(), line),
+        Mark::Level(_) => ("line level", line),
+        Mark::Band(_) | Mark::Zone(..) => ("area", square),
+        Mark::InnerBand(_) => ("area inner", square),
+        Mark::Points(_) | Mark::Place(..) | Mark::Reading(..) => {
+            ("dot", format!("M{:.1} {y:.1}h0", x + 0.5 * SWATCH))
+        }
+    };
+    let _ = write!(svg, "<path class=\"{class}\" d=\"{d}\"/>");
+}
+
+// Marks as SVG paths.
+
+/// Points beyond which each is small.
+const MANY: usize = 150;
+
+/// Rulers of one panel.
+struct Frame {
+    x: Ruler,
+    y: Ruler,
+    /// Points of a line that can be told apart.
+    most: usize,
+}
+
+impl Frame {
+    fn shows(&self, x: f64, y: f64) -> bool {
+        is_shown(x, self.x.is_log) && is_shown(y, self.y.is_log)
+    }
+
+    fn point(&self, x: f64, y: f64) -> String {
+        format!("{:.1} {:.1}", self.x.at(x), self.y.at(y))
+    }
+
+    /// The series as a group of paths.
+    fn series(&self, series: &Series, key: usize, svg: &mut String) {
+        let _ = write!(
+            svg,
+            "<g class=\"series {}\" data-k=\"{key}\" data-name=\"{}\">",
+            series.colour.class(),
+            escape(&series.name)
+        );
+        match &series.mark {
+            Mark::Line(points, stroke) => {
+                path(svg, stroke.class(), &self.line(points));
+            }
+            Mark::Band(points) => path(svg, "area", &self.band(points)),
+            Mark::InnerBand(points) => path(svg, "area inner", &self.band(points)),
+            Mark::Points(points) => self.points(points, svg),
+            Mark::Level(y) => path(svg, "line level", &self.span(*y)),
+            Mark::Zone(low, high) => {
+                let (a, b) = self.x.range;
+                path(
+                    svg,
+                    "area",
+                    &self.band(&[(a, *low, *high), (b, *low, *high)]),
+                );
+            }
+            Mark::Place(x, y) => path(svg, "dot", &format!("M{}h0", self.point(*x, *y))),
+            Mark::Reading(x, y) => {
+                let (left, bottom) = (self.x.pixels.0, self.y.pixels.0);
+                let (px, py) = (self.x.at(*x), self.y.at(*y));
+                path(
+                    svg,
+                    "line level",
+                    &format!("M{left:.1} {py:.1}H{px:.1}V{bottom:.1}"),
+                );
+                path(svg, "dot", &format!("M{px:.1} {py:.1}h0"));
+            }
+        }
+        *svg += "</g>\n";
+    }
+
+    fn line(&self, points: &[(f64, f64)]) -> String {
+        let mut d = String::new();
+        let mut pen_up = true;
+        for (x, y) in thinned(points, self.most) {
+            if self.shows(x, y) {
+                let _ = write!(d, "{}{}", if pen_up { 'M' } else { 'L' }, self.point(x, y));
+            }
+            pen_up = !self.shows(x, y);
+        }
+        d
+    }
+
+    /// There along the upper curve and back along the lower one; where one of them cannot be shown, it ends.
+    fn band(&self, points: &[(f64, f64, f64)]) -> String {
+        // A line of as many points has the lowest and the highest of every two pixels.
+        let points = thinned_band(points, self.most / 2);
+        let is_drawn = |p: &(f64, f64, f64)| self.shows(p.0, p.2) && !p.1.is_nan();
+        let pieces = points
+            .split(|p| !is_drawn(p))
+            .filter(|piece| !piece.is_empty());
+        let closed = |piece: &[(f64, f64, f64)]| {
+            let corner = |x, y| format!("{:.1} {:.1}", self.x.at(x), self.y.within(y));
+            let forth = piece.iter().map(|p| corner(p.0, p.2));
+            let back = piece.iter().rev().map(|p| corner(p.0, p.1));
+            format!("M{}Z", forth.chain(back).collect::<Vec<_>>().join("L"))
+        };
+        pieces.map(closed).collect()
+    }
+
+    fn points(&self, points: &[Interval], svg: &mut String) {
+        let shown = || points.iter().filter(|p| self.shows(p.x, p.y));
+        let with_bar = |p: &&Interval| !(p.low.is_nan() && p.high.is_nan());
+        let bar = |p: &Interval| {
+            let [low, high] =
+                [p.low, p.high].map(|end| self.y.within(if end.is_nan() { p.y } else { end }));
+            format!("M{:.1} {low:.1}V{high:.1}", self.x.at(p.x))
+        };
+        path(
+            svg,
+            "whisker",
+            &shown().filter(with_bar).map(bar).collect::<String>(),
+        );
+        let class = if points.len() > MANY {
+            "dot small"
+        } else {
+            "dot"
+        };
+        let mut dots: Vec<String> = shown()
+            .map(|p| format!("M{}h0", self.point(p.x, p.y)))
+            .collect();
+        dots.dedup();
+        path(svg, class, &dots.concat());
+    }
+
+    fn span(&self, y: f64) -> String {
+        let (a, b) = self.x.range;
+        if !self.shows(b, y) {
+            return String::new();
+        }
+        format!("M{}L{}", self.point(a, y), self.point(b, y))
+    }
+}
+
+fn path(svg: &mut String, class: &str, d: &str) {
+    if !d.is_empty() {
+        let _ = write!(svg, "<path class=\"{class}\" d=\"{d}\"/>");
+    }
+}
+
+/// At most about so many points: of each bucket its lowest and its highest one, so that peaks stay; a gap stays
+/// a gap.
+fn thinned(points: &[(f64, f64)], most: usize) -> Vec<(f64, f64)> {
+    if points.len() <= most {
+        return points.to_vec();
+    }
+    let bucket = points.len().div_ceil(most / 2);
+    if !points.is_sorted_by(|a, b| a.0 <= b.0) {
+        // a track: what is lowest in y says nothing of its shape
+        return points
+            .iter()
+            .step_by(bucket.div_ceil(2))
+            .chain(points.last())
+            .copied()
+            .collect();
+    }
+    let extremes = |chunk: &[(f64, f64)]| {
+        let by_y = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+        let gap = chunk.iter().find(|p| !p.1.is_finite()).copied();
+        let known = || chunk.iter().filter(|p| p.1.is_finite());
+        let mut pair: Vec<(f64, f64)> = known()
+            .min_by(by_y)
+            .into_iter()
+            .chain(known().max_by(by_y))
+            .copied()
+            .chain(gap)
+            .collect();
+        pair.sort_by(|a, b| a.0.total_cmp(&b.0));
+        pair.dedup();
+        pair
+    };
+    points.chunks(bucket).flat_map(extremes).collect()
+}
+
+/// The same of a band: of each bucket all that it covers.
+fn thinned_band(points: &[(f64, f64, f64)], most: usize) -> Vec<(f64, f64, f64)> {
+    if points.len() <= most {
+        return points.to_vec();
+    }
+    let cover = |chunk: &[(f64, f64, f64)]| {
+        let low = chunk.iter().fold(f64::INFINITY, |low, p| low.min(p.1));
+        let high = chunk
+            .iter()
+            .fold(f64::NEG_INFINITY, |high, p| high.max(p.2));
+        (chunk[chunk.len() / 2].0, low, high)
+    };
+    points
+        .chunks(points.len().div_ceil(most))
+        .map(cover)
+        .collect()
+}
+
+#[cfg(test)]
+mod axis_tests {
+    use super::*;
+
+    fn frame(is_log: bool) -> Frame {
+        let ruler = |is_log, pixels| Ruler {
+            range: (1.0, 11.0),
+            is_log,
+            pixels,
+        };
+        Frame {
+            x: ruler(false, (0.0, 100.0)),
+            y: ruler(is_log, (100.0, 0.0)),
+            most: 100,
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_shown_breaks_the_line() {
+        let points = [
+            (1.0, 1.0),
+            (2.0, f64::NAN),
+            (3.0, 1.0),
+            (4.0, 11.0),
+            (5.0, -1.0),
+            (6.0, 1.0),
+        ];
+        assert_eq!(
+            frame(true).line(&points),
+            "M0.0 100.0M20.0 100.0L30.0 0.0M50.0 100.0"
+        );
+        assert_eq!(
+            frame(false).line(&points[2..]),
+            "M20.0 100.0L30.0 0.0L40.0 120.0L50.0 100.0"
+        );
+    }
+
+    #[test]
+    fn a_band_goes_there_and_back() {
+        assert_eq!(
+            frame(false).band(&[(1.0, 2.0, 3.0), (11.0, 2.0, 30.0)]),
+            "M0.0 80.0L100.0 0.0L100.0 90.0L0.0 90.0Z"
+        );
+    }
+
+    #[test]
+    fn thinning_keeps_peaks_and_gaps() {
+        let value = |i| match i {
+            77_777 => 9.0,
+            50_000 => f64::NAN,
+            _ => 0.0,
+        };
+        let points: Vec<(f64, f64)> = (0..100_000).map(|i| (f64::from(i), value(i))).collect();
+        let thin = thinned(&points, 1000);
+        assert!(
+            thin.len() <= 1501
+                && thin.iter().any(|p| p.1 == 9.0)
+                && thin.iter().any(|p| p.1.is_nan())
+        );
+        let band: Vec<_> = points.iter().map(|(x, y)| (*x, -y, *y)).collect();
+        let thin = thinned_band(&band, 1000);
+        assert!(thin.len() <= 1000 && thin.iter().any(|p| (p.1, p.2) == (-9.0, 9.0)));
+    }
 }

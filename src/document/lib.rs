@@ -13,40 +13,24 @@
 //! assert!(document.html().contains("data-json=\"/outages/0/p95_m\">4.20</td>"));
 //! ```
 
-// L0: names, numbers
-mod escape;
-mod names;
+// L0: numbers and names
 mod number;
 // L1: charts
 mod chart;
 // L2
-mod axis;
-mod canvas;
-// L3
-mod legend;
-mod marks;
-// L4
 mod draw;
 #[cfg(feature = "pictures")]
 mod png;
-// L5
+// L3
 mod picture;
-// L6: tables
+// L4: tables
 mod table;
-// L7
-mod table_text;
-// L8: documents
+// L5: documents
 mod document;
-// L9
-mod terminal;
-// L10
-mod page;
 
 pub use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Scale, Series, Size, Stroke};
-pub use document::{Banner, Block, Document, Importance, Note, Tone};
-pub use escape::{escape, turns};
-pub use names::short_names;
-pub use number::{percent, readable, seconds, shortest, six_digits, window};
+pub use document::{Banner, Block, Document, Importance, NOTES, Note, Tone};
+pub use draw::{escape, turns};
+pub use number::{percent, readable, seconds, short_names, shortest, six_digits, window};
 pub use picture::{Form, encode, svg};
 pub use table::{Cell, Table};
-pub use terminal::NOTES;

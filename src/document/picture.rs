@@ -1,9 +1,7 @@
 //! Charts as a picture for a paper or a slide: SVG in plain colours, which every program reads, and what is made of it.
 
-use crate::canvas::{WIDE, text};
 use crate::chart::Chart;
-use crate::draw::draw;
-use crate::escape::escape;
+use crate::draw::{WIDE, draw, escape, text};
 use std::fmt::Write as _;
 use std::path::Path;
 

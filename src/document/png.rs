@@ -9,13 +9,6 @@ const PIXELS_AN_INCH: f32 = 96.0;
 /// Of a PNG: a taller picture has fewer dots an inch, so that no viewer refuses it.
 const MOST_DOTS: f32 = 8e7;
 
-/// With a question mark for each character of the scripts that the font lacks (those of East Asia, pictographs): it would
-/// be drawn as an empty box.
-fn drawable(svg: &str) -> String {
-    let is_lacking = |c: char| matches!(c, '\u{1100}'..='\u{11ff}' | '\u{2e80}'..='\u{a4cf}' | '\u{ac00}'..='\u{d7ff}' | '\u{f900}'..='\u{faff}' | '\u{ff00}'..='\u{ffef}' | '\u{1f000}'..);
-    svg.replace(is_lacking, "?")
-}
-
 /// With the font that is compiled in: the same drawing on every machine, also where no font is installed.
 fn parsed(svg: &str) -> Result<usvg::Tree, String> {
     let mut fonts = usvg::fontdb::Database::new();
@@ -32,7 +25,7 @@ fn parsed(svg: &str) -> Result<usvg::Tree, String> {
 
 /// The dots of an SVG picture.
 pub(crate) fn png(svg: &str) -> Result<Vec<u8>, String> {
-    let picture = parsed(&drawable(svg))?;
+    let picture = parsed(svg)?;
     let (width, height) = (picture.size().width(), picture.size().height());
     let zoom = (DENSITY / PIXELS_AN_INCH).min((MOST_DOTS / (width * height)).sqrt());
     let dots = picture

@@ -50,7 +50,7 @@ pub struct Table {
     pub(crate) head: Vec<String>,
     pub(crate) rows: Vec<Vec<Cell>>,
     /// Columns before the others that name a row: they stand in each part of a table that is cut.
-    pub(crate) keys: usize,
+    keys: usize,
 }
 
 impl Table {
@@ -263,4 +263,297 @@ fn filled(template: &str, json: &Value, place: &str) -> String {
         filled += rest;
     }
     filled
+}
+
+// Tables as text: columns of a terminal, Markdown, CSV, LaTeX.
+
+impl Table {
+    /// Head and rows as texts, each line of its own.
+    fn lines(&self) -> Vec<Vec<String>> {
+        let rows = self
+            .rows
+            .iter()
+            .map(|row| row.iter().map(|cell| cell.text.clone()).collect());
+        std::iter::once(self.head.clone()).chain(rows).collect()
+    }
+
+    /// Columns for a terminal of so many characters; a table that is wider is cut, each part with the key columns.
+    #[must_use]
+    pub fn columns(&self, width: usize) -> String {
+        const GAP: usize = 2;
+        let lines = self.lines();
+        let widths = widths(&lines);
+        let room = |columns: &[usize]| columns.iter().map(|c| widths[*c] + GAP).sum::<usize>();
+        let (keys, others): (Vec<usize>, Vec<usize>) =
+            (0..widths.len()).partition(|c| *c < self.keys);
+        let fits = |size: &usize| {
+            others
+                .chunks(*size)
+                .all(|part| room(&keys) + room(part) <= width)
+        };
+        let most = (1..=others.len()).rev().find(fits).unwrap_or(1);
+        // parts of about as many columns: those of one state stay together
+        let size = others
+            .len()
+            .div_ceil(others.len().div_ceil(most).max(1))
+            .max(1);
+        let line = |line: &Vec<String>, columns: &[usize]| {
+            let cell = |c: &usize| match (line.get(*c).map_or("", String::as_str), widths[*c]) {
+                (text, width) if self.is_numeric(*c) => format!("  {text:>width$}"),
+                (text, width) => format!("  {text:<width$}"),
+            };
+            columns
+                .iter()
+                .map(cell)
+                .collect::<String>()
+                .trim_end()
+                .to_owned()
+        };
+        let part = |part: &[usize]| {
+            let columns = [&keys, part].concat();
+            lines
+                .iter()
+                .map(|l| line(l, &columns))
+                .collect::<Vec<_>>()
+                .join("\n")
+        };
+        if others.is_empty() {
+            part(&[])
+        } else {
+            others
+                .chunks(size)
+                .map(part)
+                .collect::<Vec<_>>()
+                .join("\n\n")
+        }
+    }
+
+    /// A table in Markdown.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        let escaped = |text: &String| {
+            text.replace('|', "\\|")
+                .replace('<', "&lt;")
+                .replace(['\n', '\r'], " ")
+        };
+        let lines: Vec<Vec<String>> = self
+            .lines()
+            .iter()
+            .map(|line| line.iter().map(escaped).collect())
+            .collect();
+        let widths = widths(&lines);
+        let row = |line: &Vec<String>| {
+            line.iter()
+                .zip(&widths)
+                .map(|(cell, w)| format!("| {cell:<w$} "))
+                .collect::<String>()
+                + "|"
+        };
+        let rule = widths
+            .iter()
+            .map(|w| format!("|{}", "-".repeat(w + 2)))
+            .collect::<String>()
+            + "|";
+        let mut rows: Vec<String> = lines.iter().map(row).collect();
+        rows.insert(1, rule);
+        rows.join("\n")
+    }
+
+    /// CSV with its head. A name that a spreadsheet would compute stands behind an apostrophe (CWE-1236).
+    #[must_use]
+    pub fn csv(&self) -> String {
+        let cell = |text: &String| {
+            let text = if is_formula(text) {
+                format!("'{text}")
+            } else {
+                text.clone()
+            };
+            match text.contains([',', '"', '\n', '\r']) {
+                true => format!("\"{}\"", text.replace('"', "\"\"")),
+                false => text,
+            }
+        };
+        let line = |line: &Vec<String>| line.iter().map(cell).collect::<Vec<_>>().join(",") + "\n";
+        self.lines().iter().map(line).collect()
+    }
+
+    /// A `tabular` of LaTeX (package booktabs), the first column to the left.
+    #[must_use]
+    pub fn latex(&self) -> String {
+        let line = |line: &Vec<String>| {
+            format!(
+                "{} \\\\\n",
+                line.iter()
+                    .map(|cell| latex_cell(cell))
+                    .collect::<Vec<_>>()
+                    .join(" & ")
+            )
+        };
+        let layout = format!("l{}", "r".repeat(self.head.len().saturating_sub(1)));
+        let body: String = self.lines()[1..].iter().map(line).collect();
+        let head = line(&self.head);
+        format!(
+            "\\begin{{tabular}}{{{layout}}}\n\\toprule\n{head}\\midrule\n{body}\\bottomrule\n\\end{{tabular}}\n"
+        )
+    }
+}
+
+/// Whether a text begins as a formula does and is no number.
+fn is_formula(text: &str) -> bool {
+    let number = text.split(' ').next().unwrap_or_default();
+    text.starts_with(['=', '+', '-', '@']) && text != "-" && number.parse::<f64>().is_err()
+}
+
+/// Characters of each column.
+fn widths(lines: &[Vec<String>]) -> Vec<usize> {
+    let width = |c: usize| {
+        lines
+            .iter()
+            .filter_map(|l| l.get(c))
+            .map(|cell| cell.chars().count())
+            .max()
+    };
+    (0..lines[0].len()).map(|c| width(c).unwrap_or(0)).collect()
+}
+
+/// A cell in LaTeX: its numbers as numbers are set, the rest as text.
+fn latex_cell(text: &str) -> String {
+    let word = |word: &str| {
+        let number = word.trim_start_matches('(').trim_end_matches([')', ',']);
+        latex_number(number).map_or_else(|| latex(word), |set| word.replacen(number, &set, 1))
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
+}
+
+/// A number with a sign or a power of ten in LaTeX: a hyphen is no minus.
+fn latex_number(text: &str) -> Option<String> {
+    text.parse::<f64>()
+        .ok()
+        .filter(|number| number.is_finite())?;
+    match (text.split_once('e'), text.strip_prefix('-')) {
+        (Some((factor, power)), _) => Some(format!("${factor}\\times10^{{{power}}}$")),
+        (None, Some(size)) => Some(format!("$-${size}")),
+        (None, None) => None,
+    }
+}
+
+/// A text in LaTeX.
+fn latex(text: &str) -> String {
+    let letter = |c: char| match c {
+        '&' | '%' | '$' | '#' | '_' | '{' | '}' => format!("\\{c}"),
+        '\\' => "\\textbackslash{}".to_owned(),
+        '~' => "\\textasciitilde{}".to_owned(),
+        '^' => "\\textasciicircum{}".to_owned(),
+        '±' => "$\\pm$".to_owned(),
+        '−' => "$-$".to_owned(),
+        '–' => "--".to_owned(),
+        '\n' | '\r' => " ".to_owned(),
+        c => c.to_string(),
+    };
+    text.chars().map(letter).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::Cell;
+
+    fn table<T: AsRef<str>>(rows: &[Vec<T>]) -> Table {
+        let texts = |row: &Vec<T>| {
+            row.iter()
+                .map(|c| c.as_ref().to_owned())
+                .collect::<Vec<_>>()
+        };
+        let mut table = Table::new([]).and(texts(&rows[0]));
+        let cells = rows[1..]
+            .iter()
+            .map(|row| texts(row).into_iter().map(Cell::from));
+        cells.for_each(|row| table.row(row));
+        table.with_keys(1)
+    }
+
+    #[test]
+    fn names_stay_in_their_cells() {
+        let markdown = table(&[vec!["run"], vec!["a|b\n<script>"]]).markdown();
+        assert_eq!(
+            markdown,
+            "| run              |\n|------------------|\n| a\\|b &lt;script> |"
+        );
+    }
+
+    #[test]
+    fn tables_of_other_programs_are_escaped() {
+        let table = table(&[vec!["run", "a, b"], vec!["x_1 & 5 %", "1 ± 2"]]);
+        assert_eq!(table.csv(), "run,\"a, b\"\nx_1 & 5 %,1 ± 2\n");
+        let names = ["=cmd|x", "@SUM(1)", "-2+3", "+a", "-2.5 ± 1", "-"].map(is_formula);
+        assert_eq!(names, [true, true, true, true, false, false]);
+        let latex = table.latex();
+        assert!(
+            latex.starts_with("\\begin{tabular}{lr}\n\\toprule\nrun & a, b \\\\\n\\midrule\n"),
+            "{latex}"
+        );
+        assert!(
+            latex.contains("x\\_1 \\& 5 \\% & 1 $\\pm$ 2 \\\\\n\\bottomrule"),
+            "{latex}"
+        );
+        let set = ["-1.67 ± 5e-4 (1.67)", "9.50, -2e-3", "a-4 -b 1e400"].map(latex_cell);
+        assert_eq!(
+            set,
+            [
+                "$-$1.67 $\\pm$ $5\\times10^{-4}$ (1.67)",
+                "9.50, $-2\\times10^{-3}$",
+                "a-4 -b 1e400"
+            ]
+        );
+    }
+
+    /// Columns of 22 characters with their gap beside a key of 12: four take 100, five 122. Nine are three times three.
+    #[test]
+    fn wide_tables_are_cut_and_lose_nothing() {
+        let row = |k: usize| {
+            let cells = (0..9).map(|c| format!("{:>20}", format!("{k}.{c}")));
+            std::iter::once(format!("{k:>10}"))
+                .chain(cells)
+                .collect::<Vec<String>>()
+        };
+        let wide = table(&(0..3).map(row).collect::<Vec<_>>());
+        let parts: Vec<String> = wide.columns(100).split("\n\n").map(str::to_owned).collect();
+        assert_eq!(parts.len(), 3);
+        assert!(
+            parts
+                .iter()
+                .flat_map(|part| part.lines())
+                .all(|line| line.chars().count() <= 100)
+        );
+        let words: Vec<&str> = parts
+            .iter()
+            .flat_map(|part| part.lines().nth(2))
+            .flat_map(str::split_whitespace)
+            .collect();
+        assert_eq!(
+            words,
+            [
+                "2", "2.0", "2.1", "2.2", "2", "2.3", "2.4", "2.5", "2", "2.6", "2.7", "2.8"
+            ]
+        );
+        // nothing can be done about a column that is wider than a terminal
+        assert_eq!(
+            table(&[vec!["a".repeat(100), "b".repeat(100)]])
+                .columns(100)
+                .lines()
+                .count(),
+            1
+        );
+    }
+
+    #[test]
+    fn numbers_stand_at_the_right() {
+        let mut table = Table::new(["state", "RMSE (m)"]);
+        table.row(["north".into(), Cell::number(12.0, "")]);
+        table.row(["east".into(), Cell::number(1.0, "")]);
+        assert_eq!(
+            table.columns(100),
+            "  state  RMSE (m)\n  north      12.0\n  east       1.00"
+        );
+    }
 }

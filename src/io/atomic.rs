@@ -2,7 +2,7 @@
 //! to the disk, then renamed. What a command may write is found out before its work, and no other writes it meanwhile.
 //!
 //! Refused, with `--force` too: an input, what another command writes, what nav-sim did not write.
-//! A file takes the place of an earlier result of its own kind; `--force` is for one of another kind.
+//! A file takes the place of an earlier result.
 //! A directory takes the place of the same run; `--force` is for one of another configuration, inputs or seed.
 
 use super::{Failure, Place, help, source};
@@ -167,15 +167,19 @@ fn remove_abandoned(path: &Path) {
 /// Writes a whole file.
 ///
 /// # Errors
-/// As [`AtomicFile::create`] and [`AtomicFile::commit`].
+/// As [`filled`] and [`AtomicFile::commit`].
 pub(crate) fn write(destination: &Path, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
     filled(destination, contents.as_ref())?.commit()
 }
 
 /// A file that is written but does not have its name yet.
+///
+/// # Errors
+/// When the directory cannot be made or written to, or the disk is full.
 pub(crate) fn filled(destination: &Path, contents: &[u8]) -> Result<AtomicFile, Failure> {
-    let mut file = AtomicFile::create(destination)?;
-    let written = file.write_all(contents).and_then(|()| file.flush());
+    let opened = AtomicFile::open(destination);
+    let mut file = opened.map_err(|e| Failure::unwritable(destination, e))?;
+    let written = file.file.write_all(contents);
     written.map_err(|e| Failure::io(destination, e))?;
     Ok(file)
 }
@@ -188,18 +192,11 @@ pub(crate) fn filled(destination: &Path, contents: &[u8]) -> Result<AtomicFile, 
 pub(crate) struct AtomicFile {
     destination: PathBuf,
     temporary: Option<Temporary>,
-    file: BufWriter<File>,
+    file: File,
 }
 
 impl AtomicFile {
     /// Opens the temporary file beside `destination`.
-    ///
-    /// # Errors
-    /// When the directory cannot be made or written to.
-    pub(crate) fn create(destination: &Path) -> Result<Self, Failure> {
-        Self::open(destination).map_err(|e| Failure::unwritable(destination, e))
-    }
-
     fn open(destination: &Path) -> io::Result<Self> {
         let (file, temporary, destination) = match fs::metadata(destination) {
             Ok(there) if there.is_dir() => return Err(ErrorKind::IsADirectory.into()),
@@ -219,7 +216,7 @@ impl AtomicFile {
         Ok(Self {
             destination,
             temporary,
-            file: BufWriter::with_capacity(1 << 16, file),
+            file,
         })
     }
 
@@ -228,24 +225,12 @@ impl AtomicFile {
     /// # Errors
     /// When the disk is full or the rename is refused; nothing is left then.
     pub(crate) fn commit(mut self) -> Result<(), Failure> {
-        let mut finish = || {
-            self.file.flush()?;
-            let Some(temporary) = &mut self.temporary else {
-                return Ok(());
-            };
-            self.file.get_ref().sync_all()?;
-            temporary.rename(&self.destination)
+        let Some(temporary) = &mut self.temporary else {
+            return Ok(());
         };
-        finish().map_err(|e| Failure::io(&self.destination, e))
-    }
-}
-
-impl Write for AtomicFile {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file.write(bytes)
-    }
-    fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
+        let synced = self.file.sync_all();
+        let finished = synced.and_then(|()| temporary.rename(&self.destination));
+        finished.map_err(|e| Failure::io(&self.destination, e))
     }
 }
 
@@ -379,12 +364,12 @@ impl Claim {
         let mut claimed = locked(&CLAIMED);
         if outputs.iter().any(|output| claimed.contains(output)) {
             let why = "is another output of the same command";
-            return Err(refused(shown, why).or(help::OUTPUT));
+            return Err(refused(shown, why).or_hint(help::OUTPUT));
         }
         let marked = fs::create_dir_all(parent_of(marker)).and_then(|()| Temporary::marker(marker));
         let Some((marker, is_left)) = marked.map_err(|e| Failure::unwritable(shown, e))? else {
             return Err(refused(shown, "is being written by another nav-sim")
-                .or(help::OUTPUT)
+                .or_hint(help::OUTPUT)
                 .or_hint("wait until that is done"));
         };
         claimed.extend(outputs.iter().cloned());
@@ -437,16 +422,16 @@ fn resolved(path: &Path) -> PathBuf {
     own.unwrap_or_else(|| path.to_owned())
 }
 
-/// Claims a file that can be made and is none of the inputs. A device is everybody's.
+/// Claims a file that can be made, is none of the inputs, and replaces nothing but a file of nav-sim. A device is everybody's.
 ///
 /// # Errors
-/// When it is an input, cannot be made, or another command writes it.
+/// When it is an input, cannot be made, another command writes it, or nav-sim did not write what stands there.
 pub(crate) fn claim_file<'a>(
     output: &Path,
     inputs: impl IntoIterator<Item = &'a Path>,
 ) -> Result<Claim, Failure> {
     guard_inputs(output, inputs)?;
-    AtomicFile::create(output)?; // dropped at once
+    drop(AtomicFile::open(output).map_err(|e| Failure::unwritable(output, e))?);
     if fs::metadata(output).is_ok_and(|m| !m.is_file()) {
         return Ok(Claim {
             outputs: Vec::new(),
@@ -457,34 +442,15 @@ pub(crate) fn claim_file<'a>(
     let output_at = resolved(output);
     let claim = Claim::new(output, &marker_beside(&output_at), vec![output_at.clone()])?;
     remove_abandoned(&output_at);
-    Ok(claim)
-}
-
-/// Claims a file for a result: what stands there may be replaced.
-///
-/// # Errors
-/// As [`claim_file`]; when nav-sim did not write what stands there, or it is a result of another kind and to stay.
-pub(crate) fn claim_result<'a>(
-    output: &Path,
-    inputs: impl IntoIterator<Item = &'a Path>,
-    kind: Written,
-    force: bool,
-) -> Result<Claim, Failure> {
-    let claim = claim_file(output, inputs)?;
-    replaceable(output, kind.found(output), force)?;
-    Ok(claim)
-}
-
-fn replaceable(path: &Path, found: Found, force: bool) -> Result<(), Failure> {
-    match found {
-        Found::Foreign => {
-            let why = "is not of this command: it is not replaced";
-            let error = refused(path, why).or(help::OUTPUT);
-            Err(error.or_hint("move it away"))
-        }
-        Found::Other(why) if !force => Err(refused(path, why).or(help::FORCE)),
-        Found::Other(_) | Found::Same => Ok(()),
+    if output.exists() && !source::head(output).is_ok_and(|text| is_own(&text)) {
+        return Err(foreign(output));
     }
+    Ok(claim)
+}
+
+fn foreign(path: &Path) -> Failure {
+    let error = refused(path, "is not of this command: it is not replaced");
+    error.or_hint(help::OUTPUT).or_hint("move it away")
 }
 
 /// Refuses an output that is one of the inputs, under whatever name.
@@ -498,7 +464,7 @@ fn guard_inputs<'a>(
         false => Ok(()),
         true => {
             let why = "is an input of this command and would be overwritten";
-            Err(refused(output, why).or(help::OUTPUT))
+            Err(refused(output, why).or_hint(help::OUTPUT))
         }
     }
 }
@@ -532,8 +498,15 @@ pub(crate) fn claim_directory<'a>(
         Err(_) => empty_or_new(directory),
         Ok(text) => recognise(&text),
     };
-    replaceable(directory, found, force)?;
-    Ok(claim)
+    match found {
+        Found::Foreign => Err(foreign(directory)),
+        Found::Other if !force => {
+            let why = "holds the result of another configuration, other inputs or another seed";
+            Err(refused(directory, why)
+                .or_hint("name another place for it, or replace it with --force"))
+        }
+        Found::Other | Found::Same => Ok(claim),
+    }
 }
 
 /// Files of the same names would be lost in a directory that holds anything.
@@ -546,102 +519,42 @@ fn empty_or_new(directory: &Path) -> Found {
     }
 }
 
-/// A kind of file that nav-sim writes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Written {
-    Calibrated,
-    Datasheet,
-    Required,
-    Tuned,
-    Curves,
-    Draws,
-    Signals,
-    Comparison,
-    Export,
-    Page,
-    Svg,
-    Png,
-    Trajectory,
+/// Texts that tell files of nav-sim: models, exports, pages, figures, pictures.
+const MARKS: [&str; 5] = [
+    "program = \"nav-sim ",
+    "(nav-sim export)",
+    "<meta name=\"generator\" content=\"nav-sim\">",
+    "class=\"chart wide\"",
+    "Software\0nav-sim",
+];
+const JSON: [&str; 2] = ["{\n  \"schema_version\"", "{\"schema_version\""];
+const TRAJECTORY: &str =
+    "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n";
+
+/// True of a text that nav-sim wrote, and of an empty one. Other programs write tables with the same header, but not each
+/// number in its shortest form.
+fn is_own(text: &str) -> bool {
+    let is_shortest = |cell: &str| cell.parse::<f64>().is_ok_and(|x| x.to_string() == cell);
+    let mut rows = text
+        .strip_prefix(TRAJECTORY)
+        .into_iter()
+        .flat_map(str::lines);
+    text.is_empty()
+        || JSON.iter().any(|start| text.starts_with(start))
+        || MARKS.iter().any(|mark| text.contains(mark))
+        || rows
+            .next()
+            .is_some_and(|row| row.split(',').all(is_shortest))
 }
 
-/// Texts that every file of a kind has.
-const MARKS: [(Written, [&str; 2]); 13] = {
-    const MODEL: &str = "program = \"nav-sim ";
-    const JSON: &str = "\"schema_version\"";
-    [
-        (Written::Calibrated, [MODEL, "[[provenance.fits]]"]),
-        (Written::Datasheet, [MODEL, "estimator = \"datasheet\""]),
-        (Written::Required, [MODEL, "made_by = \"require\""]),
-        (Written::Tuned, [MODEL, "made_by = \"tune\""]),
-        (Written::Curves, [JSON, "\"curves\""]),
-        (Written::Draws, [JSON, "\"draws\""]),
-        (Written::Signals, [JSON, "\"edof_method\""]),
-        (Written::Comparison, [JSON, "\"paired\""]),
-        (Written::Export, ["(nav-sim export)", ""]),
-        (
-            Written::Page,
-            ["<meta name=\"generator\" content=\"nav-sim\">", ""],
-        ),
-        (Written::Svg, ["<svg", "class=\"chart wide\""]),
-        (Written::Png, ["PNG", "Software\0nav-sim"]),
-        (
-            Written::Trajectory,
-            [
-                "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n",
-                "",
-            ],
-        ),
-    ]
-};
-
-impl Written {
-    /// What stands at a path where a file of this kind is to be written.
-    fn found(self, path: &Path) -> Found {
-        let Ok(text) = source::head(path) else {
-            return match path.exists() {
-                true => Found::Foreign,
-                false => Found::Same,
-            };
-        };
-        let is_of = |(kind, marks): &&(Self, [&str; 2])| {
-            marks.iter().all(|mark| text.contains(mark)) && kind.is_as_written(&text)
-        };
-        let kinds: Vec<Self> = MARKS.iter().filter(is_of).map(|(kind, _)| *kind).collect();
-        match kinds[..] {
-            _ if text.is_empty() || kinds.contains(&self) => Found::Same,
-            [] => Found::Foreign,
-            _ => Found::Other("holds another kind of result"),
-        }
-    }
-
-    /// Other programs write tables with the same header, but not each number in its shortest form.
-    fn is_as_written(self, text: &str) -> bool {
-        let row = text.lines().nth(1).unwrap_or_default();
-        let is_shortest = |cell: &str| cell.parse::<f64>().is_ok_and(|x| x.to_string() == cell);
-        self != Self::Trajectory || row.split(',').all(is_shortest)
-    }
-}
-
-/// What stands where a result is to be written; in a directory told by its last file, which appears when the others are whole.
+/// What stands in a directory of results, told by its last file, which appears when the others are whole.
 pub(crate) enum Found {
     /// Nothing that may be replaced.
     Foreign,
-    /// Another result: how so.
-    Other(&'static str),
+    /// A result of another configuration, other inputs or another seed.
+    Other,
     /// An earlier result of what is to be written, or nothing.
     Same,
-}
-
-impl Found {
-    /// A result of this command, by whether all that decides it is the same.
-    pub(crate) const fn result(is_same: bool) -> Self {
-        match is_same {
-            true => Self::Same,
-            false => Self::Other(
-                "holds the result of another configuration, other inputs or another seed",
-            ),
-        }
-    }
 }
 
 #[cfg(test)]

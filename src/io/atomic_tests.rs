@@ -15,8 +15,7 @@ fn listing(dir: &Path) -> Vec<String> {
 fn a_file_appears_at_commit_only() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("deep/er/model.toml");
-    let mut file = AtomicFile::create(&path).unwrap();
-    file.write_all(b"whole").unwrap();
+    let file = filled(&path, b"whole").unwrap();
     assert!(!path.exists());
     file.commit().unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"whole");
@@ -54,9 +53,7 @@ fn a_dropped_file_leaves_nothing_and_the_old_one_stays() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.csv");
     write(&path, "old").unwrap();
-    let mut file = AtomicFile::create(&path).unwrap();
-    file.write_all(b"half").unwrap();
-    drop(file);
+    drop(filled(&path, b"half").unwrap());
     assert_eq!(fs::read(&path).unwrap(), b"old");
     assert_eq!(listing(dir.path()), ["a.csv"]);
 }
@@ -101,7 +98,7 @@ fn a_full_disk_is_an_error_that_names_the_output() {
 #[test]
 fn a_directory_is_no_file_and_a_file_no_directory() {
     let dir = tempfile::tempdir().unwrap();
-    assert!(AtomicFile::create(dir.path()).is_err());
+    assert!(filled(dir.path(), b"").is_err());
     let file = dir.path().join("f");
     write(&file, "x").unwrap();
     assert!(AtomicDir::create(&file).is_err());
@@ -233,7 +230,7 @@ fn a_claim_ends_with_its_holder() {
 fn where_nothing_can_be_made_another_path_is_the_remedy() {
     for path in ["/proc/no_such_place", "/proc/no_such_place/inside"].map(Path::new) {
         for e in [
-            AtomicFile::create(path).unwrap_err(),
+            filled(path, b"").unwrap_err(),
             AtomicDir::create(path).unwrap_err(),
         ] {
             let shown = path.display();

@@ -63,11 +63,10 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, Failure> {
     };
     if name.ends_with(".json") || text.trim_start().starts_with('{') {
         // What this program says of its results has a version; of those only curves have wavelet variances to be read.
-        let is_record = text.contains("\"schema_version\"") && !text.contains("\"wv\"");
-        return Ok(if is_record {
-            FileKind::Record
-        } else {
-            FileKind::Curve
+        let has = |key: &str| text.contains(key);
+        return Ok(match has("\"schema_version\"") && !has("\"wv\"") {
+            true => FileKind::Record,
+            false => FileKind::Curve,
         });
     }
     // No table of numbers is TOML, which needs no ending then: a pipe has none.
@@ -119,26 +118,23 @@ fn bare_kind(text: &str) -> Option<FileKind> {
 }
 
 fn table_kind(text: &str) -> FileKind {
-    let position =
-        |line: &str| line.contains("lat_deg") || line.contains("n_m") && line.contains("e_m");
-    let fixes = |line: &str| {
-        position(line)
-            && ["sd_", "std_", "sigma_"].iter().any(|s| line.contains(s))
-            && !line.contains("yaw")
+    let has_any = |line: &str, words: &[&str]| words.iter().any(|word| line.contains(word));
+    let is_position = |line: &str| {
+        has_any(line, &["lat_deg"]) || has_any(line, &["n_m"]) && has_any(line, &["e_m"])
     };
+    let is_fix = |line: &str| {
+        is_position(line) && has_any(line, &["sd_", "std_", "sigma_"]) && !has_any(line, &["yaw"])
+    };
+    let mut head = text.lines().take(20);
     if let Some(kind) = bare_kind(text) {
         kind
     } else if is_nmea(text) || is_rtklib(text) {
         FileKind::Gnss
-    } else if text
-        .lines()
-        .take(20)
-        .any(|line| line.contains("tau_samples"))
-    {
+    } else if head.clone().any(|line| has_any(line, &["tau_samples"])) {
         FileKind::Curve
-    } else if text.lines().take(20).any(fixes) {
+    } else if head.clone().any(is_fix) {
         FileKind::Gnss
-    } else if text.lines().take(20).any(position) {
+    } else if head.any(is_position) {
         FileKind::Trajectory
     } else {
         FileKind::Recording

@@ -1,6 +1,6 @@
 //! Files as inputs: which ones are meant, and their fingerprints.
 
-use super::{Failure, hash};
+use super::{Failure, source};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ pub struct Input {
 /// # Errors
 /// When the system refuses.
 pub(crate) fn input(role: &str, path: &Path) -> Result<Input, Failure> {
-    let blake3 = hash::of_file(path).map_err(|e| Failure::io(path, e))?;
+    let blake3 = hash_of_file(path).map_err(|e| Failure::io(path, e))?;
     Ok(Input {
         role: role.to_owned(),
         path: path.display().to_string(),
@@ -51,4 +51,29 @@ pub(crate) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         files.extend(within);
     }
     Ok(files)
+}
+
+/// BLAKE3 of a file's bytes, in hexadecimal, whatever its size.
+///
+/// # Errors
+/// When the system refuses.
+fn hash_of_file(path: &Path) -> std::io::Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(source::open(path)?)?;
+    Ok(hasher.finalize().to_hex().to_string())
+}
+
+/// BLAKE3 of bytes, in hexadecimal.
+pub(crate) fn hash_of(bytes: &[u8]) -> String {
+    blake3::hash(bytes).to_hex().to_string()
+}
+
+/// BLAKE3 of samples, in hexadecimal.
+pub(crate) fn hash_of_samples(samples: &[f64]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for block in samples.chunks(4096) {
+        let bytes: Vec<u8> = block.iter().flat_map(|x| x.to_le_bytes()).collect();
+        hasher.update(&bytes);
+    }
+    hasher.finalize().to_hex().to_string()
 }

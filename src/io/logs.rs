@@ -1,6 +1,6 @@
 //! Logs of robots, flight controllers and receivers ([`nav_sim_logs`]), among the files that are read.
 
-use super::{Failure, Place, help};
+use super::{Failure, Place};
 use nav_sim_logs::{Damage, Error, Fault, HEAD, Kind, Log, Stamp, recognise};
 use std::fs::File;
 use std::io::Read;
@@ -42,10 +42,12 @@ pub(crate) fn refused(path: &Path, error: Error) -> Failure {
     match error {
         Error::Io(source) => Failure::io(path, source),
         Error::SeveralTopics { .. } | Error::NoTopic { .. } => {
-            Failure::contents(shown, Place::Within, error.to_string()).or(help::TOPIC)
+            Failure::contents(shown, Place::Within, error.to_string())
+                .or_hint("--topic NAME names one (nav-sim inspect lists them)")
         }
         Error::At(_, Fault::TimeBack { .. }) => {
-            Failure::contents(shown, Place::Within, error.to_string()).or(help::STAMP)
+            Failure::contents(shown, Place::Within, error.to_string())
+                .or_option(("stamp", "--stamp log takes the times of arrival"))
         }
         Error::NotRead(_) => {
             let refusal = Failure::contents(shown, Place::Itself, format!("is {error}"));

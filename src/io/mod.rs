@@ -7,7 +7,6 @@ pub mod datasheet;
 pub mod draws_file;
 pub(crate) mod file_kind;
 pub(crate) mod fusion_files;
-pub(crate) mod hash;
 pub(crate) mod input;
 pub mod logs;
 pub mod model_file;

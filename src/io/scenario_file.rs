@@ -3,7 +3,6 @@
 use super::Failure;
 use super::toml_file::Source;
 use nav_sim_navigation::scenario::Scenario;
-use nav_sim_signal::units::SettingError;
 use std::path::Path;
 
 /// Reads and checks a scenario.
@@ -11,29 +10,12 @@ use std::path::Path;
 /// # Errors
 /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
 pub(crate) fn read(path: &Path) -> Result<Scenario, Failure> {
-    read_for(path, |_| Ok(()))
+    from_source(&Source::read(path)?)
 }
 
-/// Reads and checks a scenario, also by a rule of the study it is for.
-///
-/// # Errors
-/// As [`read`].
-fn read_for(
-    path: &Path,
-    rule: impl FnOnce(&Scenario) -> Result<(), SettingError>,
-) -> Result<Scenario, Failure> {
-    from_source(&Source::read(path)?, rule)
-}
-
-fn from_source(
-    source: &Source,
-    rule: impl FnOnce(&Scenario) -> Result<(), SettingError>,
-) -> Result<Scenario, Failure> {
+fn from_source(source: &Source) -> Result<Scenario, Failure> {
     let scenario: Scenario = source.get()?;
-    scenario
-        .validate()
-        .and_then(|()| rule(&scenario))
-        .map_err(|e| source.setting(&e))?;
+    scenario.validate().map_err(|e| source.setting(&e))?;
     Ok(scenario)
 }
 
@@ -43,7 +25,7 @@ mod tests {
     use serde_json::Value;
 
     fn refused(text: &str) -> (String, Option<String>) {
-        let error = from_source(&Source::new("s.toml", text), |_| Ok(())).unwrap_err();
+        let error = from_source(&Source::new("s.toml", text)).unwrap_err();
         (error.to_string(), error.advice())
     }
 
@@ -240,6 +222,6 @@ mod tests {
 
     #[test]
     fn states_may_be_a_number() {
-        assert!(from_source(&Source::new("s.toml", "filter.states = 15"), |_| Ok(())).is_ok());
+        assert!(from_source(&Source::new("s.toml", "filter.states = 15")).is_ok());
     }
 }

@@ -198,7 +198,9 @@ mod tests {
         assert_eq!(text(&path).unwrap(), "a = 1\n");
         writer.join().unwrap();
         assert_eq!(text(&path).unwrap(), "a = 1\n");
-        let hash = crate::io::hash::of_file(&path).unwrap();
+        let hash = crate::io::input::input("a", &path)
+            .map(|found| found.blake3)
+            .unwrap();
         assert_eq!(hash, blake3::hash(b"a = 1\n").to_hex().to_string());
     }
 }

@@ -1,6 +1,7 @@
 //! Bytes of a log, with their offsets.
 
-use crate::error::{Error, Fault};
+use std::fmt;
+use std::fmt::{Display, Formatter};
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -127,5 +128,441 @@ impl Input {
     /// The bytes from here on, as many as there are or so many.
     pub(crate) fn take(self, bytes: u64) -> impl Read {
         self.source.take(bytes)
+    }
+}
+
+// Numbers within the bytes of a message.
+
+/// Bytes of a message, read in order; `None` beyond their end.
+#[derive(Clone, Copy)]
+pub(crate) struct Bytes<'a> {
+    all: &'a [u8],
+    at: usize,
+    is_big_endian: bool,
+    /// Numbers are aligned to their own size, at most to so many bytes.
+    alignment: usize,
+}
+
+impl<'a> Bytes<'a> {
+    pub(crate) const fn little(all: &'a [u8]) -> Self {
+        Self::new(all, false, 1)
+    }
+
+    pub(crate) const fn new(all: &'a [u8], is_big_endian: bool, alignment: usize) -> Self {
+        Self {
+            all,
+            at: 0,
+            is_big_endian,
+            alignment,
+        }
+    }
+
+    pub(crate) fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let taken = self.all.get(self.at..self.at.checked_add(count)?)?;
+        self.at += count;
+        Some(taken)
+    }
+
+    fn number<const N: usize>(&mut self) -> Option<[u8; N]> {
+        self.at = self.at.next_multiple_of(N.min(self.alignment));
+        let mut bytes = *self.take(N)?.first_chunk::<N>()?;
+        if self.is_big_endian {
+            bytes.reverse();
+        }
+        Some(bytes)
+    }
+
+    pub(crate) fn u8(&mut self) -> Option<u8> {
+        self.number().map(u8::from_le_bytes)
+    }
+
+    pub(crate) fn u16(&mut self) -> Option<u16> {
+        self.number().map(u16::from_le_bytes)
+    }
+
+    pub(crate) fn u32(&mut self) -> Option<u32> {
+        self.number().map(u32::from_le_bytes)
+    }
+
+    pub(crate) fn i32(&mut self) -> Option<i32> {
+        self.number().map(i32::from_le_bytes)
+    }
+
+    pub(crate) fn u64(&mut self) -> Option<u64> {
+        self.number().map(u64::from_le_bytes)
+    }
+
+    fn f64(&mut self) -> Option<f64> {
+        self.number().map(f64::from_le_bytes)
+    }
+
+    pub(crate) fn f64s<const N: usize>(&mut self) -> Option<[f64; N]> {
+        let mut values = [0.0; N];
+        for value in &mut values {
+            *value = self.f64()?;
+        }
+        Some(values)
+    }
+
+    /// A string behind its length.
+    pub(crate) fn string(&mut self) -> Option<&'a [u8]> {
+        let length = self.u32()?;
+        self.take(length as usize)
+    }
+}
+
+/// Text of a name in a file.
+pub(crate) fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Types of numbers, with their bytes.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Number {
+    Signed(usize),
+    Unsigned(usize),
+    Float(usize),
+}
+
+impl Number {
+    pub(crate) const fn size(self) -> usize {
+        let (Self::Signed(size) | Self::Unsigned(size) | Self::Float(size)) = self;
+        size
+    }
+
+    pub(crate) fn read(self, bytes: &mut Bytes<'_>) -> Option<f64> {
+        Some(match self {
+            Self::Signed(1) => bytes.u8()?.cast_signed().into(),
+            Self::Signed(2) => bytes.u16()?.cast_signed().into(),
+            Self::Signed(4) => bytes.i32()?.into(),
+            Self::Signed(_) => bytes.u64()?.cast_signed() as f64,
+            Self::Unsigned(1) => bytes.u8()?.into(),
+            Self::Unsigned(2) => bytes.u16()?.into(),
+            Self::Unsigned(4) => bytes.u32()?.into(),
+            Self::Unsigned(_) => bytes.u64()? as f64,
+            Self::Float(4) => f32::from_bits(bytes.u32()?).into(),
+            Self::Float(_) => bytes.f64()?,
+        })
+    }
+}
+
+// Formats, told by their first bytes.
+
+/// Bytes from the start of a file that [`recognise`] looks at.
+pub const HEAD: usize = 4096;
+
+/// Format of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// MCAP, of ROS 2 or ROS 1.
+    Mcap,
+    /// Bag of ROS 1, version 2.0.
+    Bag,
+    /// Log of PX4.
+    Ulog,
+    /// Messages of a u-blox receiver, perhaps among others.
+    Ubx,
+    /// Arrays of NumPy in a zip archive.
+    Npz,
+    /// One that is not read: its name, and the command that makes one that is.
+    Other(&'static str, &'static str),
+}
+
+impl Kind {
+    /// Name, as in a sentence.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Mcap => "an MCAP log",
+            Self::Bag => "a ROS 1 bag",
+            Self::Ulog => "a PX4 ULog",
+            Self::Ubx => "a u-blox UBX log",
+            Self::Npz => "a NumPy .npz",
+            Self::Other(name, _) => name,
+        }
+    }
+
+    /// The command that makes a file that is read, for a format that is not.
+    #[must_use]
+    pub const fn conversion(self) -> Option<&'static str> {
+        match self {
+            Self::Other(_, conversion) => Some(conversion),
+            _ => None,
+        }
+    }
+}
+
+const MATLAB: &str = "in MATLAB: writematrix(imu, 'imu.csv')";
+const HDF5: Kind = Kind::Other("an HDF5 file, as MATLAB 7.3 writes", MATLAB);
+/// First bytes of the formats that have such.
+const MAGIC: [(&[u8], Kind); 10] = [
+    (b"\x89MCAP0\r\n", Kind::Mcap),
+    (b"#ROSBAG V", Kind::Bag),
+    (b"ULog\x01\x12\x35", Kind::Ulog),
+    (
+        b"SQLite format 3\0",
+        Kind::Other(
+            "a SQLite database, as rosbag2 writes (.db3)",
+            "mcap convert FILE.db3 FILE.mcap",
+        ),
+    ),
+    // a description of the description of messages comes first
+    (
+        b"\xa3\x95\x80",
+        Kind::Other(
+            "an ArduPilot DataFlash log",
+            "mavlogdump.py --format csv --types IMU FILE.bin > imu.csv",
+        ),
+    ),
+    (
+        b"MATLAB 5.0 MAT-file",
+        Kind::Other("a MATLAB .mat file", MATLAB),
+    ),
+    (b"MATLAB 7.3 MAT-file", HDF5),
+    (b"\x89HDF\r\n\x1a\n", HDF5),
+    // preamble of an Xbus message, and the bus itself
+    (
+        b"\xfa\xff",
+        Kind::Other(
+            "an Xsens .mtb log",
+            "in MT Manager: File > Export, as ASCII (.txt)",
+        ),
+    ),
+    (
+        b"$@",
+        Kind::Other(
+            "a Septentrio SBF log",
+            "bin2asc -f FILE.sbf -m PVTGeodetic2 -t",
+        ),
+    ),
+];
+/// First bytes of a zip archive with and without files.
+const ZIP: [&[u8]; 2] = [b"PK\x03\x04", b"PK\x05\x06"];
+/// First bytes of a message of u-blox.
+pub(crate) const UBX_SYNC: [u8; 2] = [0xb5, 0x62];
+
+/// Format of a file by its first bytes, at best [`HEAD`] of them.
+///
+/// ```
+/// use nav_sim_logs::{Kind, recognise};
+///
+/// assert_eq!(recognise(b"\x89MCAP0\r\n\x01"), Some(Kind::Mcap));
+/// let kind = recognise(b"SQLite format 3\0\x10\0").expect("a known one");
+/// assert_eq!(kind.conversion(), Some("mcap convert FILE.db3 FILE.mcap"));
+/// assert_eq!(recognise(b"t_s,gyro_x\n0.0,1.0\n"), None);
+/// ```
+#[must_use]
+pub fn recognise(head: &[u8]) -> Option<Kind> {
+    if let Some((_, kind)) = MAGIC.iter().find(|(magic, _)| head.starts_with(magic)) {
+        return Some(*kind);
+    }
+    if ZIP.iter().any(|magic| head.starts_with(magic)) {
+        return Some(if first_name(head).is_some_and(|n| n.ends_with(b".npy")) {
+            Kind::Npz
+        } else {
+            Kind::Other("a zip archive", "unzip FILE.zip")
+        });
+    }
+    // the label of the first line stands in its columns 61 to 80
+    if head
+        .get(60..80)
+        .is_some_and(|label| label == b"RINEX VERSION / TYPE")
+    {
+        return Some(Kind::Other(
+            "a RINEX file",
+            "rnx2rtkp -o fixes.pos rover.obs base.obs FILE.nav",
+        ));
+    }
+    head.windows(2)
+        .enumerate()
+        .any(|(i, w)| w == UBX_SYNC && is_ubx(&head[i..]))
+        .then_some(Kind::Ubx)
+}
+
+/// Name of the first file in a zip archive.
+fn first_name(head: &[u8]) -> Option<&[u8]> {
+    let length = u16::from_le_bytes(*head.get(26..)?.first_chunk()?);
+    head.get(30..30 + usize::from(length))
+}
+
+/// A whole message of u-blox with its checksum; or the start of one that is the first of the file, as it may
+/// be longer than the bytes that are here.
+fn is_ubx(bytes: &[u8]) -> bool {
+    let Some(length) = bytes.get(4..).and_then(|b| b.first_chunk()) else {
+        return false;
+    };
+    let length = usize::from(u16::from_le_bytes(*length));
+    bytes.get(2..8 + length).is_some_and(|body| {
+        let (summed, sum) = body.split_at(4 + length);
+        ubx_checksum(summed) == sum
+    })
+}
+
+/// Checksum of a message of u-blox, over class, number, length and payload (RFC 1145, over bytes).
+pub(crate) fn ubx_checksum(bytes: &[u8]) -> [u8; 2] {
+    let (a, b) = bytes.iter().fold((0_u8, 0_u8), |(a, b), byte| {
+        let a = a.wrapping_add(*byte);
+        (a, b.wrapping_add(a))
+    });
+    [a, b]
+}
+
+// Errors of reading a log.
+
+/// Place in a log: a byte of the file, and the topic that was read.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Place {
+    /// Byte of the file; that of the chunk for what is packed within it.
+    pub offset: u64,
+    /// Topic, where one was being read.
+    pub topic: Option<String>,
+}
+
+impl Display for Place {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "byte {}", self.offset)?;
+        self.topic
+            .iter()
+            .try_for_each(|topic| write!(f, ", topic {topic}"))
+    }
+}
+
+/// Errors of reading a log; what to do about each is its [`hint`](Self::hint).
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The operating system refused.
+    #[error("{0}")]
+    Io(#[from] std::io::Error),
+    /// Bytes at a place are at fault.
+    #[error("{0}: {1}")]
+    At(Place, Fault),
+    /// Several topics could be meant.
+    #[error("{} topics have {what}: {}", .topics.len(), .topics.join(", "))]
+    #[expect(missing_docs, reason = "the choice")]
+    SeveralTopics {
+        what: &'static str,
+        topics: Vec<String>,
+    },
+    /// No topic is the one that is wanted.
+    #[error("no topic has {what}{}", in_place_of(.topics))]
+    #[expect(missing_docs, reason = "the topics that are there instead")]
+    NoTopic { what: String, topics: Vec<String> },
+    /// A format that is known by its first bytes, and is not read.
+    #[error("{}, which is not read", .0.name())]
+    NotRead(Kind),
+    /// Not one of the known formats.
+    #[error("not a known log")]
+    Unknown,
+}
+
+/// Faults of bytes.
+#[derive(Debug)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the fields are")]
+pub enum Fault {
+    /// A record goes beyond the end of the file.
+    Truncated { needed: u64, left: u64 },
+    /// The file lacks the end that its writer puts there last.
+    StillWritten,
+    /// A checksum differs.
+    Crc { stored: u32, computed: u32 },
+    /// An encoding or a compression that is not known.
+    Encoding(String),
+    /// A length beyond what any such message has.
+    TooLarge { bytes: u64, limit: u64 },
+    /// Stamps of a topic run backwards.
+    TimeBack { from_ns: i64, to_ns: i64 },
+    /// Bytes that do not follow the format.
+    Malformed(String),
+}
+
+impl Display for Fault {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Truncated { needed, left } => {
+                write!(f, "cut off, a record of {needed} bytes has {left}")
+            }
+            Self::StillWritten => {
+                f.write_str("the end is missing: still being written, or its writer was stopped")
+            }
+            Self::Crc { stored, computed } => {
+                write!(
+                    f,
+                    "CRC failed, stored {stored:08x}, computed {computed:08x}"
+                )
+            }
+            Self::Encoding(name) => write!(f, "unknown encoding {name:?}"),
+            Self::TooLarge { bytes, limit } => {
+                write!(f, "{bytes} bytes where at most {limit} make sense")
+            }
+            Self::TimeBack { from_ns, to_ns } => {
+                let [from, to] = [*from_ns, *to_ns].map(seconds);
+                write!(f, "time goes back from {from} s to {to} s")
+            }
+            Self::Malformed(what) => f.write_str(what),
+        }
+    }
+}
+
+impl Error {
+    pub(crate) const fn at(offset: u64, fault: Fault) -> Self {
+        let topic = None;
+        Self::At(Place { offset, topic }, fault)
+    }
+
+    pub(crate) fn malformed(offset: u64, what: impl Into<String>) -> Self {
+        Self::at(offset, Fault::Malformed(what.into()))
+    }
+
+    pub(crate) fn encoding(offset: u64, encoding: &[u8]) -> Self {
+        let encoding = String::from_utf8_lossy(encoding).into_owned();
+        Self::at(offset, Fault::Encoding(encoding))
+    }
+
+    /// Byte at which a file ends that its writer did not end.
+    pub(crate) const fn cut(&self) -> Option<u64> {
+        match self {
+            Self::At(place, Fault::Truncated { .. } | Fault::StillWritten) => Some(place.offset),
+            _ => None,
+        }
+    }
+
+    /// The same, said of a topic.
+    pub(crate) fn of_topic(mut self, name: &str) -> Self {
+        if let Self::At(place, _) = &mut self {
+            place.topic.get_or_insert_with(|| name.to_owned());
+        }
+        self
+    }
+
+    /// Advice on what to do.
+    #[must_use]
+    pub const fn hint(&self) -> Option<&'static str> {
+        match self {
+            Self::At(_, Fault::Encoding(_) | Fault::TooLarge { .. } | Fault::TimeBack { .. }) => {
+                None
+            }
+            Self::At(..) => Some("the file is damaged: copy it again"),
+            Self::NotRead(kind) => kind.conversion(),
+            _ => None,
+        }
+    }
+}
+
+fn seconds(ns: i64) -> String {
+    let sign = if ns < 0 { "-" } else { "" };
+    format!(
+        "{sign}{}.{:09}",
+        ns.unsigned_abs() / 1_000_000_000,
+        ns.unsigned_abs() % 1_000_000_000
+    )
+}
+
+fn in_place_of(topics: &[String]) -> String {
+    if topics.is_empty() {
+        String::new()
+    } else {
+        format!("; there are {}", topics.join(", "))
     }
 }

@@ -27,40 +27,24 @@
     )
 )]
 
-// L0: errors, samples, bytes
-mod bytes;
-mod recognise;
-mod sample;
-// L1
-mod error;
-// L2
-mod channel;
+// L0: bytes and errors
 mod input;
-// L3
+// L1: channels and samples
+mod channel;
+// L2: arrays
 pub mod npy;
 #[cfg(feature = "npz")]
 pub mod npz;
-#[cfg(any(feature = "mcap", feature = "bag"))]
-mod unpack;
-// L4
+// L3: formats
 #[cfg(any(feature = "mcap", feature = "bag"))]
 mod container;
-// L5: formats
-#[cfg(feature = "bag")]
-mod bag;
-#[cfg(feature = "mcap")]
-mod mcap;
-#[cfg(any(feature = "mcap", feature = "bag"))]
-mod ros;
 #[cfg(feature = "ubx")]
 mod ubx;
 #[cfg(feature = "ulog")]
 mod ulog;
-// L6
+// L4
 mod log;
 
-pub use channel::{Channel, Content};
-pub use error::{Error, Fault, Place};
+pub use channel::{Channel, Clock, Content, Fix, ImuSample, Stamp, in_seconds};
+pub use input::{Error, Fault, HEAD, Kind, Place, recognise};
 pub use log::{Damage, Log};
-pub use recognise::{HEAD, Kind, recognise};
-pub use sample::{Clock, Fix, ImuSample, Stamp, in_seconds};

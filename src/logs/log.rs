@@ -1,10 +1,9 @@
 //! A log of any format.
 
-use crate::channel::{Channel, Content, Each, choose};
-use crate::error::{Error, Fault};
-use crate::input::Input;
-use crate::recognise::{HEAD, Kind, recognise};
-use crate::sample::{Fix, ImuSample, Sample, Stamp};
+use crate::channel::{Channel, Content, Each, Fix, ImuSample, Sample, Stamp, choose};
+#[cfg(any(feature = "mcap", feature = "bag"))]
+use crate::container;
+use crate::input::{Error, Fault, HEAD, Input, Kind, recognise};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -64,15 +63,9 @@ impl Log {
         let kind = recognise(&input.bytes(head, head)?).ok_or(Error::Unknown)?;
         let (survey, read): (Survey, Read) = match kind {
             #[cfg(feature = "mcap")]
-            Kind::Mcap => {
-                use crate::mcap::Mcap;
-                (crate::ros::survey::<Mcap>, crate::ros::read::<Mcap>)
-            }
+            Kind::Mcap => (container::survey, container::read),
             #[cfg(feature = "bag")]
-            Kind::Bag => {
-                use crate::bag::Bag;
-                (crate::ros::survey::<Bag>, crate::ros::read::<Bag>)
-            }
+            Kind::Bag => (container::survey, container::read),
             #[cfg(feature = "ulog")]
             Kind::Ulog => (crate::ulog::survey, crate::ulog::read),
             #[cfg(feature = "ubx")]

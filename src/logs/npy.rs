@@ -1,9 +1,8 @@
 //! Arrays in NumPy's own format, `.npy` (`numpy.lib.format`).
 
-use crate::bytes::{Bytes, Number};
-use crate::error::{Error, Fault};
-use crate::input::Input;
-use std::io::{self, Read};
+use crate::input::{Bytes, Error, Fault, Input, Number};
+use std::io;
+use std::io::Read;
 use std::path::Path;
 
 /// Longest header (bytes).
@@ -18,14 +17,6 @@ pub struct Array {
     pub shape: Vec<usize>,
     /// Numbers, the last dimension running fastest.
     pub values: Vec<f64>,
-}
-
-/// Header of an array.
-struct Header {
-    number: Number,
-    is_big_endian: bool,
-    shape: Vec<usize>,
-    is_fortran: bool,
 }
 
 /// Reads the array of a file.
@@ -48,12 +39,18 @@ pub(crate) fn read_from(from: &mut impl Read, size: u64, offset: u64) -> Result<
         _ => Error::malformed(offset, format!("not a NumPy array: {error}")),
     };
     let (text, header_bytes) = header_text(from).map_err(fault)?;
-    let header = Header::parse(&text, offset)?;
-    let count = header
-        .shape
-        .iter()
-        .try_fold(1_usize, |count, n| count.checked_mul(*n));
-    let bytes = count.and_then(|count| count.checked_mul(header.number.size()));
+    let unparsed = || {
+        let text = text.trim();
+        Error::malformed(
+            offset,
+            format!("the header of an array does not parse: {text}"),
+        )
+    };
+    let (kind, shape, is_fortran) = parse(&text).ok_or_else(unparsed)?;
+    let known = number(kind).ok_or_else(|| Error::encoding(offset, kind.as_bytes()));
+    let (is_big_endian, number) = known?;
+    let count = shape.iter().try_fold(1_usize, |n, of| n.checked_mul(*of));
+    let bytes = count.and_then(|count| count.checked_mul(number.size()));
     let left = size.saturating_sub(header_bytes);
     let needed = bytes.map_or(u64::MAX, |bytes| bytes as u64);
     let Some(bytes) = bytes.filter(|_| needed <= left) else {
@@ -61,22 +58,20 @@ pub(crate) fn read_from(from: &mut impl Read, size: u64, offset: u64) -> Result<
         return Err(Error::at(offset + header_bytes, fault));
     };
     let mut values = Vec::new();
-    let mut block = vec![0; BLOCK * header.number.size()];
+    let mut block = vec![0; BLOCK * number.size()];
     let mut left = bytes;
     while left > 0 {
-        let part = &mut block[..left.min(BLOCK * header.number.size())];
+        let most = left.min(block.len());
+        let part = &mut block[..most];
         from.read_exact(part).map_err(fault)?;
         left -= part.len();
-        let mut numbers = Bytes::new(part, header.is_big_endian, 1);
-        values.extend(std::iter::from_fn(|| header.number.read(&mut numbers)));
+        let mut numbers = Bytes::new(part, is_big_endian, 1);
+        values.extend(std::iter::from_fn(|| number.read(&mut numbers)));
     }
-    if header.is_fortran {
-        values = transposed(&values, &header.shape);
+    if is_fortran {
+        values = transposed(&values, &shape);
     }
-    Ok(Array {
-        shape: header.shape,
-        values,
-    })
+    Ok(Array { shape, values })
 }
 
 /// The header's text, and the bytes up to its end.
@@ -99,40 +94,17 @@ fn header_text(from: &mut impl Read) -> io::Result<(String, u64)> {
     }
     let mut text = vec![0; length];
     from.read_exact(&mut text)?;
-    Ok((crate::bytes::text(&text), (before + length) as u64))
+    Ok((crate::input::text(&text), (before + length) as u64))
 }
 
-impl Header {
-    /// The dictionary `{'descr': '<f8', 'fortran_order': False, 'shape': (40, 3), }`.
-    fn parse(text: &str, offset: u64) -> Result<Self, Error> {
-        let value = |key: &str| Some(text.split_once(key)?.1.trim_start_matches([' ', ':']));
-        let fault = || {
-            Error::malformed(
-                offset,
-                format!("the header of an array does not parse: {}", text.trim()),
-            )
-        };
-        let kind = value("'descr'").ok_or_else(fault)?;
-        let (is_big_endian, number) =
-            number(kind).ok_or_else(|| Error::encoding(offset, kind.as_bytes()))?;
-        let shape = value("'shape'")
-            .and_then(|v| v.strip_prefix('(')?.split_once(')'))
-            .ok_or_else(fault)?
-            .0;
-        let lengths = shape.split(',').map(str::trim).filter(|n| !n.is_empty());
-        let shape = lengths
-            .map(|n| n.parse().map_err(|_| fault()))
-            .collect::<Result<_, _>>()?;
-        let is_fortran = value("'fortran_order'")
-            .ok_or_else(fault)?
-            .starts_with("True");
-        Ok(Self {
-            number,
-            is_big_endian,
-            shape,
-            is_fortran,
-        })
-    }
+/// Type, shape and order of the dictionary `{'descr': '<f8', 'fortran_order': False, 'shape': (40, 3), }`.
+fn parse(text: &str) -> Option<(&str, Vec<usize>, bool)> {
+    let value = |key: &str| Some(text.split_once(key)?.1.trim_start_matches([' ', ':']));
+    let (shape, _) = value("'shape'")?.strip_prefix('(')?.split_once(')')?;
+    let lengths = shape.split(',').map(str::trim).filter(|n| !n.is_empty());
+    let shape: Option<Vec<usize>> = lengths.map(|n| n.parse().ok()).collect();
+    let is_fortran = value("'fortran_order'")?.starts_with("True");
+    Some((value("'descr'")?, shape?, is_fortran))
 }
 
 /// Order and type of numbers from `'<f8'`.

@@ -13,10 +13,12 @@
 //! # }
 //! ```
 
-use crate::error::{Error, Fault};
-use crate::npy::{self, Array};
+use crate::input::{Error, Fault};
+use crate::npy;
+use crate::npy::Array;
 use std::fs::File;
-use std::io::{self, BufReader};
+use std::io;
+use std::io::BufReader;
 use std::path::Path;
 use zip::ZipArchive;
 use zip::result::ZipError;

@@ -3,12 +3,8 @@
 //! A receiver's log is a stream of bytes with other protocols between: what is no message with its checksum is passed
 //! over, also one that is cut off at the end.
 
-use crate::bytes::Bytes;
-use crate::channel::{Channel, Content, Each};
-use crate::error::Error;
-use crate::input::Input;
-use crate::recognise::{UBX_SYNC, ubx_checksum};
-use crate::sample::{Clock, Fix, ImuSample, NS, Sample, Stamp, stated};
+use crate::channel::{Channel, Clock, Content, Each, Fix, ImuSample, NS, Sample, Stamp, stated};
+use crate::input::{Bytes, Error, Input, UBX_SYNC, ubx_checksum};
 use chrono::NaiveDate;
 use std::collections::BTreeMap;
 

@@ -254,11 +254,8 @@ fn the_version_says_more_if_asked() {
         String::from_utf8(output.stdout).unwrap()
     };
     let short = format!("nav-sim {}\n", env!("CARGO_PKG_VERSION"));
-    assert_eq!(
-        [said(&["--version"]), said(&["-V"])],
-        [short.clone(), short]
-    );
-    for words in [&["--version", "-v"][..], &["--verbose", "-V"], &["-vV"]] {
+    assert_eq!(said(&["-V"]), short);
+    for words in [&["--version"][..], &["--version", "-v"]] {
         let long = said(words);
         assert!(
             long.contains("build  ")

@@ -239,7 +239,7 @@ fn mistakes_are_refused_and_leave_nothing() {
     );
     fs::write(
         place.path("plain.toml"),
-        "[[accel]]\noperation = \"replace\"\npoints = 500\nsigma = 1\n",
+        "[[accel]]\noperation = \"step\"\nat_s = 5\namplitude = 1\n",
     )
     .unwrap();
     refused(
@@ -250,7 +250,7 @@ fn mistakes_are_refused_and_leave_nothing() {
             "--contaminate",
             "plain.toml",
         ],
-        "plain.toml, line 1: the replacement of points needs 500 samples, the record has 100 (replicate 1)",
+        "plain.toml, line 1: a step needs 500 samples, the record has 100 (replicate 1)",
         "",
     );
     fs::write(
@@ -281,7 +281,7 @@ fn mistakes_are_refused_and_leave_nothing() {
     );
     fs::write(
         place.path("plain.toml"),
-        "[[accel]]\noperation = \"replace\"\npoints = 500\nsigma = 1\n",
+        "[[accel]]\noperation = \"step\"\nat_s = 5\namplitude = 1\n",
     )
     .unwrap();
     refused(

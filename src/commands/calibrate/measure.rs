@@ -6,7 +6,7 @@ use super::model_file::CalibrationNote;
 use crate::app::reading::note_report;
 use crate::app::{Context, Failure};
 use crate::io::recordings::{FileReport, ReadOptions, Report};
-use crate::io::{curve_file, hash, recordings};
+use crate::io::{curve_file, input, recordings};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
     self, Advance, Beginning, Beginnings, Bootstrap, CalibrationError, Diagnosis, Estimator, Group,
@@ -334,7 +334,7 @@ impl MeasuredRecording {
         let signals = recording
             .signals
             .par_iter()
-            .map(|s| (s.channel, hash::samples(&s.samples)))
+            .map(|s| (s.channel, input::hash_of_samples(&s.samples)))
             .collect();
         let (recording, warm_ups) = without_warm_up(recording, skip_warm_up);
         let replicates = replicates(&recording, levels, tuning)?;

@@ -33,9 +33,8 @@ pub(crate) use model_file::CalibrationNote;
 use crate::app::inputs::{files, listed};
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
-use crate::io::atomic::Written;
 use crate::io::draws_file::DrawsFile;
-use crate::io::hash;
+use crate::io::input;
 use crate::io::model_file::ModelFile;
 use crate::parse;
 use crate::report;
@@ -161,7 +160,6 @@ impl Command for Calibrate {
     type Answer = Calibration;
     const NAME: &'static str = "calibrate";
     const OUT: Out = Out::File {
-        kind: Written::Calibrated,
         name: "model.toml",
         help: "The model file (default: model.toml; none for --curve)",
     };
@@ -171,7 +169,7 @@ impl Command for Calibrate {
         self.curve.is_none()
     }
 
-    fn endings(&self) -> Vec<(Cow<'static, str>, Written)> {
+    fn endings(&self) -> Vec<Cow<'static, str>> {
         endings(&self.estimator.possible())
     }
 
@@ -344,16 +342,16 @@ fn model_ending(stem: &str) -> String {
     }
 }
 
-/// Endings and kinds of all files of these estimators.
-fn endings(estimators: &[Estimator]) -> Vec<(Cow<'static, str>, Written)> {
+/// Endings of all files of these estimators.
+fn endings(estimators: &[Estimator]) -> Vec<Cow<'static, str>> {
     let of_estimator = |estimator: &Estimator| {
         let stem = stem_of(*estimator, estimators);
         [
-            (model_ending(&stem).into(), Written::Calibrated),
-            (format!("{stem}.wv.json").into(), Written::Curves),
-            (format!("{stem}.draws.json").into(), Written::Draws),
-            (format!("{stem}.html").into(), Written::Page),
-            (format!("{stem}.svg").into(), Written::Svg),
+            model_ending(&stem).into(),
+            format!("{stem}.wv.json").into(),
+            format!("{stem}.draws.json").into(),
+            format!("{stem}.html").into(),
+            format!("{stem}.svg").into(),
         ]
     };
     estimators.iter().flat_map(of_estimator).collect()
@@ -372,7 +370,7 @@ impl Calibration {
         let curves = report::json(&shown.curves);
         let mut model = self
             .note
-            .model_file(&shown, &hash::of_bytes(curves.as_bytes()));
+            .model_file(&shown, &input::hash_of(curves.as_bytes()));
         let mut draws = DrawsFile::of(&shown.outcomes, self.settings.rate_hz);
         if let Some((inflated, how)) = inflated {
             draws = None;

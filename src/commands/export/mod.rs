@@ -11,7 +11,6 @@ pub(crate) use words::Quantity;
 
 use crate::app::inputs::files;
 use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Refuse, Result};
-use crate::io::atomic::Written;
 use crate::io::model_file;
 use crate::io::model_file::ModelFile;
 use crate::parse::{one_of, seconds_range};
@@ -81,7 +80,6 @@ impl Command for ExportArgs {
     type Answer = ExportAnswer;
     const NAME: &'static str = "export";
     const OUT: Out = Out::File {
-        kind: Written::Export,
         name: "parameters.txt",
         help: "File to write to (default: stdout)",
     };

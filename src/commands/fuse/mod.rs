@@ -103,7 +103,7 @@ const ROWS_HZ: f64 = 10.0;
 /// (dtheta_x_rad … dv_z_m_s, time = end of the interval). GNSS: t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m,
 /// sd_d_m, and v_n_m_s … sd_vd_m_s where velocity is measured. Either may be a text file of KF-GINS (7 or 8
 /// columns of increments; 7 of position, 13 with velocity). GNSS may also be a solution of RTKLIB (.pos, GPST)
-/// or NMEA sentences (GGA; RMC or VTG, GST), in seconds of the day or in Unix time, as the IMU is. A log (MCAP, bag,
+/// or NMEA sentences (GGA, RMC, GST), in seconds of the day or in Unix time, as the IMU is. A log (MCAP, bag,
 /// ULog, UBX) may be either, or both. Gaps of up to 5 s are bridged, with the uncertainty that the recording shows over such times elsewhere. Writes solution.csv,
 /// innovations.csv, errors.csv (with a reference), solution.kml, summary.json, report.html, manifest.json; with
 /// --smooth also smoothed.csv, errors_smoothed.csv, smoothed.kml. Exit code 3: the solution is overconfident.

@@ -4,7 +4,7 @@ use crate::app::Manifest;
 use crate::commands::run::RunOrigin;
 use crate::failure::{Failure, Place, Result};
 use crate::io::run_tables::{REPEAT, parse_epochs, parse_runs};
-use crate::io::{hash, source};
+use crate::io::{input, source};
 use nav_sim_navigation::metrics::{Measured, PerState, VerdictKind};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::{OutageRecord, RunRecord};
@@ -109,7 +109,7 @@ fn part<T>(
     let (path, text) = text(directory, name)?;
     let found = parse(&path, &text)?;
     match manifest.outputs.get(name) {
-        Some(blake3) if *blake3 != hash::of_bytes(text.as_bytes()) => {
+        Some(blake3) if *blake3 != input::hash_of(text.as_bytes()) => {
             let message =
                 "is not what its manifest.json says (BLAKE3): it is damaged, or was changed";
             Err(Failure::contents(path, Place::Within, message).or_hint(REPEAT))

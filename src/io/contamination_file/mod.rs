@@ -3,11 +3,11 @@
 //! ```toml
 //! schema = 1
 //! [[accel]]                        # or [[gyro]]: all axes of the sensor
-//! operation = "step"               # amplitude, at_share = 0.5 | at_samples | at_s
+//! operation = "step"               # amplitude, at_share = 0.5 | at_s
 //! replicates = [1, 2]              # default: every one
 //! amplitude = [0.004, 0.003]       # one number, or one for each replicate listed
 //! [[accel]]
-//! operation = "replace"            # share | points, sigma, mean (default: the signal's)
+//! operation = "replace"            # share, sigma, mean (default: the signal's)
 //! [[accel]]
 //! operation = "bursts"             # count = 5, length_samples = 500, spacing_samples = 90000, of_samples,
 //!                                  # amplitude, frequency_hz = 5
@@ -19,19 +19,19 @@
 //! With `of_samples` the burst's lengths are meant for a record of so many samples and are scaled to the
 //! record's length. What the operations do, and in which order: [`nav_sim_signal::noise::contamination`].
 
-mod description;
-
 use super::Failure;
 use super::suggest::nearest;
 use super::toml_file::Source;
-use description::{Described, Description, Mean};
+use crate::io::toml_file::{
+    Between, Finite, NonNegative, OneOrEach, Positive, Share, Stationary, Version,
+};
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Ar1;
 use nav_sim_signal::noise::contamination::{Contamination, Extent, Operation, Rule};
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::num::NonZero;
 use std::path::Path;
-
-pub(crate) use description::schema;
 
 /// Names and texts of the contaminations that come with the program.
 const PRESETS: [(&str, &str); 6] = [
@@ -124,33 +124,22 @@ fn operation(
     rate_hz: f64,
 ) -> Result<Operation, Failure> {
     let refused = |name: &str, reason: String| source.refused(&format!("{key}.{name}"), reason);
-    // several ways to say the same
-    let at_most_one = |keys: &[(&str, bool)]| {
-        let mut given = keys.iter().filter(|(_, is_given)| *is_given);
-        match (given.next(), given.next()) {
-            (Some((first, _)), Some((second, _))) => {
-                Err(refused(second, format!("says again what \"{first}\" says")))
-            }
-            _ => Ok(()),
-        }
-    };
     Ok(match described {
         Described::Step {
             amplitude,
             at_share,
-            at_samples,
             at_s,
         } => {
-            at_most_one(&[
-                ("at_share", at_share.is_some()),
-                ("at_samples", at_samples.is_some()),
-                ("at_s", at_s.is_some()),
-            ])?;
-            let samples = at_s.as_ref().map(|s| (s.of(i) * rate_hz).round() as u64);
+            if at_share.is_some() && at_s.is_some() {
+                return Err(refused(
+                    "at_s",
+                    "says again what \"at_share\" says".to_owned(),
+                ));
+            }
             let share = at_share.as_ref().map_or(0.5, |share| share.of(i));
-            let samples = at_samples.or(samples).map(Extent::Samples);
+            let samples = at_s.as_ref().map(|s| (s.of(i) * rate_hz).round() as u64);
             Operation::Step {
-                at: samples.unwrap_or(Extent::Share(share)),
+                at: samples.map_or(Extent::Share(share), Extent::Samples),
                 amplitude: amplitude.of(i),
             }
         }
@@ -159,24 +148,15 @@ fn operation(
         },
         Described::Replace {
             share,
-            points,
             length_samples,
             sigma,
             mean,
-        } => {
-            at_most_one(&[("share", share.is_some()), ("points", points.is_some())])?;
-            let share = share.as_ref().map(|share| Extent::Share(share.of(i)));
-            let points = points.map(Extent::Samples).or(share);
-            Operation::Replace {
-                points: points.ok_or_else(|| source.missing(key, &["share", "points"]))?,
-                block: Extent::Samples(length_samples.map_or(1, NonZero::get)),
-                mean: match mean {
-                    None | Some(Mean::Kept(_)) => None,
-                    Some(Mean::Own(mean)) => Some(mean.of(i)),
-                },
-                sigma: sigma.of(i),
-            }
-        }
+        } => Operation::Replace {
+            points: Extent::Share(share.of(i)),
+            block: Extent::Samples(length_samples.map_or(1, NonZero::get)),
+            mean: mean.as_ref().map(|mean| mean.of(i)),
+            sigma: sigma.of(i),
+        },
         Described::Bursts {
             count,
             length_samples,
@@ -332,7 +312,7 @@ mod tests {
 
     #[test]
     fn a_file_says_the_same_in_other_units() {
-        let text = "[[gyro]]\noperation = \"step\"\nat_s = 2\namplitude = 1\n[[gyro]]\noperation = \"replace\"\npoints = 7\nsigma = 1\nmean = 3.0\n";
+        let text = "[[gyro]]\noperation = \"step\"\nat_s = 2\namplitude = 1\n[[gyro]]\noperation = \"replace\"\nshare = 0.25\nsigma = 1\nmean = 3.0\n";
         let rules = parse(&Source::new("c.toml", text), 50.0).unwrap().rules;
         assert_eq!(
             rules[0].operation,
@@ -342,7 +322,7 @@ mod tests {
             }
         );
         assert_eq!(rules[0].replicate, None);
-        let (points, block) = (Extent::Samples(7), Extent::Samples(1));
+        let (points, block) = (Extent::Share(0.25), Extent::Samples(1));
         let replace = Operation::Replace {
             points,
             block,
@@ -385,7 +365,7 @@ mod tests {
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"replace\"\nsigma = 1\n"),
-            "c.toml, line 1: \"gyro[1].share\" or \"gyro[1].points\" is missing | add the key \"gyro[1].share\" or \"gyro[1].points\""
+            "c.toml, line 1: \"gyro[1].share\" is missing | add the key \"gyro[1].share\""
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"ar1\"\nphi = 1\nsigma2 = 1\n"),
@@ -397,10 +377,118 @@ mod tests {
         );
         assert_eq!(
             refusal(
-                "[[gyro]]\noperation = \"replace\"\npoints = 9\nsigma = 1\nlength_samples = 0\n"
+                "[[gyro]]\noperation = \"replace\"\nshare = 0.5\nsigma = 1\nlength_samples = 0\n"
             ),
             "c.toml, line 5: \"gyro[1].length_samples\" = 0 is not a whole number ≥ 1 | "
         );
         assert_eq!(meant("section5-2"), Some("section5-I"));
     }
+}
+
+// What contamination files hold: one description an operation, for readers and for editors.
+
+/// Errors and disturbances put into recordings: nav-sim synthesize --contaminate
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Contamination")]
+struct Description {
+    /// Version of the layout
+    #[serde(rename = "schema")]
+    _schema: Option<Version>,
+    /// Of all axes of the accelerometers
+    #[serde(default)]
+    accel: Vec<RuleTable>,
+    /// Of all axes of the gyroscopes
+    #[serde(default)]
+    gyro: Vec<RuleTable>,
+}
+
+/// What is done to the signals of a sensor
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+struct RuleTable {
+    /// Replicates, counted from 1 (default: every one)
+    #[schemars(length(min = 1))]
+    replicates: Option<Vec<NonZero<u64>>>,
+    #[schemars(flatten)]
+    operation: Described,
+}
+
+/// The operations of files, each with its keys.
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[schemars(tag = "operation", !deny_unknown_fields)]
+enum Described {
+    /// A jump of the mean
+    Step {
+        /// Height of the step (units of the signal)
+        amplitude: OneOrEach<Finite>,
+        /// Where in the record, as a share of it (default: 0.5)
+        at_share: Option<OneOrEach<Share>>,
+        /// Where in the record (s)
+        at_s: Option<OneOrEach<NonNegative>>,
+    },
+    /// A drift over the whole record
+    Drift {
+        /// Value at the end of the record (units of the signal)
+        amplitude: OneOrEach<Finite>,
+    },
+    /// Samples replaced by outliers
+    Replace {
+        /// Share of the samples
+        share: OneOrEach<Share>,
+        /// Samples replaced together (default: 1)
+        length_samples: Option<NonZero<u64>>,
+        /// Standard deviation of what replaces them
+        sigma: OneOrEach<NonNegative>,
+        /// Mean of what replaces them (default: the signal's)
+        mean: Option<OneOrEach<Finite>>,
+    },
+    /// Bursts of vibration
+    Bursts {
+        /// Number of bursts (default: 5)
+        count: Option<u64>,
+        /// Length of a burst (samples; default: 500)
+        length_samples: Option<u64>,
+        /// From one burst to the next (samples; default: 90000)
+        spacing_samples: Option<u64>,
+        /// Length of the record that these are meant for (samples; default: as it is)
+        of_samples: Option<OneOrEach<AtLeastOne>>,
+        /// Amplitude (units of the signal)
+        amplitude: OneOrEach<Finite>,
+        /// Frequency (Hz; default: 5)
+        frequency_hz: Option<OneOrEach<Positive>>,
+    },
+    /// A first-order autoregression on top
+    Ar1 {
+        /// Coefficient
+        phi: OneOrEach<Stationary>,
+        /// Innovation variance per sample
+        sigma2: OneOrEach<NonNegative>,
+    },
+    /// Noise with heavy tails on top
+    HeavyTails {
+        /// Degrees of freedom, more than 2
+        freedom: OneOrEach<AboveTwo>,
+        /// Scale of Student's t (units of the signal)
+        sigma: OneOrEach<NonNegative>,
+    },
+    /// A parameter of the model, scaled
+    Scale {
+        /// Process of the model, such as RW
+        process: String,
+        /// Its parameter, such as gamma2
+        parameter: String,
+        /// What it is multiplied by
+        factor: OneOrEach<NonNegative>,
+    },
+}
+
+/// Degrees of freedom with a variance.
+type AboveTwo = Between<2, { i64::MAX }, true>;
+type AtLeastOne = Between<1, { i64::MAX }, false>;
+
+/// The JSON schema of such a file.
+pub(crate) fn schema() -> serde_json::Value {
+    schemars::schema_for!(Description).to_value()
 }

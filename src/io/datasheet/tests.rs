@@ -1,4 +1,3 @@
-use super::catalogue::parse;
 use super::*;
 use crate::io::model_file;
 use crate::io::toml_file::Source;

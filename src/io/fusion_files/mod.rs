@@ -1,23 +1,31 @@
 //! What `fuse` reads: recorded IMU data, GNSS fixes, an initial state. Our own tables, the headers that
 //! recordings may have, the text files of KF-GINS, the solutions of RTKLIB, the sentences of NMEA 0183.
 
-mod fixes;
-mod inertial;
-mod initial;
-mod nmea;
-mod rtklib;
-mod wheel;
-
-pub(in crate::io) use fixes::WEEK_S;
-pub(crate) use fixes::read_gnss;
-pub(crate) use inertial::{ImuFile, read_imu};
-pub(crate) use initial::{initial_schema, read_initial};
-pub(in crate::io) use nmea::is_nmea;
-pub(in crate::io) use rtklib::is_rtklib;
-pub(crate) use wheel::read_wheel;
-
-use crate::io::Failure;
+use super::logs::LogOptions;
+use super::recordings::timing::{median_step, unit_of_step};
+use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
+use super::table::{Asked, Bare, Column, Dictionary, NONE, Quantity, SPEED, Table, normalised};
+use super::toml_file::{Between, Finite, Source};
+use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
+use chrono::{DateTime, NaiveDateTime};
+use glam::DVec3;
 use nav_sim_document::{Importance, Note};
+use nav_sim_logs::{Clock, Content, Fix, Stamp, in_seconds};
+use nav_sim_navigation::earth::{MAX_LATITUDE, MAX_LATITUDE_DEG, geodetic_to_ecef};
+use nav_sim_navigation::ekf::InitialSettings;
+use nav_sim_navigation::frames::{NavState, RollPitchYaw};
+use nav_sim_navigation::fusion::{LONGEST_GAP_S, Start, WheelSpeed, bridged};
+use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
+use nav_sim_navigation::strapdown::MAX_ROTATION;
+use nav_sim_signal::imu::ImuIncrement;
+use nav_sim_signal::units::{DEG, exactly_if};
+pub(crate) use nmea::is_nmea;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::f64::consts::PI;
+use std::path::Path;
+
+mod nmea;
 
 fn note(importance: Importance, text: impl Into<String>) -> Note {
     let text = text.into();
@@ -60,4 +68,1142 @@ fn time_back(path: &str, line: u64, previous_s: f64, t_s: f64) -> Failure {
     };
     let message = format!("time goes from {previous_s} s to {t_s} s: it must increase");
     Failure::contents(path, line, message).or_hint(advice)
+}
+
+// Recorded GNSS fixes.
+
+/// Seconds of a GNSS week.
+pub(crate) const WEEK_S: f64 = 604_800.0;
+/// Faster than this from one fix to the next is no motion (m/s).
+const MAX_SPEED: f64 = 8000.0;
+
+/// Quantities of fixes; a deviation up is one down.
+static FIX_QUANTITIES: [Quantity; 15] = [
+    Quantity::time(&["t", "time", "timestamp", "tow", "sow"]),
+    Quantity::angle("lat_deg", &["lat", "latitude"]),
+    Quantity::angle("lon_deg", &["lon", "lng", "longitude"]),
+    Quantity::length("h_m", &["h", "height", "alt", "altitude"]),
+    Quantity::length(
+        "sd_n_m",
+        &[
+            "sd_n",
+            "std_n",
+            "sigma_n",
+            "pos_std_n",
+            "sd_north",
+            "sd_lat",
+            "sdn",
+        ],
+    ),
+    Quantity::length(
+        "sd_e_m",
+        &[
+            "sd_e",
+            "std_e",
+            "sigma_e",
+            "pos_std_e",
+            "sd_east",
+            "sd_lon",
+            "sde",
+        ],
+    ),
+    Quantity::length(
+        "sd_d_m",
+        &[
+            "sd_d",
+            "std_d",
+            "sigma_d",
+            "pos_std_d",
+            "sd_u",
+            "std_u",
+            "sd_h",
+            "sdu",
+        ],
+    ),
+    Quantity::speed("v_n_m_s", &["v_n", "vn"]),
+    Quantity::speed("v_e_m_s", &["v_e", "ve"]),
+    V_D,
+    V_D.reversed(&["v_u", "vu"]),
+    Quantity::speed("sd_vn_m_s", &["sd_vn", "sd_v_n", "vel_std_n", "sdvn"]),
+    Quantity::speed("sd_ve_m_s", &["sd_ve", "sd_v_e", "vel_std_e", "sdve"]),
+    Quantity::speed("sd_vd_m_s", &["sd_vd", "sd_v_d", "vel_std_d", "sdvu"]),
+    Quantity::number("week", &["week", "gps_week"]),
+];
+const V_D: Quantity = Quantity::speed("v_d_m_s", &["v_d", "vd"]);
+const PLACE: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
+const PLACE_SIGMA: [&str; 3] = ["sd_n_m", "sd_e_m", "sd_d_m"];
+const VELOCITY: [&str; 3] = ["v_n_m_s", "v_e_m_s", "v_d_m_s"];
+const VELOCITY_SIGMA: [&str; 3] = ["sd_vn_m_s", "sd_ve_m_s", "sd_vd_m_s"];
+
+/// Dictionary of fixes. Texts without a header are those of KF-GINS.
+const FIXES: Dictionary = Dictionary {
+    bare: &[
+        &[
+            "t_s", "lat_deg", "lon_deg", "h_m", "sd_n_m", "sd_e_m", "sd_d_m",
+        ],
+        &[
+            "t_s",
+            "lat_deg",
+            "lon_deg",
+            "h_m",
+            "v_n_m_s",
+            "v_e_m_s",
+            "v_d_m_s",
+            "sd_n_m",
+            "sd_e_m",
+            "sd_d_m",
+            "sd_vn_m_s",
+            "sd_ve_m_s",
+            "sd_vd_m_s",
+        ],
+    ],
+    bad_cell: |error, _| error.hint("remove the row: a fix that is not whole is no fix"),
+    ..Dictionary::new(
+        &FIX_QUANTITIES,
+        "columns: t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m, sd_d_m; with velocity v_n_m_s … and \
+             sd_vn_m_s …; without a header, as KF-GINS has it, 7 of them (t_s, latitude, longitude, height, three deviations) \
+             or 13 (velocity behind the height)",
+    )
+};
+
+/// The fixes of the rows of a table, each with its line. Position and its deviations are needed; velocity and its deviations
+/// come together or not at all. `unsaid` are the standard deviations where the file states none.
+fn of_rows(
+    table: &Table,
+    unsaid: Option<&FixSigma>,
+    remarks: &mut Vec<Note>,
+) -> Result<Vec<(u64, GnssFix)>, Error> {
+    let any = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
+    let has_velocity = any(VELOCITY) || any(VELOCITY_SIGMA);
+    let own = ["t_s"].into_iter().chain(PLACE);
+    let own = own.chain(VELOCITY.into_iter().filter(|_| has_velocity));
+    table.require(own, &FIXES)?;
+    let mut sigmas = Vec::new();
+    // what is missing in all of a position or velocity may be given for the whole file
+    if unsaid.is_none() || any(PLACE_SIGMA) {
+        sigmas.extend(PLACE_SIGMA);
+    }
+    let given_velocity = unsaid.and_then(|sigma| sigma.vel_m_s);
+    if has_velocity && (given_velocity.is_none() || any(VELOCITY_SIGMA)) {
+        sigmas.extend(VELOCITY_SIGMA);
+    }
+    // a receiver's log that has all but these
+    let found = table.require(sigmas, &FIXES);
+    found.map_err(|e| e.or_option(help::FIX_SIGMA))?;
+    let ([time], place) = (
+        table.columns(["t_s"], &FIXES)?,
+        table.columns(PLACE, &FIXES)?,
+    );
+    let place_sigma = table.all(PLACE_SIGMA);
+    let (velocity, velocity_sigma) = (table.all(VELOCITY), table.all(VELOCITY_SIGMA));
+    if place_sigma.is_none() || velocity.is_some() && velocity_sigma.is_none() {
+        remarks.push(remark("standard deviations as given for all fixes"));
+    }
+    if !table.ignored.is_empty() {
+        let text = format!("columns not used: {}", table.ignored.join(", "));
+        remarks.push(remark(text));
+    }
+    let fix = |row: usize| {
+        let triad = |columns: [&Column; 3]| DVec3::from(columns.map(|column| column.si(row)));
+        let [lat, lon, h] = place.map(|column| column.si(row));
+        let stated = place_sigma.map(triad);
+        let given = unsaid.map(|s| DVec3::from(s.pos_m));
+        let velocity = velocity.map(|columns| {
+            let sigma = velocity_sigma
+                .map(triad)
+                .or(given_velocity.map(DVec3::from));
+            GnssVelocity::new(triad(columns), sigma.unwrap_or(DVec3::NAN))
+        });
+        let weeks = table.get("week").map_or(0.0, |week| week.si(row));
+        let fix = GnssFix {
+            t_s: time.si(row) + weeks * WEEK_S,
+            lat,
+            lon,
+            h,
+            pos_sigma_n: stated.or(given).unwrap_or(DVec3::NAN),
+            velocity,
+        };
+        const DEGREES: &str = "latitude within ±89.9, longitude in (−180, 180] or [0, 360), in degrees (or lat_rad, lon_rad)";
+        const SIGMA: &str =
+            "a fix needs the standard deviations its receiver believes; remove rows without";
+        let sigmas = [place_sigma, velocity_sigma].into_iter().flatten();
+        let [first, second, _] = place;
+        let is_longitude = (-180.0 * DEG - 1e-9..=360.0 * DEG + 1e-9).contains(&lon);
+        let (column, reason, advice) = if lat.abs() > 90.0 * DEG {
+            (first, "is not a latitude", DEGREES)
+        } else if !is_longitude {
+            (second, "is not a longitude", DEGREES)
+        } else if lat.abs() > MAX_LATITUDE {
+            let reason = "is too near a pole to navigate in latitude and longitude";
+            (first, reason, DEGREES)
+        } else if let Some(column) = sigmas.flatten().find(|column| column.si(row) <= 0.0) {
+            let reason = "is not a standard deviation: it must be above 0";
+            (column, reason, SIGMA)
+        } else {
+            return Ok((table.line(row), fix));
+        };
+        let (line, value) = (table.line(row), column.values[row].to_string());
+        Err(Error::cell(&table.path, line, &column.name, value, reason).or_hint(advice))
+    };
+    (0..table.rows()).map(fix).collect()
+}
+
+/// Reads fixes: a table with a header, or the text of KF-GINS (time, latitude, longitude (deg), height (m),
+/// standard deviations north, east, down (m); or with velocity behind the height and its deviations behind
+/// those), a solution of RTKLIB, NMEA sentences, a log (of several topics, `topic`). `unsaid` are the standard deviations where the file states none, `clock_s` when
+/// the IMU begins and ends, where there is one. Also what is doubtful about it.
+///
+/// # Errors
+/// Whatever is wrong with it, with its line.
+pub(crate) fn read_gnss(
+    path: &Path,
+    unsaid: Option<&FixSigma>,
+    clock_s: Option<(f64, f64)>,
+    topic: Option<&str>,
+) -> Result<(Vec<GnssFix>, Vec<Note>), Error> {
+    let shown = path.display().to_string();
+    let (fixes, remarks) = match logs::kind_of(path) {
+        Some(_) => of_log(path, (unsaid, topic), clock_s)?,
+        None => {
+            let text = source::table_text(path)?;
+            if text.trim_start().starts_with('<') {
+                let message = "XML, as GPX and KML are, not a table of fixes";
+                return Err(Error::contents(shown, 1_u64, message).or_hint(
+                    "write its points as a table t_s, lat_deg, lon_deg, h_m on the clock of the IMU",
+                ));
+            }
+            match is_nmea(&text) {
+                true => nmea::fixes(&shown, &text, unsaid, clock_s)?,
+                false => of_table(&shown, text, unsaid, clock_s)?,
+            }
+        }
+    };
+    for pair in fixes.windows(2) {
+        check_step(&shown, pair[1].0, &pair[0].1, &pair[1].1)?;
+    }
+    let fixes = fixes.into_iter().map(|(_, fix)| fix).collect();
+    let remarks = remarks.into_iter().map(|note| of_file(note, &shown));
+    Ok((fixes, remarks.collect()))
+}
+
+/// Fixes with their lines, and remarks.
+type Fixes = (Vec<(u64, GnssFix)>, Vec<Note>);
+
+/// The fixes of a table, of KF-GINS or of RTKLIB.
+fn of_table(
+    shown: &str,
+    mut text: String,
+    unsaid: Option<&FixSigma>,
+    clock_s: Option<(f64, f64)>,
+) -> Result<Fixes, Error> {
+    let mut clock = None;
+    if is_rtklib(&text) {
+        let (table, name) = table(shown, &text, clock_s)?;
+        (text, clock) = (table, Some(name));
+    }
+    let mut table = table::parse(shown, &text, &FIXES, &Asked::default())?;
+    let has_all = |table: &Table, columns: [&Column; 3]| {
+        (0..table.rows()).all(|row| columns.iter().all(|c| c.si(row) > 0.0))
+    };
+    if clock.is_some() {
+        table.ignored.clear();
+        let sigma = table.all(VELOCITY_SIGMA);
+        // what states no deviation of one velocity states none
+        if !sigma.is_some_and(|sigma| has_all(&table, sigma)) {
+            let velocity = VELOCITY.into_iter().chain(VELOCITY_SIGMA);
+            velocity.for_each(|name| drop(table.take(name)));
+        }
+    }
+    let velocity = match table.has(VELOCITY[0]) {
+        true => ", velocity",
+        false => "",
+    };
+    let mut remarks = Vec::new();
+    if table.is_bare {
+        remarks.push(remark(format!(
+            "no header: read as KF-GINS text, position{velocity} and standard deviations"
+        )));
+    }
+    remarks.extend(clock.map(|clock| {
+        remark(format!(
+            "an RTKLIB solution: position{velocity} and standard deviations, in {clock}"
+        ))
+    }));
+    let fixes = of_rows(&table, unsaid, &mut remarks)?;
+    remarks.extend(table.assumptions.iter().map(remark));
+    let small =
+        |(_, f): &(u64, GnssFix)| f.lat.abs() <= 0.5 * PI * DEG && f.lon.abs() <= 2.0 * PI * DEG;
+    if fixes.iter().all(small) {
+        let text = "latitude and longitude never exceed π: radians? Then name the columns lat_rad, lon_rad";
+        remarks.push(doubt(text));
+    }
+    Ok((fixes, remarks))
+}
+
+/// Reads fixes of a topic, of several; `unsaid` are the standard deviations where the log states none, `imu_s` is when the IMU
+/// begins and ends.
+///
+/// # Errors
+/// When the log is damaged, has no fixes, or states no standard deviations where none are given.
+fn of_log(
+    path: &Path,
+    (unsaid, topic): (Option<&FixSigma>, Option<&str>),
+    imu_s: Option<(f64, f64)>,
+) -> Result<Fixes, Error> {
+    let refused = |e| logs::refused(path, e);
+    let log = logs::open(path)?;
+    let channel = log.channel(Content::Fix, topic).map_err(refused)?;
+    let read = log.fixes(channel, Stamp::default()).map_err(refused)?;
+    let unstated = || {
+        let message = "the fixes have no standard deviations";
+        Error::contents(path.display(), Place::Within, message).or_option(help::FIX_SIGMA)
+    };
+    let fixes = (1..)
+        .zip(read)
+        .map(|(row, fix)| Some((row, in_radians(&fix, unsaid)?)));
+    let mut fixes: Vec<(u64, GnssFix)> = fixes.collect::<Option<_>>().ok_or_else(unstated)?;
+    let mut said = format!("fixes of {}", channel.topic);
+    let span_s = fixes.first().zip(fixes.last());
+    let clock = span_s
+        .filter(|_| channel.clock == Clock::Unix)
+        .and_then(|((_, first), (_, last))| clock((first.t_s, last.t_s), imu_s));
+    if let Some(clock) = clock.filter(|clock| clock.origin_s != 0.0) {
+        fixes
+            .iter_mut()
+            .for_each(|(_, fix)| fix.t_s -= clock.origin_s);
+        said = format!("{said}, in {}", clock.name);
+    }
+    let cut = log.damage().map(logs::cut_off);
+    let remarks = cut.map(doubt).into_iter();
+    Ok((fixes, remarks.chain([remark(said)]).collect()))
+}
+
+/// The same fix with angles in radians; none without standard deviations.
+fn in_radians(fix: &Fix, unsaid: Option<&FixSigma>) -> Option<GnssFix> {
+    let pos_sigma_n = fix.sd_ned_m.or(unsaid.map(|sigma| sigma.pos_m))?;
+    let velocity_sigma = fix.sd_v_ned_m_s.or(unsaid.and_then(|sigma| sigma.vel_m_s));
+    let velocity = fix.v_ned_m_s.zip(velocity_sigma);
+    Some(GnssFix {
+        t_s: in_seconds(fix.stamp_ns),
+        lat: fix.lat_deg * DEG,
+        lon: fix.lon_deg * DEG,
+        h: fix.h_m,
+        pos_sigma_n: DVec3::from(pos_sigma_n),
+        velocity: velocity.map(|(v, sigma)| GnssVelocity::new(v.into(), sigma.into())),
+    })
+}
+
+fn check_step(path: &str, line: u64, before: &GnssFix, fix: &GnssFix) -> Result<(), Error> {
+    let seconds = fix.t_s - before.t_s;
+    if seconds <= 0.0 {
+        return Err(time_back(path, line, before.t_s, fix.t_s));
+    }
+    let place = |f: &GnssFix| geodetic_to_ecef(f.lat, f.lon, f.h);
+    let metres = place(fix).distance(place(before));
+    if metres <= MAX_SPEED * seconds {
+        return Ok(());
+    }
+    let message = format!(
+        "the fix is {metres:.0} m from the one {} s before",
+        (1e6 * seconds).round() / 1e6
+    );
+    Err(Error::contents(path, line, message)
+        .or_hint("is a latitude swapped with a longitude, a sign lost, or a row damaged?"))
+}
+
+#[cfg(test)]
+mod fix_tests {
+    use super::*;
+
+    #[test]
+    fn a_quantity_in_two_columns_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("gnss.csv");
+        let text = "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m,altitude\n0,46,7,400,1,1,2,450\n";
+        std::fs::write(&path, text).unwrap();
+        let e = read_gnss(&path, None, None, None).unwrap_err();
+        assert!(
+            e.to_string()
+                .ends_with("line 1: columns \"h_m\" and \"altitude\" both give h_m"),
+            "{e}"
+        );
+        assert_eq!(e.advice().unwrap(), "remove one of them");
+    }
+
+    /// The sums are those of the independent writer of the file (`src/logs/tests/data/expected.csv`), in degrees and metres.
+    #[test]
+    fn fixes_of_a_log_are_those_of_its_writer() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/logs/tests/data/ros2_zstd.mcap");
+        let (fixes, _) = of_log(&path, (None, None), None).unwrap();
+        let sum = |of: fn(&GnssFix) -> f64| fixes.iter().map(|(_, fix)| of(fix)).sum::<f64>();
+        assert_eq!(fixes.len(), 4);
+        assert!((sum(|f| f.lat) / DEG - 186.000_007_999_999_98).abs() < 1e-11);
+        assert!((sum(|f| f.lon) / DEG - 26.399_984).abs() < 1e-11);
+        assert!((sum(|f| f.h) - 1_601.022_578_849_756).abs() < 1e-9);
+        assert!((sum(|f| f.pos_sigma_n.z) - 4.8).abs() < 1e-12);
+    }
+}
+
+// Solutions of RTKLIB (`.pos`): a table whose header is a comment and whose time (GPST) takes two columns.
+
+/// 1980-01-06, from which GPS weeks are counted (Unix s).
+const GPS_EPOCH_S: i64 = 315_964_800;
+/// Leap seconds between GPS time and UTC, and from when on (Unix s): IERS Bulletin C.
+const LEAPS: [(f64, f64); 6] = [
+    (1_483_228_800.0, 18.0),
+    (1_435_708_800.0, 17.0),
+    (1_341_100_800.0, 16.0),
+    (1_230_768_000.0, 15.0),
+    (1_136_073_600.0, 14.0),
+    (915_148_800.0, 13.0),
+];
+
+/// True if a text is such a solution.
+pub(crate) fn is_rtklib(text: &str) -> bool {
+    header(text).is_some()
+}
+
+/// The line that names the columns.
+fn header(text: &str) -> Option<(usize, &str)> {
+    let comments = text
+        .lines()
+        .enumerate()
+        .take_while(|(_, l)| l.starts_with('%') || l.trim().is_empty());
+    comments.filter(|(_, l)| l.contains("sdn(m)")).last()
+}
+
+/// Clock that an IMU may run in.
+#[derive(Debug, PartialEq)]
+struct ClockOfImu {
+    /// Subtracted from Unix times of the fixes (s).
+    origin_s: f64,
+    pub(super) name: String,
+}
+
+/// Unix time at which GPS time is 0, by the leap seconds of a time (Unix s).
+fn gps_origin_s(unix_s: f64) -> f64 {
+    let leap = LEAPS.iter().find(|(from_s, _)| unix_s >= *from_s);
+    GPS_EPOCH_S as f64 - leap.map_or(0.0, |(_, leap_s)| *leap_s)
+}
+
+/// Clocks that IMUs run in beside fixes that begin then (Unix s): Unix time, GPS time, seconds of the GPS week.
+fn clocks(begin_s: f64) -> [ClockOfImu; 3] {
+    let gps_s = gps_origin_s(begin_s);
+    let week = ((begin_s - gps_s) / WEEK_S).floor();
+    let week_name = format!("seconds of GPS week {week}");
+    [
+        (0.0, "Unix time"),
+        (gps_s, "seconds of GPS time"),
+        (gps_s + week * WEEK_S, &week_name),
+    ]
+    .map(|(origin_s, name)| ClockOfImu {
+        origin_s,
+        name: name.to_owned(),
+    })
+}
+
+/// The clock in which an IMU ran beside fixes of such times (Unix s).
+fn clock(span_s: (f64, f64), imu_s: Option<(f64, f64)>) -> Option<ClockOfImu> {
+    let (first_s, last_s) = imu_s?;
+    clocks(span_s.0)
+        .into_iter()
+        .find(|clock| first_s <= span_s.1 - clock.origin_s && span_s.0 - clock.origin_s <= last_s)
+}
+
+/// The same as a table with one column of time, line by line, and the name of the clock of its times: that of the IMU, which
+/// begins and ends at `imu_s`, else seconds of the GPS week.
+pub(super) fn table(
+    path: &str,
+    text: &str,
+    imu_s: Option<(f64, f64)>,
+) -> Result<(String, String), Error> {
+    let (at, names) = header(text).unwrap_or_default();
+    let refuse = |line: usize, message: &str, advice: &'static str| {
+        Error::contents(path, line + 1, message).or_hint(advice)
+    };
+    if !names.contains("GPST") {
+        let advice = "write the solution in GPS time, as the IMU's clock is";
+        return Err(refuse(at, "times that are not GPST", advice));
+    }
+    let is_blank = |c: char| matches!(c, ' ' | ',' | '\t' | '%');
+    let cells = |line| -> Vec<&str> {
+        str::split(line, is_blank)
+            .filter(|c| !c.is_empty())
+            .collect()
+    };
+    let names = cells(names);
+    let mut rows = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        if line.starts_with('%') || line.trim().is_empty() {
+            continue;
+        }
+        let row = cells(line);
+        let t_s = row
+            .first()
+            .zip(row.get(1))
+            .and_then(|(a, b)| gps_time_s(a, b));
+        let advice = "2021/03/01 00:00:01.000 (or 2147 86401.000), latitude, longitude, height, Q, ns, sdn, sde, sdu";
+        let refused = || {
+            refuse(
+                i,
+                "not a row of time, position, quality, satellites and standard deviations",
+                advice,
+            )
+        };
+        rows.push((i, t_s.ok_or_else(refused)?, row));
+    }
+    let span = rows.first().zip(rows.last());
+    let (first_s, last_s) = span.map_or((0.0, 0.0), |(first, last)| (first.1, last.1));
+    let gps_s = gps_origin_s(first_s + GPS_EPOCH_S as f64);
+    let span_s = (first_s + gps_s, last_s + gps_s);
+    let [.., of_week] = clocks(span_s.0);
+    let clock = clock(span_s, imu_s).unwrap_or(of_week);
+    let mut out = "\n".repeat(at) + "t_s " + &names[1..].join(" ") + "\n";
+    let mut lines = at + 1;
+    for (i, t_s, row) in rows {
+        // line by line, so that a refusal names that of the file; the difference of two numbers of 1e9 keeps 0.2 µs
+        let rest = row[2..].iter().take(names.len() - 1);
+        let rest: Vec<&str> = rest.copied().collect();
+        out += &"\n".repeat(i - lines);
+        out += &format!("{:.6} {}\n", t_s + gps_s - clock.origin_s, rest.join(" "));
+        lines = i + 1;
+    }
+    Ok((out, clock.name))
+}
+
+/// Seconds since GPS weeks are counted, of a date and a time of day or of a week and its second.
+fn gps_time_s(first: &str, second: &str) -> Option<f64> {
+    if !first.contains('/') {
+        return Some(
+            first.parse::<u32>().map(f64::from).ok()? * WEEK_S + second.parse::<f64>().ok()?,
+        );
+    }
+    let time =
+        NaiveDateTime::parse_from_str(&format!("{first} {second}"), "%Y/%m/%d %H:%M:%S%.f").ok()?;
+    // GPST has no leap seconds, and neither has this count
+    let since = time.and_utc() - DateTime::from_timestamp(GPS_EPOCH_S, 0)?;
+    Some(since.num_seconds() as f64 + 1e-9 * f64::from(since.subsec_nanos()))
+}
+
+#[cfg(test)]
+mod rtklib_tests {
+    use super::*;
+
+    const HEAD: &str = "% program : RTKLIB\n%  GPST  latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m)\n";
+
+    const TABLE: &str = "\nt_s latitude(deg) longitude(deg) height(m) Q ns sdn(m) sde(m) sdu(m)\n";
+
+    /// 2021-03-01 was a Monday, the second day of GPS week 2147.
+    #[test]
+    fn dates_and_weeks_are_one_clock() {
+        let dated = format!("{HEAD}2021/03/01 00:00:01.250   46.5 6.5 400.8  5  8  2.0 2.1 4.0\n");
+        let counted = format!("{HEAD}2147 86401.250   46.5 6.5 400.8  5  8  2.0 2.1 4.0\n");
+        assert!(is_rtklib(&dated) && !is_rtklib("t_s,lat_deg\n") && !is_rtklib(""));
+        for text in [dated, counted] {
+            let (table, clock) = table("a.pos", &text, None).unwrap();
+            assert_eq!(
+                table,
+                format!("{TABLE}86401.250000 46.5 6.5 400.8 5 8 2.0 2.1 4.0\n")
+            );
+            assert_eq!(clock, "seconds of GPS week 2147");
+        }
+    }
+
+    /// An IMU in Unix time, 18 leap seconds behind since 2017, or in GPS time has the fixes on its clock. 86401.25 s of
+    /// week 2147 are 1298591.6 million of GPS time.
+    #[test]
+    fn the_clock_is_the_imu_s() {
+        let row = "46.5 6.5 400.8 5 8 2.0 2.1 4.0\n";
+        let text = format!("{HEAD}2021/03/01 00:00:01.250 {row}");
+        let gps_s = 2147.0 * WEEK_S + 86_401.25;
+        let unix_s = 1_614_556_801.25 - 18.0;
+        for (start_s, words) in [(gps_s, "seconds of GPS time"), (unix_s, "Unix time")] {
+            let imu_s = Some((start_s - 5.0, start_s + 5.0));
+            let (table, said) = table("a.pos", &text, imu_s).unwrap();
+            assert_eq!(table, format!("{TABLE}{start_s:.6} {row}"));
+            assert_eq!(said, words);
+        }
+    }
+
+    /// Fixes in Unix time beside IMUs in GPS time and in its weeks; an IMU of no known clock leaves them.
+    #[test]
+    fn dated_fixes_come_to_the_clock_of_the_imu() {
+        let unix_s = (1_614_556_783.25, 1_614_556_883.25);
+        let of = |start_s: f64| clock(unix_s, Some((start_s - 5.0, start_s + 5.0)));
+        let gps_s = 2147.0 * WEEK_S + 86_401.25;
+        for (start_s, name) in [
+            (unix_s.0, "Unix time"),
+            (gps_s, "seconds of GPS time"),
+            (86_401.25, "seconds of GPS week 2147"),
+        ] {
+            let clock = of(start_s).unwrap();
+            assert_eq!(
+                (unix_s.0 - clock.origin_s, clock.name.as_str()),
+                (start_s, name)
+            );
+        }
+        assert_eq!([of(3_326.0), clock(unix_s, None)], [None, None]);
+    }
+
+    #[test]
+    fn the_week_counts_on() {
+        let text =
+            format!("{HEAD}2147 604799 46.5 6.5 400 5 8 2 2 4\n2148 0.5 46.5 6.5 400 5 8 2 2 4\n");
+        let (table, _) = table("a.pos", &text, None).unwrap();
+        assert!(
+            table.contains("604799.000000 ") && table.contains("604800.500000 "),
+            "{table}"
+        );
+    }
+
+    #[test]
+    fn what_is_not_such_a_row_is_refused_with_its_line() {
+        let error = |text: &str| table("a.pos", text, None).unwrap_err().to_string();
+        let short = format!("{HEAD}2021/03/01 46.5 6.5\n");
+        assert!(error(&short).starts_with("a.pos, line 3: not a row of time, position"));
+        assert!(
+            error(&HEAD.replace("GPST", "UTC"))
+                .starts_with("a.pos, line 2: times that are not GPST")
+        );
+    }
+}
+
+// Recorded IMU data.
+
+/// A step this many times the median one is a gap.
+const GAP: f64 = 1.5;
+/// Mean angular rate above which the unit is doubted (rad/s).
+const FAST: f64 = 2.0;
+
+/// A recording, ready to be fused.
+pub(crate) struct ImuFile {
+    /// Samples whose intervals follow one another.
+    pub samples: Vec<ImuIncrement>,
+    /// Samples a second, by the median step.
+    pub rate_hz: f64,
+    /// What is doubtful, and how the file was read.
+    pub remarks: Vec<Note>,
+}
+
+/// Dictionary of recordings under way. Texts without a header are those of KF-GINS, with or without an odometer.
+const SAMPLES: Dictionary = Dictionary {
+    bare: &[
+        &[
+            "t_s",
+            "dtheta_x_rad",
+            "dtheta_y_rad",
+            "dtheta_z_rad",
+            "dv_x_m_s",
+            "dv_y_m_s",
+            "dv_z_m_s",
+        ],
+        &[
+            "t_s",
+            "dtheta_x_rad",
+            "dtheta_y_rad",
+            "dtheta_z_rad",
+            "dv_x_m_s",
+            "dv_y_m_s",
+            "dv_z_m_s",
+            "odometer_m_s",
+        ],
+    ],
+    advice: "columns: t_s, gyro_x_rad_s … accel_z_m_s2 (rates) or t_s, dtheta_x_rad … dv_z_m_s (increments); without a header, \
+             as KF-GINS has it, 7 of them (t_s, dtheta_x, dtheta_y, dtheta_z in rad, dv_x, dv_y, dv_z in m/s), or 8 with an \
+             odometer",
+    ..recordings::DICTIONARY
+};
+
+/// Reads a recording: a table whose headers are those of static recordings (rates, or increments over the
+/// interval that ends at the time given), or the text of KF-GINS: time, three angle increments (rad), three
+/// velocity increments (m/s), and perhaps an odometer's speed, which is left. `names` are those of the columns of a file
+/// without a header, `topic` is that of a log that has several.
+///
+/// # Errors
+/// Whatever is wrong with it, with its line.
+pub(crate) fn read_imu(
+    path: &Path,
+    names: Option<&[String]>,
+    topic: Option<&str>,
+) -> Result<ImuFile, Error> {
+    let options = ReadOptions {
+        columns: names.map(<[String]>::to_vec),
+        log: LogOptions {
+            topic: topic.map(str::to_owned),
+            ..LogOptions::default()
+        },
+        ..ReadOptions::default()
+    };
+    let table = recordings::load(path, &options, &SAMPLES)?;
+    let names = [
+        "t_s", "accel.x", "accel.y", "accel.z", "gyro.x", "gyro.y", "gyro.z",
+    ];
+    let [time, signals @ ..] = table.columns(names, &SAMPLES)?;
+    let unit_s = |values| unit_of_step(median_step(values)).0;
+    let unit_s = time.factor.unwrap_or_else(|| unit_s(&time.values));
+    let from_gravity = gravity_factor(&table)?;
+    let mut remarks: Vec<Note> = table.assumptions.iter().map(remark).collect();
+    remarks.extend(table.warnings.iter().map(doubt));
+    if table.is_bare {
+        let odometer = match table.ignored.is_empty() {
+            true => "",
+            false => "; the odometer's speed in column 8 is not used",
+        };
+        let text = "no header: read as KF-GINS text, angle then velocity increments";
+        remarks.push(remark(format!("{text}{odometer}")));
+    }
+    let t_s: Vec<f64> = time.values.iter().map(|t| t * unit_s).collect();
+    let sample = |k: usize, dt_s: f64| {
+        let three = |own: &[&Column]| {
+            let value = |axis: usize| {
+                let Column { values, factor, .. } = own[axis];
+                values[k] * factor.unwrap_or(from_gravity)
+            };
+            let seconds = if own[0].quantity.per_sample {
+                1.0
+            } else {
+                dt_s
+            };
+            DVec3::from([0, 1, 2].map(value)) * seconds
+        };
+        ImuIncrement {
+            t_s: t_s[k],
+            dt_s,
+            dtheta: three(&signals[3..]),
+            dv: three(&signals[..3]),
+        }
+    };
+    let samples = increments(&table, &t_s, &sample, &mut remarks)?;
+    let step = median_step(&t_s);
+    Ok(ImuFile {
+        samples: bridged(&samples, step),
+        rate_hz: 1.0 / step,
+        remarks: remarks
+            .into_iter()
+            .map(|note| of_file(note, &table.path))
+            .collect(),
+    })
+}
+
+/// The k-th sample, over so many seconds.
+type Sample<'a> = &'a dyn Fn(usize, f64) -> ImuIncrement;
+
+/// The samples; those after a hole last a step like any other.
+fn increments(
+    table: &Table,
+    t_s: &[f64],
+    sample: Sample<'_>,
+    remarks: &mut Vec<Note>,
+) -> Result<Vec<ImuIncrement>, Error> {
+    let path = &table.path;
+    if t_s.len() < 3 {
+        let message = format!("{} samples, but at least 3 are needed", t_s.len());
+        return Err(Error::contents(path, Place::Within, message));
+    }
+    if let Some(k) = (1..t_s.len()).find(|k| t_s[*k] <= t_s[k - 1]) {
+        return Err(time_back(path, table.line(k), t_s[k - 1], t_s[k]));
+    }
+    let step = median_step(t_s);
+    doubt_units((path, t_s.len(), step), sample, remarks)?;
+    let mut samples = Vec::with_capacity(t_s.len());
+    let mut holes = Vec::new();
+    for k in 0..t_s.len() {
+        let since_s = if k == 0 { step } else { t_s[k] - t_s[k - 1] };
+        let is_hole = since_s > GAP * step;
+        let sample = sample(k, if is_hole { step } else { since_s });
+        let refuse = |message: String| Error::contents(path, table.line(k), message);
+        if is_hole && since_s - step > LONGEST_GAP_S + 0.5 * step {
+            let message = format!(
+                "no samples from {} s to {} s: {LONGEST_GAP_S} s can be bridged",
+                t_s[k - 1],
+                t_s[k]
+            );
+            return Err(
+                refuse(message).or_hint("fuse the stretches before and after it one by one")
+            );
+        }
+        let angle = sample.dtheta.length();
+        if angle > MAX_ROTATION {
+            let [degrees, most] = [angle, MAX_ROTATION].map(|a| a / DEG);
+            let message = format!("a rotation of {degrees:.1}° in one sample, {most:.1}° at most");
+            let advice =
+                "is the unit right? gyro_x_deg_s is in degrees, gyro_x_rad_s in radians a second";
+            return Err(refuse(message).or_hint(advice));
+        }
+        if is_hole {
+            holes.push((k, since_s - step));
+        }
+        samples.push(sample);
+    }
+    if let Some((k, seconds)) = holes.first() {
+        let (at_s, line, more) = (t_s[*k], table.line(*k), holes.len() - 1);
+        remarks.push(doubt(format!(
+                "samples missing: {seconds:.2} s before {at_s:.2} s (line {line}) and {more} more gaps; bridged"
+            )));
+    }
+    Ok(samples)
+}
+
+/// Over a whole recording the specific force is gravity in the mean, and nothing turns all the time.
+fn doubt_units(
+    (path, count, step): (&str, usize, f64),
+    sample: Sample<'_>,
+    remarks: &mut Vec<Note>,
+) -> Result<(), Error> {
+    let mean = |of: fn(ImuIncrement) -> DVec3| {
+        let lengths = (0..count).map(|k| of(sample(k, step)).length() / step);
+        lengths.sum::<f64>() / count as f64
+    };
+    let (force, rate) = (mean(|sample| sample.dv), mean(|sample| sample.dtheta));
+    if !(4.0..25.0).contains(&force) {
+        check_gravity(path, force.max(0.3))?;
+    }
+    if rate > FAST {
+        let degrees = rate / DEG;
+        let text =
+            format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?");
+        remarks.push(doubt(text));
+    }
+    Ok(())
+}
+
+// An initial state (TOML).
+
+/// Where and how a drive begins: nav-sim fuse --initial
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Initial state")]
+struct Description {
+    /// Time (s)
+    t_s: Finite,
+    /// Latitude of the IMU (degrees)
+    #[schemars(range(min = -MAX_LATITUDE_DEG, max = MAX_LATITUDE_DEG))]
+    lat_deg: Finite,
+    /// Longitude of the IMU (degrees)
+    lon_deg: Between<-360, 360, false>,
+    /// Height of the IMU above the ellipsoid (m)
+    h_m: Finite,
+    /// Velocity north (m/s; default: 0)
+    #[serde(default)]
+    v_n_m_s: Finite,
+    /// Velocity east (m/s; default: 0)
+    #[serde(default)]
+    v_e_m_s: Finite,
+    /// Velocity down (m/s; default: 0)
+    #[serde(default)]
+    v_d_m_s: Finite,
+    /// Roll of the vehicle (degrees)
+    roll_deg: Between<-180, 180, false>,
+    /// Pitch (degrees)
+    pitch_deg: Between<-90, 90, false>,
+    /// Yaw (degrees)
+    yaw_deg: Between<-360, 360, false>,
+    /// Standard deviations of the position north, east, down (m; default: as in scenarios)
+    #[serde(default, deserialize_with = "exactly_if")]
+    pos_sigma_m: Option<[f64; 3]>,
+    /// Of the velocity (m/s)
+    #[serde(default, deserialize_with = "exactly_if")]
+    vel_sigma_m_s: Option<[f64; 3]>,
+    /// Of roll, pitch, yaw (degrees)
+    #[serde(default, deserialize_with = "exactly_if")]
+    att_sigma_deg: Option<[f64; 3]>,
+    /// Of a turn-on bias of the accelerometers that the filter expects (m/s²)
+    accel_bias_sigma_m_s2: Option<f64>,
+    /// Of a turn-on bias of the gyroscopes (rad/s)
+    gyro_bias_sigma_rad_s: Option<f64>,
+    /// Of a scale-factor error of the accelerometers (parts per million)
+    accel_scale_sigma_ppm: Option<f64>,
+    /// Of a scale-factor error of the gyroscopes (parts per million)
+    gyro_scale_sigma_ppm: Option<f64>,
+}
+
+/// The JSON schema of such a file; the ranges of standard deviations are those of scenarios.
+#[must_use]
+pub(crate) fn initial_schema() -> serde_json::Value {
+    let mut schema = schemars::schema_for!(Description).to_value();
+    let of_scenarios = schemars::schema_for!(InitialSettings).to_value();
+    for (key, own) in schema["properties"].as_object_mut().into_iter().flatten() {
+        if let Some(said) = of_scenarios["properties"].get(key) {
+            let description = own["description"].take();
+            *own = said.clone();
+            own["description"] = description;
+        }
+    }
+    schema
+}
+
+/// Reads an initial state: time, position of the IMU, velocity (0 where it is not said), attitude of the
+/// vehicle, and standard deviations as in the `[initial]` section of a scenario.
+///
+/// # Errors
+/// File, line, key and value of what is refused.
+pub(crate) fn read_initial(path: &Path) -> Result<Start, Failure> {
+    parse(&Source::read(path)?)
+}
+
+fn parse(source: &Source) -> Result<Start, Failure> {
+    let d: Description = source.get()?;
+    if d.lat_deg.0.abs() > MAX_LATITUDE_DEG {
+        return Err(source.refused("lat_deg", format!("is not within ±{MAX_LATITUDE_DEG}")));
+    }
+    let (roll, pitch, yaw) = (d.roll_deg.0 * DEG, d.pitch_deg.0 * DEG, d.yaw_deg.0 * DEG);
+    let state = NavState {
+        lat: d.lat_deg.0 * DEG,
+        lon: d.lon_deg.0 * DEG,
+        h: d.h_m.0,
+        v_n: DVec3::new(d.v_n_m_s.0, d.v_e_m_s.0, d.v_d_m_s.0),
+        q_b_n: RollPitchYaw { roll, pitch, yaw }.to_quat(),
+    };
+    let default = InitialSettings::default();
+    let sigma = InitialSettings {
+        pos_sigma_m: d.pos_sigma_m.unwrap_or(default.pos_sigma_m),
+        vel_sigma_m_s: d.vel_sigma_m_s.unwrap_or(default.vel_sigma_m_s),
+        att_sigma_deg: d.att_sigma_deg.unwrap_or(default.att_sigma_deg),
+        accel_bias_sigma_m_s2: d.accel_bias_sigma_m_s2,
+        gyro_bias_sigma_rad_s: d.gyro_bias_sigma_rad_s,
+        accel_scale_sigma_ppm: d.accel_scale_sigma_ppm,
+        gyro_scale_sigma_ppm: d.gyro_scale_sigma_ppm,
+        perfect: false,
+    };
+    sigma.validate().map_err(|e| source.setting(&e))?;
+    Ok(Start {
+        t_s: d.t_s.0,
+        state,
+        sigma,
+        found: None,
+    })
+}
+
+#[cfg(test)]
+mod initial_tests {
+    use super::*;
+
+    #[test]
+    fn refusals_name_line_key_and_value() {
+        let sound = "t_s = 0\nlat_deg = 46\nlon_deg = 6\nh_m = 400\nroll_deg = 0\npitch_deg = 0\nyaw_deg = 40\n";
+        let refused = |text: &str| {
+            let e = parse(&Source::new("i.toml", text)).unwrap_err();
+            format!("{e} | {}", e.advice().unwrap_or_default())
+        };
+        assert_eq!(
+            parse(&Source::new("i.toml", sound)).unwrap().sigma,
+            InitialSettings::default()
+        );
+        for (old, new, expected) in [
+            (
+                "= 46",
+                "= 91",
+                "i.toml, line 2: \"lat_deg\" = 91 is not within ±89.9 | ",
+            ),
+            (
+                "= 46",
+                "= 89.95",
+                "i.toml, line 2: \"lat_deg\" = 89.95 is not within ±89.9 | ",
+            ),
+            (
+                "= 400",
+                "= inf",
+                "i.toml, line 4: \"h_m\" = inf is not a finite number such as 1.5e-4 | ",
+            ),
+            (
+                "h_m = 400\n",
+                "",
+                "i.toml, line 1: \"h_m\" is missing | add the key \"h_m\"",
+            ),
+            (
+                "yaw_deg",
+                "heading_deg",
+                "i.toml, line 7: unknown key \"heading_deg\" | did you mean \"yaw_deg\"?",
+            ),
+            (
+                "t_s = 0",
+                "pos_sigma_m = [1, 1, -1]",
+                "i.toml, line 1: \"t_s\" is missing | add the key \"t_s\"",
+            ),
+            (
+                "t_s = 0",
+                "t_s = 0\npos_sigma_m = [1, 1, -1]",
+                "i.toml, line 2: \"pos_sigma_m\" = [1, 1, -1] is refused: it must be a finite number > 0 and ≤ 100000 | ",
+            ),
+        ] {
+            assert_eq!(refused(&sound.replacen(old, new, 1)), expected);
+        }
+    }
+}
+
+// Recorded speeds of a wheel.
+
+/// Speeds by the words of their names.
+static SPEED_QUANTITIES: [Quantity; 5] = [
+    Quantity::time(OF_CLOCK),
+    Quantity::time(STAMP),
+    Quantity::time(OF_RECEIVER),
+    Quantity::new("t_s", &["timeus"], NONE, Bare::Is(1e-6)),
+    Quantity {
+        of_words: true,
+        ..Quantity::new(
+            "speed",
+            &[
+                "speed", "velocity", "vel", "v", "wheel", "wheels", "odometer", "odo", "forward",
+                "rear",
+            ],
+            SPEED,
+            Bare::Unknown,
+        )
+    },
+];
+
+const SPEEDS: Dictionary = Dictionary::new(
+    &SPEED_QUANTITIES,
+    "columns: t_s and wheel_m_s (or wheel_km_h, wheel_mph), negative in reverse; or rear_left_m_s and rear_right_m_s",
+);
+
+/// Reads speeds: a table with a time, and a speed or those of both rear wheels, whose mean is taken.
+///
+/// # Errors
+/// Whatever is wrong with it, with its line.
+pub(crate) fn read_wheel(path: &Path) -> Result<Vec<WheelSpeed>, Error> {
+    let table = table::read(path, &SPEEDS, &Asked::default())?;
+    let [time] = table.columns(["t_s"], &SPEEDS)?;
+    let speeds = speed_columns(&table)?;
+    let speed = |row| speeds.iter().map(|c| c.si(row)).sum::<f64>() / speeds.len() as f64;
+    let rows = (0..table.rows()).map(|row| WheelSpeed {
+        t_s: time.si(row),
+        m_s: speed(row),
+    });
+    let read: Vec<WheelSpeed> = rows.collect();
+    match read.windows(2).position(|w| w[1].t_s <= w[0].t_s) {
+        Some(k) => {
+            let line = table.line(k + 1);
+            Err(time_back(&table.path, line, read[k].t_s, read[k + 1].t_s))
+        }
+        None => Ok(read),
+    }
+}
+
+/// The speed, or those of both rear wheels.
+fn speed_columns(table: &Table) -> Result<Vec<&Column>, Error> {
+    let has = |c: &Column, word: &str| normalised(&c.name).split('_').any(|w| w == word);
+    let is_candidate = |c: &&Column| c.quantity.of_words && !has(c, "front");
+    let all: Vec<&Column> = table.columns.iter().filter(is_candidate).collect();
+    let rear = |side: &str| all.iter().find(|c| has(c, "rear") && has(c, side));
+    let chosen = match (rear("left"), rear("right"), &all[..]) {
+        (Some(left), Some(right), _) => vec![*left, *right],
+        (_, _, []) => {
+            let refusal = table.refused("no speed of a wheel");
+            return Err(refusal.or_hint(SPEEDS.advice));
+        }
+        (_, _, [one]) => vec![*one],
+        (_, _, many) => {
+            let names: Vec<_> = many.iter().map(|c| format!("\"{}\"", c.name)).collect();
+            let message = format!("several speeds: {}", names.join(", "));
+            return Err(table.refused(message).or_hint("keep one of them"));
+        }
+    };
+    for column in &chosen {
+        let name = &column.name;
+        if column.factor.is_none() {
+            let message = format!("column \"{name}\" has no unit of speed in its name");
+            return Err(table
+                .refused(message)
+                .or_hint("end its name in _m_s, _km_h or _mph"));
+        }
+    }
+    Ok(chosen)
+}
+
+#[cfg(test)]
+mod wheel_tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Vec<WheelSpeed>, Error> {
+        let file = tempfile::NamedTempFile::with_suffix(".csv").unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        read_wheel(file.path())
+    }
+
+    #[test]
+    fn speeds_come_by_the_unit_of_their_column() {
+        let read = |header: &str| read(&format!("{header}\n0.5,36\n1.5,-18\n")).unwrap();
+        for (header, m_s) in [
+            ("t_s,wheel_m_s", 36.0),
+            ("time,speed (km/h)", 10.0),
+            ("t_s,odo_km_h", 10.0),
+            ("t_s,v_mph", 16.09344),
+        ] {
+            let speeds = read(header);
+            assert!(
+                (speeds[0].m_s - m_s).abs() < 1e-12 && (speeds[1].m_s + m_s / 2.0).abs() < 1e-12,
+                "{header}"
+            );
+            assert_eq!([speeds[0].t_s, speeds[1].t_s], [0.5, 1.5]);
+        }
+    }
+
+    #[test]
+    fn of_four_wheels_it_is_the_mean_of_the_rear() {
+        let header = "t_ms,front_left_m_s,front_right_m_s,rear_left_m_s,rear_right_m_s";
+        let speeds = read(&format!("{header}\n1000,9,9,7,8\n1010,9,9,8,9\n")).unwrap();
+        assert_eq!(
+            speeds,
+            [
+                WheelSpeed { t_s: 1.0, m_s: 7.5 },
+                WheelSpeed {
+                    t_s: 1.01,
+                    m_s: 8.5
+                }
+            ]
+        );
+    }
+
+    #[test]
+    fn what_is_no_speed_is_refused_with_its_line_and_column() {
+        for (text, said, hint) in [
+            (
+                "# a\nt_s,wheel_ticks\n0,1\n",
+                "line 2: column \"wheel_ticks\" has no unit",
+                "_m_s, _km_h or _mph",
+            ),
+            (
+                "t_s,wheel_rpm\n0,1\n",
+                "line 1: column \"wheel_rpm\" has no unit",
+                "_m_s, _km_h or _mph",
+            ),
+            (
+                "t_s,wheel\n0,1\n",
+                "line 1: column \"wheel\" has no unit",
+                "_m_s, _km_h or _mph",
+            ),
+            (
+                "t_s,speed_ft_s\n0,1\n",
+                "line 1: column \"speed_ft_s\" has no unit",
+                "_m_s, _km_h or _mph",
+            ),
+            (
+                "t_s,wheel_m_s,speed_m_s\n0,1,1\n",
+                "several speeds: \"wheel_m_s\", \"speed_m_s\"",
+                "keep one",
+            ),
+            ("t_s,gear\n0,1\n", "no speed of a wheel", "wheel_m_s"),
+            ("wheel_m_s\n1\n", "column t_s is missing", "t_s"),
+            (
+                "t_s,wheel_m_s\n1,2\n1,2\n",
+                "line 3: time goes from 1 s to 1 s",
+                "sort",
+            ),
+            (
+                "t_s,wheel_m_s\n1,x\n",
+                "line 2: column \"wheel_m_s\": \"x\" is not a number",
+                "",
+            ),
+        ] {
+            let e = read(text).unwrap_err();
+            assert!(e.to_string().contains(said), "{e}");
+            assert!(
+                e.advice().unwrap_or_default().contains(hint),
+                "{text}: {:?}",
+                e.advice()
+            );
+        }
+    }
 }

@@ -1,18 +1,15 @@
-//! NMEA 0183 sentences of a receiver, as it logs them: `GGA` (position), `RMC` or `VTG` (speed and course), `GST`
-//! (standard deviations), `RMC` or `ZDA` (date), from any talker. What has one time is one fix.
+//! NMEA 0183 sentences of a receiver, as it logs them: `GGA` (position), `RMC` (speed and course, date), `GST` (standard
+//! deviations), from any talker. What has one time is one fix.
 //!
 //! The layout of the sentences is that of the receivers' manuals (Trimble R6/R7/R8, appendix A; u-blox protocol
 //! specifications).
 
-use super::fixes::Fixes;
-use super::rtklib;
-use super::{doubt, remark};
+use super::{Fixes, clock, doubt, remark};
 use crate::io::{Failure as Error, help};
 use chrono::NaiveDate;
 use glam::{DVec2, DVec3};
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
 use nav_sim_signal::units::DEG;
-use std::collections::BTreeMap;
 
 /// Seconds of a day.
 const DAY_S: f64 = 86_400.0;
@@ -24,37 +21,27 @@ const KNOT: f64 = 1852.0 / 3600.0;
 struct Epoch {
     /// Line of its position.
     line: usize,
-    /// Time of day as written (s), and the days since the first sentence.
+    /// Time of day as written (s), and since the midnight before the first sentence.
     time_s: f64,
-    day: f64,
+    since_s: f64,
     /// Latitude, longitude (rad), height above the ellipsoid (m).
     position: Option<[f64; 3]>,
-    hdop: Option<f64>,
     sigma: Option<DVec3>,
     /// North and east (m/s), and what an unknown course leaves open of them (m/s).
     velocity: Option<(DVec2, f64)>,
-}
-
-impl Epoch {
-    /// Seconds since the first midnight.
-    fn since_s(&self) -> f64 {
-        DAY_S * self.day + self.time_s
-    }
 }
 
 /// All of a log.
 #[derive(Default)]
 struct Log {
     epochs: Vec<Epoch>,
-    /// Midnights before the first sentence (Unix s), and how many sentences state them.
-    dates: BTreeMap<i64, usize>,
-    /// Positions that are none: no fix, dead reckoning, typed in by hand.
-    left_out: usize,
+    /// The midnight before the first sentence (Unix s) by the last date: before it has found the time, a receiver states any.
+    midnight_s: Option<f64>,
     has_separation: bool,
 }
 
 /// Whether a text is such a log: one of its first lines has a sentence of a receiver in it.
-pub(in crate::io) fn is_nmea(text: &str) -> bool {
+pub(crate) fn is_nmea(text: &str) -> bool {
     let is_address = |word: &str| word.len() == 5 && word.bytes().all(|b| b.is_ascii_uppercase());
     let mut lines = text.lines().take(20).map(str::trim_end);
     lines.any(|line| body(line).is_ok_and(|body| body.split(',').next().is_some_and(is_address)))
@@ -68,88 +55,63 @@ impl Log {
         let number = |i: usize| field(i).parse::<f64>().ok();
         let kind = field(0).get(2..).unwrap_or_default();
         // proprietary ones begin with P
-        let epoch = match kind {
-            "ZDA" | "RMC" | "GGA" | "GST" if !field(1).is_empty() && !field(0).starts_with('P') => {
-                let time_s = time_of_day(field(1)).ok_or("not a time of day hhmmss.ss")?;
-                self.at(time_s)
-            }
-            // without a time: of the sentences before it
-            "VTG" => self.epochs.last_mut(),
-            _ => None,
+        if !matches!(kind, "RMC" | "GGA" | "GST")
+            || field(1).is_empty()
+            || field(0).starts_with('P')
+        {
+            return Ok(());
+        }
+        let time_s = time_of_day(field(1)).ok_or("not a time of day hhmmss.ss")?;
+        let last = self.epochs.last().map(|e| (e.time_s, e.since_s - e.time_s));
+        if last.is_none_or(|(last_s, _)| last_s != time_s) {
+            // after midnight it is a day later
+            let next_day =
+                |(last_s, day_s)| day_s + DAY_S * f64::from(last_s - time_s > DAY_S / 2.0);
+            self.epochs.push(Epoch {
+                time_s,
+                since_s: time_s + last.map_or(0.0, next_day),
+                ..Epoch::default()
+            });
+        }
+        let Some(epoch) = self.epochs.last_mut() else {
+            return Ok(());
         };
-        let Some(epoch) = epoch else { return Ok(()) };
-        let (mut midnight_s, mut left_out, mut has_separation) = (None, 0, false);
         match kind {
-            // 0: none, 6: dead reckoning, 7: typed in by hand
-            "GGA" if epoch.position.is_none() && matches!(field(6), "" | "0" | "6" | "7") => {
-                left_out = 1;
-            }
-            "GGA" if epoch.position.is_none() => {
+            // quality 0: none, 6: dead reckoning, 7: typed in by hand
+            "GGA" if epoch.position.is_none() && !matches!(field(6), "" | "0" | "6" | "7") => {
                 let lat = angle(field(2), field(3), 90.0);
                 let lon = angle(field(4), field(5), 180.0);
                 let lat = lat.ok_or("not a latitude ddmm.mmmm,N or S")?;
                 let lon = lon.ok_or("not a longitude dddmm.mmmm,E or W")?;
                 let altitude = number(9).ok_or("not an altitude")?;
                 epoch.line = line;
-                epoch.hdop = number(8).filter(|hdop| *hdop > 0.0);
                 epoch.position = Some([lat, lon, altitude + number(11).unwrap_or(0.0)]);
-                has_separation = number(11).is_some();
+                self.has_separation |= number(11).is_some();
             }
             "GST" => {
                 let north_east = number(6).zip(number(7)).zip(number(8));
                 epoch.sigma = north_east.map(|((n, e), d)| DVec3::new(n, e, d));
             }
-            "VTG" if epoch.velocity.is_none() => {
-                let knots = number(5).or(number(7).map(|km_h| km_h / 1.852));
-                epoch.velocity = knots.map(|knots| horizontal(knots, number(1)));
-            }
             "RMC" => {
                 if field(2) == "A" {
                     epoch.velocity = number(7).map(|knots| horizontal(knots, number(8)));
                 }
-                midnight_s = date_of_rmc(field(9));
-            }
-            "ZDA" => {
-                let date = number(4).zip(number(3)).zip(number(2));
-                midnight_s = date.and_then(|((y, m), d)| midnight(y as i32, m as u32, d as u32));
+                let first =
+                    midnight(field(9)).map(|midnight_s| midnight_s - epoch.since_s + time_s);
+                self.midnight_s = first.or(self.midnight_s);
             }
             _ => {}
         }
-        let first = midnight_s.map(|midnight_s| midnight_s - DAY_S * epoch.day);
-        self.left_out += left_out;
-        self.has_separation |= has_separation;
-        if let Some(first) = first {
-            *self.dates.entry(first as i64).or_default() += 1;
-        }
         Ok(())
-    }
-
-    /// The epoch of a time of day: the last one, or a new one, after midnight a day later.
-    fn at(&mut self, time_s: f64) -> Option<&mut Epoch> {
-        let last = self.epochs.last().map(|e| (e.time_s, e.day));
-        if last.is_none_or(|(last_s, _)| last_s != time_s) {
-            let next_day = |(last_s, day)| day + f64::from(last_s - time_s > DAY_S / 2.0);
-            self.epochs.push(Epoch {
-                time_s,
-                day: last.map_or(0.0, next_day),
-                ..Epoch::default()
-            });
-        }
-        self.epochs.last_mut()
     }
 
     /// What is added to seconds since the first midnight, and what times are then: Unix time where the IMU runs in it from
     /// one time to the other, else seconds of the first day, else GPS time.
     fn clock(&self, imu_s: Option<(f64, f64)>) -> Option<(f64, String)> {
-        // before a receiver has found the time, it states any date
-        let (midnight_s, _) = self.dates.iter().max_by_key(|(_, count)| **count)?;
-        let midnight_s = *midnight_s as f64;
-        let (first, last) = (
-            self.epochs.first()?.since_s(),
-            self.epochs.last()?.since_s(),
-        );
+        let midnight_s = self.midnight_s?;
+        let (first, last) = (self.epochs.first()?.since_s, self.epochs.last()?.since_s);
         let is_of_day = imu_s.is_some_and(|imu| imu.0 <= last && first <= imu.1);
-        let clock = rtklib::clock((midnight_s + first, midnight_s + last), imu_s)?;
+        let clock = clock((midnight_s + first, midnight_s + last), imu_s)?;
         let is_meant = clock.origin_s == 0.0 || !is_of_day;
         is_meant.then_some((midnight_s - clock.origin_s, clock.name))
     }
@@ -183,27 +145,19 @@ pub(super) fn fixes(
     }
     let day = || (0.0, "seconds of the day (UTC)".to_owned());
     let (origin_s, clock) = log.clock(imu_s).unwrap_or_else(day);
-    let mut hdop: Vec<f64> = log.epochs.iter().filter_map(|e| e.hdop).collect();
-    hdop.sort_by(f64::total_cmp);
-    let middle = hdop.get(hdop.len() / 2);
     let (mut fixes, mut is_given) = (Vec::new(), false);
     let vel_sigma = unsaid.and_then(|s| s.vel_m_s);
     for epoch in &log.epochs {
         let Some([lat, lon, h]) = epoch.position else {
             continue;
         };
-        // a receiver's deviations as given are those of its middle HDOP
-        let worse = epoch
-            .hdop
-            .zip(middle)
-            .map_or(1.0, |(own, middle)| own / middle);
-        let given = unsaid.map(|s| DVec3::from(s.pos_m) * worse);
+        let given = unsaid.map(|s| DVec3::from(s.pos_m));
         is_given |= epoch.sigma.is_none();
         let stated = epoch.sigma.filter(|sigma| sigma.min_element() > 0.0);
         let pos_sigma_n = stated.or(given).ok_or_else(|| {
             let message =
                 "a fix without standard deviations: no GST sentence of its time states them";
-            Error::contents(path, epoch.line, message).or(help::FIX_SIGMA)
+            Error::contents(path, epoch.line, message).or_option(help::FIX_SIGMA)
         })?;
         let velocity = epoch.velocity.zip(vel_sigma);
         let velocity = velocity.map(|((horizontal, course), [n, e, _])| GnssVelocity {
@@ -212,7 +166,7 @@ pub(super) fn fixes(
             down: None,
         });
         let fix = GnssFix {
-            t_s: origin_s + epoch.since_s(),
+            t_s: origin_s + epoch.since_s,
             lat,
             lon,
             h,
@@ -226,16 +180,12 @@ pub(super) fn fixes(
         return Err(Error::contents(path, 1_u64, message)
             .or_hint("let the receiver write GGA, RMC and GST"));
     }
-    let moving = fixes
-        .iter()
-        .filter(|(_, fix)| fix.velocity.is_some())
-        .count();
-    let (count, left_out) = (fixes.len(), log.left_out);
+    let count = fixes.len();
     let mut remarks = vec![remark(format!(
-        "NMEA sentences: {count} fixes, {moving} with a horizontal velocity, {left_out} left out, times are {clock}"
+        "NMEA sentences: {count} fixes, times are {clock}"
     ))];
     if is_given {
-        let text = "standard deviations without GST as given, in proportion to HDOP";
+        let text = "standard deviations without GST as given";
         remarks.push(remark(text));
     }
     if vel_sigma.is_none() && log.epochs.iter().any(|e| e.velocity.is_some()) {
@@ -296,17 +246,12 @@ fn angle(text: &str, hemisphere: &str, limit_deg: f64) -> Option<f64> {
     ((0.0..60.0).contains(&minutes) && value <= limit_deg).then_some(sign * value * DEG)
 }
 
-/// Midnight of a date (Unix s).
-fn midnight(year: i32, month: u32, day: u32) -> Option<f64> {
-    let date = NaiveDate::from_ymd_opt(year, month, day)?;
-    Some(date.and_hms_opt(0, 0, 0)?.and_utc().timestamp() as f64)
-}
-
-/// `ddmmyy`; years from 80 on are of the last century, as receivers count GPS.
-fn date_of_rmc(text: &str) -> Option<f64> {
-    let year = two(text, 4)?;
+/// Midnight of a date `ddmmyy` (Unix s); years from 80 on are of the last century, as receivers count GPS.
+fn midnight(text: &str) -> Option<f64> {
+    let (day, month, year) = (two(text, 0)?, two(text, 2)?, two(text, 4)?);
     let century = if year < 80 { 2000 } else { 1900 };
-    midnight((century + year) as i32, two(text, 2)?, two(text, 0)?)
+    let date = NaiveDate::from_ymd_opt((century + year) as i32, month, day)?;
+    Some(date.and_hms_opt(0, 0, 0)?.and_utc().timestamp() as f64)
 }
 
 /// Speed and course as north and east; without a course, as receivers have none at rest, nothing but as slow as that.

@@ -17,19 +17,26 @@
 //! A sensor or axis that is not in the file is noise-free in [`ModelFile::model`] and listed in
 //! [`ModelFile::missing`].
 
-mod description;
-mod provenance;
-mod read;
-mod write;
-
-pub(crate) use description::schema;
-pub use provenance::Misfit;
-pub use read::{from_text, read};
-pub use write::to_toml;
-pub use write::write;
-
-use nav_sim_signal::imu::{Channel, Sensor};
-use nav_sim_signal::noise::{Model, Spread};
+use super::file_kind::FileKind;
+use super::toml_file::{
+    Between, Finite, NonNegative, OneOrEach, Positive, Source, Stationary, Version,
+};
+use super::{Failure, atomic, file_kind};
+use crate::report::readable;
+use nav_sim_calibration::duration;
+use nav_sim_navigation::sensors::defects::{MAX_BIAS_M_S2, MAX_BIAS_RAD_S};
+use nav_sim_signal::imu::{Axis, Channel, MAX_RATE_HZ, Sensor};
+use nav_sim_signal::noise::{
+    Composite, Kind, Law, LognormalIntervals, Model, ParameterError, Process, Spread, SpreadError,
+    Variation,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_json::Map;
+use std::fmt;
+use std::fmt::Write;
+use std::path::Path;
+use toml::Value;
 
 /// Where the provenance of a model made from a data sheet names the figures that it lacks.
 pub(crate) const NOT_STATED: &str = "not_stated";
@@ -162,3 +169,680 @@ const CI: &str = "_ci95";
 
 #[cfg(test)]
 mod tests;
+
+// What model files hold, for the reader and for editors.
+
+/// What nav-sim calibrate writes and run, fuse, synthesize, export read
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Noise model")]
+struct Description {
+    /// Version of the layout
+    #[serde(rename = "schema")]
+    _schema: Option<Version>,
+    /// Sample rate that the variances are of (Hz)
+    #[schemars(with = "Positive", range(max = MAX_RATE_HZ))]
+    pub(super) rate_hz: Finite,
+    accel: Option<SensorTable>,
+    gyro: Option<SensorTable>,
+    turn_on: Option<TurnOnTable>,
+    spread: Option<SpreadTable>,
+    /// How the model was made
+    #[schemars(with = "Option<Map<String, serde_json::Value>>")]
+    provenance: Option<toml::Table>,
+}
+
+/// All three axes by `processes`, or each by x, y, z
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(inline)]
+struct SensorTable {
+    processes: Option<Vec<ProcessTable>>,
+    x: Option<AxisTable>,
+    y: Option<AxisTable>,
+    z: Option<AxisTable>,
+}
+
+/// One axis
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(inline)]
+#[expect(
+    dead_code,
+    reason = "its values are read by the names of their parameters"
+)]
+struct AxisTable {
+    processes: Vec<ProcessTable>,
+}
+
+/// Ends of a 95 % interval.
+type Ends = [f64; 2];
+
+/// A process: variances in units² of the signal
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(tag = "type", inline)]
+#[expect(
+    dead_code,
+    reason = "its values are read by the names of their parameters"
+)]
+enum ProcessTable {
+    /// White noise: variance a sample
+    WN {
+        #[schemars(with = "NonNegative")]
+        sigma2: Finite,
+        sigma2_ci95: Option<Ends>,
+    },
+    /// Quantization noise, Q²
+    QN {
+        #[schemars(with = "NonNegative")]
+        q2: Finite,
+        q2_ci95: Option<Ends>,
+    },
+    /// First-order autoregression: coefficient e^(−1/(rate × correlation time)), variance of the innovation
+    AR1 {
+        #[schemars(with = "Stationary")]
+        phi: Finite,
+        phi_ci95: Option<Ends>,
+        #[schemars(with = "NonNegative")]
+        sigma2: Finite,
+        sigma2_ci95: Option<Ends>,
+    },
+    /// Gauss-Markov process: reciprocal correlation time (1/s), variance of the process
+    GM {
+        #[schemars(with = "Positive")]
+        beta: Finite,
+        beta_ci95: Option<Ends>,
+        #[schemars(with = "NonNegative")]
+        s2: Finite,
+        s2_ci95: Option<Ends>,
+    },
+    /// First-order moving average: coefficient, variance of the innovation
+    MA1 {
+        #[schemars(with = "Between<-1, 1, false>")]
+        theta: Finite,
+        theta_ci95: Option<Ends>,
+        #[schemars(with = "NonNegative")]
+        sigma2: Finite,
+        sigma2_ci95: Option<Ends>,
+    },
+    /// Flicker noise, B²: bias instability
+    FN {
+        #[schemars(with = "NonNegative")]
+        b2: Finite,
+        b2_ci95: Option<Ends>,
+    },
+    /// Random walk: variance of an increment
+    RW {
+        #[schemars(with = "NonNegative")]
+        gamma2: Finite,
+        gamma2_ci95: Option<Ends>,
+    },
+    /// Drift (units a sample)
+    DR {
+        slope: Finite,
+        slope_ci95: Option<Ends>,
+    },
+}
+
+/// Standard deviations of the constant bias of a switching-on: one, or one for each axis
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(inline)]
+struct TurnOnTable {
+    accel_m_s2: Option<OneOrEach<Finite, [Finite; 3]>>,
+    gyro_rad_s: Option<OneOrEach<Finite, [Finite; 3]>>,
+}
+
+/// How parameters vary between recordings: of all three axes of a sensor, or of each
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct SpreadTable {
+    accel: Option<OneOrEach<LawAxes, Vec<LawTable>>>,
+    gyro: Option<OneOrEach<LawAxes, Vec<LawTable>>>,
+}
+
+/// Laws of each axis
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[derive(Default)]
+struct LawAxes {
+    x: Vec<LawTable>,
+    y: Vec<LawTable>,
+    z: Vec<LawTable>,
+}
+
+/// The law of a parameter of one process, such as AR1_2
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+struct LawTable {
+    process: String,
+    parameter: String,
+    #[schemars(flatten)]
+    distribution: Distribution,
+}
+
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
+#[schemars(tag = "distribution", !deny_unknown_fields)]
+enum Distribution {
+    /// low + width × a beta law
+    Beta {
+        a: Finite,
+        b: Finite,
+        low: Finite,
+        width: Finite,
+    },
+    /// A normal law about the parameter
+    Normal { sd: Finite },
+    /// A normal law of the logarithm of the parameter, of phi and beta of that of the correlation time
+    Lognormal {
+        median: Finite,
+        median_ci95: Option<Ends>,
+        sd: Finite,
+        sd_ci95: Option<Ends>,
+    },
+}
+
+impl Distribution {
+    fn law(&self) -> Law {
+        match *self {
+            Self::Beta {
+                a: Finite(a),
+                b: Finite(b),
+                low: Finite(low),
+                width: Finite(width),
+            } => Law::Beta { a, b, low, width },
+            Self::Normal { sd: Finite(sd) } => Law::Normal { sd },
+            Self::Lognormal {
+                median: Finite(median),
+                median_ci95,
+                sd: Finite(sd),
+                sd_ci95,
+            } => {
+                let ends = median_ci95.zip(sd_ci95);
+                let ci95 = ends.map(|(median, sd)| LognormalIntervals { median, sd });
+                Law::Lognormal { median, sd, ci95 }
+            }
+        }
+    }
+}
+
+/// The JSON schema of a model file, for editors and checkers.
+#[must_use]
+pub(crate) fn schema() -> serde_json::Value {
+    schemars::schema_for!(Description).to_value()
+}
+
+// Remarks of a calibration in the provenance of its model.
+
+/// Disagreement of a model with the recordings that it was fitted to, as its provenance has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Misfit {
+    /// Probability of the J-test, if it was made.
+    pub p_value: Option<f64>,
+    /// Wavelet variance of the data over that of the model where it is furthest from 1, and that scale (s).
+    pub worst: Option<(f64, f64)>,
+}
+
+impl fmt::Display for Misfit {
+    /// `does not fit its recordings (p = 0.005, data/model 0.33 at 0.02 s)`
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let p = self.p_value.map(|p| format!("p = {p:.3}"));
+        let worst = self
+            .worst
+            .map(|(ratio, tau_s)| format!("data/model {} at {}", readable(ratio), duration(tau_s)));
+        let figures: Vec<String> = p.into_iter().chain(worst).collect();
+        write!(f, "does not fit its recordings ({})", figures.join(", "))
+    }
+}
+
+impl ModelFile {
+    /// The estimator that made the model, if known.
+    pub(crate) fn estimator(&self) -> Option<String> {
+        let estimator = self.provenance.as_ref()?.get("estimator")?;
+        estimator.as_str().map(str::to_owned)
+    }
+
+    /// The worst disagreement of the model with its recordings, where a fit of it does not describe them.
+    #[must_use]
+    pub fn misfit(&self) -> Option<Misfit> {
+        let fits = self.provenance.as_ref()?.get("fits")?.as_array()?;
+        let of_fit = |fit: &Value| {
+            let number = |key| fit.get(key).and_then(Value::as_float);
+            let (p_value, ratio) = (number("j_p_value"), number("worst_ratio"));
+            let is_missed = ratio.is_some() || p_value.is_some_and(|p| p < 0.05);
+            is_missed.then(|| Misfit {
+                p_value,
+                worst: ratio.zip(number("worst_tau_s")),
+            })
+        };
+        let size = |m: &Misfit| m.worst.map_or(0.0, |(ratio, _)| ratio.ln().abs());
+        fits.iter()
+            .filter_map(of_fit)
+            .max_by(|a, b| size(a).total_cmp(&size(b)))
+    }
+
+    /// The largest whole number of that name that the provenance has of a fit.
+    fn most_of_fits(&self, key: &str) -> Option<i64> {
+        let fits = self.provenance.as_ref()?.get("fits")?.as_array()?;
+        fits.iter()
+            .filter_map(|fit| fit.get(key)?.as_integer())
+            .max()
+    }
+
+    /// The longest averaging time (s) that the calibration saw: half its longest scale.
+    pub(crate) fn observed_s(&self) -> Option<f64> {
+        let scales = self
+            .most_of_fits("scales")
+            .filter(|n| (1..63).contains(n))?;
+        Some((scales as f64 - 1.0).exp2() / self.model.rate_hz)
+    }
+}
+
+// Reading model files.
+
+/// Reads a model file.
+///
+/// # Errors
+/// When the file cannot be read, is not TOML, has unknown keys, lacks some, or has values outside their
+/// domains.
+pub fn read(path: &Path) -> Result<ModelFile, Failure> {
+    parse(&Source::read(path)?).map_err(|e| {
+        use FileKind as K;
+        match file_kind::of(path) {
+            Ok(K::Trajectory | K::Recording | K::Imu | K::Gnss | K::Curve | K::Record) => {
+                e.hint(NOT_A_MODEL)
+            }
+            _ => e,
+        }
+    })
+}
+
+/// For a file of another kind in the place of a model.
+const NOT_A_MODEL: &str = "a model is a TOML file, as calibrate and datasheet write them: are the arguments in another order?";
+
+/// A model file's text, at the path that messages show.
+///
+/// # Errors
+/// As [`read`].
+pub fn from_text(path: &Path, text: &str) -> Result<ModelFile, Failure> {
+    parse(&Source::new(&path.display().to_string(), text))
+}
+
+pub(super) fn parse(source: &Source) -> Result<ModelFile, Failure> {
+    let Description {
+        rate_hz: Finite(rate_hz),
+        accel,
+        gyro,
+        turn_on,
+        spread,
+        provenance,
+        ..
+    } = source.get()?;
+    // the same by the names of keys
+    let named: toml::Table = source.get()?;
+    if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
+        let reason = format!("is not a rate: it must be > 0 and at most {MAX_RATE_HZ}");
+        return Err(source.refused("rate_hz", reason));
+    }
+    let mut file = ModelFile::new(Model {
+        rate_hz,
+        axes: Default::default(),
+    });
+    for (sensor, table) in Sensor::ALL.into_iter().zip([accel, gyro]) {
+        match table {
+            Some(table) => read_sensor(source, sensor, table, &named[sensor.name()], &mut file)?,
+            None => file
+                .missing
+                .extend(Axis::ALL.map(|axis| Channel { sensor, axis })),
+        }
+    }
+    if file.missing.len() == Channel::ALL.len() {
+        return Err(source.missing("", &Sensor::ALL.map(Sensor::name)));
+    }
+    file.turn_on = turn_on
+        .map(|table| read_turn_on(source, &table))
+        .transpose()?;
+    if let Some(spread) = spread {
+        let mut read = Spread::default();
+        for (sensor, laws) in Sensor::ALL.into_iter().zip([spread.accel, spread.gyro]) {
+            let Some(laws) = laws else { continue };
+            read_laws(source, sensor, &laws, &file, &mut read)?;
+        }
+        file.spread = Some(read);
+    }
+    file.provenance = provenance;
+    Ok(file)
+}
+
+fn read_sensor(
+    source: &Source,
+    sensor: Sensor,
+    table: SensorTable,
+    named: &Value,
+    file: &mut ModelFile,
+) -> Result<(), Failure> {
+    let name = sensor.name();
+    let own = [table.x, table.y, table.z];
+    if table.processes.is_none() && own.iter().all(Option::is_none) {
+        return Err(source.missing(name, &["processes"]));
+    }
+    for (axis, own) in Axis::ALL.into_iter().zip(own) {
+        let channel = Channel { sensor, axis };
+        let key = format!("{name}.{}", axis.name());
+        match (&table.processes, own) {
+            (Some(_), Some(_)) => {
+                let error = source.refused(&key, "is given both for all axes and for this one");
+                return Err(error.or_hint(format!("write either [{name}] or one table an axis")));
+            }
+            (Some(_), None) => read_processes(source, name, named, channel, file)?,
+            (None, Some(_)) => read_processes(source, &key, &named[axis.name()], channel, file)?,
+            (None, None) => file.missing.push(channel),
+        }
+    }
+    Ok(())
+}
+
+fn read_turn_on(source: &Source, table: &TurnOnTable) -> Result<TurnOn, Failure> {
+    let axes = |sensor: Sensor, given: &Option<OneOrEach<Finite, [Finite; 3]>>, limit: f64| {
+        let axes = match given {
+            None => return Ok(None),
+            Some(OneOrEach::One(all)) => [all.0; 3],
+            Some(OneOrEach::Each(each)) => each.map(|sigma| sigma.0),
+        };
+        if axes.iter().all(|sigma| (0.0..=limit).contains(sigma)) {
+            return Ok(Some(axes));
+        }
+        let reason = format!(
+            "is not a standard deviation between 0 and {limit} {}",
+            sensor.unit()
+        );
+        Err(source.refused(&format!("turn_on.{}", TurnOn::key(sensor)), reason))
+    };
+    Ok(TurnOn {
+        accel_m_s2: axes(Sensor::Accel, &table.accel_m_s2, MAX_BIAS_M_S2)?,
+        gyro_rad_s: axes(Sensor::Gyro, &table.gyro_rad_s, MAX_BIAS_RAD_S)?,
+    })
+}
+
+fn read_processes(
+    source: &Source,
+    key: &str,
+    named: &Value,
+    channel: Channel,
+    file: &mut ModelFile,
+) -> Result<(), Failure> {
+    let rate_hz = file.model.rate_hz;
+    let tables = named["processes"].as_array().into_iter().flatten();
+    let tables: Vec<(String, &Value)> = (1..)
+        .zip(tables)
+        .map(|(i, table)| (format!("{key}.processes[{i}]"), table))
+        .collect();
+    let processes = tables
+        .iter()
+        .map(|(key, values)| read_process(source, key, values, rate_hz));
+    let noise = Composite::new(processes.collect::<Result<_, _>>()?);
+    for (((key, values), process), label) in tables.iter().zip(&noise.processes).zip(noise.labels())
+    {
+        for (parameter, _) in process.parameters() {
+            let name = format!("{parameter}{CI}");
+            let Some(ends) = values.get(&name).and_then(Value::as_array) else {
+                continue;
+            };
+            let [low, high] = [0, 1].map(|end| number(&ends[end]));
+            if low.is_nan() || high.is_nan() || low > high {
+                return Err(source.refused(&format!("{key}.{name}"), "is not a pair [low, high]"));
+            }
+            let (process, parameter) = (label.clone(), parameter.to_owned());
+            file.intervals.push(Interval {
+                channel,
+                process,
+                parameter,
+                low,
+                high,
+            });
+        }
+    }
+    file.model.axes[channel.index()] = noise;
+    Ok(())
+}
+
+/// What is made of larger parameters, such as the sum of a random walk's variances, may be no number any more.
+const LARGEST: f64 = 1e30;
+
+/// A number, written with a point or not.
+fn number(value: &Value) -> f64 {
+    let whole = value.as_integer().map(|whole| whole as f64);
+    value.as_float().or(whole).unwrap_or(f64::NAN)
+}
+
+fn read_process(
+    source: &Source,
+    key: &str,
+    values: &Value,
+    rate_hz: f64,
+) -> Result<Process, Failure> {
+    let code = values["type"].as_str().unwrap_or_default();
+    let kind = Kind::named(code).expect("the description has the codes of the kinds");
+    let names = kind.parameters().iter().map(|p| p.name());
+    let values: Vec<f64> = names.clone().map(|name| number(&values[name])).collect();
+    if let Some((name, _)) = names.zip(&values).find(|(_, value)| value.abs() > LARGEST) {
+        let reason = format!("is more than {LARGEST:e}, which no sensor has");
+        return Err(source.refused(&format!("{key}.{name}"), reason));
+    }
+    let process = kind
+        .process(&values, rate_hz)
+        .expect("as many values as the kind has parameters");
+    process.map_err(|e| refuse_parameter(source, key, &e))
+}
+
+fn refuse_parameter(source: &Source, key: &str, e: &ParameterError) -> Failure {
+    let refusal = source.refused(
+        &format!("{key}.{}", e.parameter),
+        format!("is not {}", e.domain),
+    );
+    match e.parameter {
+        "phi" => refusal.or_hint(
+            "phi = exp(−1/(T·rate_hz)) for a correlation time of T seconds; phi = 1 is a random walk: RW",
+        ),
+        "sigma2" | "gamma2" | "q2" | "s2" => {
+            refusal.or_hint("a variance is never negative; 0 switches the process off")
+        }
+        _ => refusal,
+    }
+}
+
+fn read_laws(
+    source: &Source,
+    sensor: Sensor,
+    laws: &OneOrEach<LawAxes, Vec<LawTable>>,
+    file: &ModelFile,
+    into: &mut Spread,
+) -> Result<(), Failure> {
+    for axis in Axis::ALL {
+        let channel = Channel { sensor, axis };
+        let (key, laws) = match laws {
+            OneOrEach::Each(all) => (format!("spread.{}", sensor.name()), all),
+            OneOrEach::One(LawAxes { x, y, z }) => {
+                (format!("spread.{channel}"), [x, y, z][axis as usize])
+            }
+        };
+        let into = &mut into.axes[channel.index()];
+        for (i, law) in (1..).zip(laws) {
+            let key = format!("{key}[{i}]");
+            let (process, parameter) = (law.process.as_str(), law.parameter.as_str());
+            let law = law.distribution.law();
+            let variation = Variation::new(
+                file.model.axis(channel),
+                file.model.rate_hz,
+                process,
+                parameter,
+                law,
+            )
+            .map_err(|e| refuse_law(source, &key, &e))?;
+            if into
+                .iter()
+                .any(|v| (v.process.as_str(), v.of.parameter.name()) == (process, parameter))
+            {
+                let key = format!("{key}.parameter");
+                return Err(source.refused(&key, "of this process already has a law"));
+            }
+            into.push(variation);
+        }
+    }
+    Ok(())
+}
+
+fn refuse_law(source: &Source, key: &str, e: &SpreadError) -> Failure {
+    let name = match e {
+        SpreadError::NoProcess { .. } => "process",
+        SpreadError::NoParameter { .. } => "parameter",
+        SpreadError::Constant { name, .. } => name,
+        SpreadError::Lognormal | SpreadError::Reaches(_) => "distribution",
+    };
+    source.refused(&format!("{key}.{name}"), format!("is refused: {e}"))
+}
+
+// Writing model files: numbers in the shortest form that reads back to the same bits.
+
+/// Writes a model file, whole or not at all.
+///
+/// # Errors
+/// When the system refuses, or another model is there and is to stay.
+pub fn write(path: &Path, file: &ModelFile) -> Result<(), Failure> {
+    atomic::write(path, to_toml(file))
+}
+
+/// The text of a model file. A sensor whose three axes are alike is written once.
+pub fn to_toml(file: &ModelFile) -> String {
+    let mut out = format!("schema = {SCHEMA}\nrate_hz = {:?}\n", file.model.rate_hz);
+    for sensor in Sensor::ALL {
+        let tables = Axis::ALL.map(|axis| processes(file, Channel { sensor, axis }));
+        write_axes(&mut out, sensor, &tables, |name, table| {
+            format!("\n[{name}]\n{table}")
+        });
+    }
+    out.push_str(&turn_on(file));
+    for sensor in Sensor::ALL {
+        let tables = Axis::ALL.map(|axis| laws(file, Channel { sensor, axis }));
+        write_axes(&mut out, sensor, &tables, |name, laws| {
+            laws.iter()
+                .map(|law| format!("\n[[spread.{name}]]\n{law}"))
+                .collect()
+        });
+    }
+    if let Some(provenance) = &file.provenance {
+        let mut table = toml::Table::new();
+        table.insert("provenance".into(), provenance.clone().into());
+        let _ = write!(out, "\n{table}");
+    }
+    out
+}
+
+fn turn_on(file: &ModelFile) -> String {
+    let Some(turn_on) = &file.turn_on else {
+        return String::new();
+    };
+    let mut out = String::from("\n[turn_on]\n");
+    for sensor in Sensor::ALL {
+        let Some(axes) = turn_on.axes(sensor) else {
+            continue;
+        };
+        let alike = axes.iter().all(|sigma| *sigma == axes[0]);
+        let value = if alike {
+            format!("{:?}", axes[0])
+        } else {
+            format!("{axes:?}")
+        };
+        let _ = writeln!(out, "{} = {value}", TurnOn::key(sensor));
+    }
+    out
+}
+
+/// One table for the sensor if the three are alike, else one an axis; none where there is nothing.
+fn write_axes<T: PartialEq>(
+    out: &mut String,
+    sensor: Sensor,
+    tables: &[Option<T>; 3],
+    table: impl Fn(&str, &T) -> String,
+) {
+    if tables.iter().all(|t| *t == tables[0]) {
+        if let Some(text) = &tables[0] {
+            out.push_str(&table(sensor.name(), text));
+        }
+        return;
+    }
+    for (axis, text) in Axis::ALL.iter().zip(tables) {
+        if let Some(text) = text {
+            out.push_str(&table(&format!("{}.{}", sensor.name(), axis.name()), text));
+        }
+    }
+}
+
+fn processes(file: &ModelFile, channel: Channel) -> Option<String> {
+    if file.missing.contains(&channel) {
+        return None;
+    }
+    let noise = file.model.axis(channel);
+    let mut out = String::from("processes = [\n");
+    for (process, label) in noise.processes.iter().zip(noise.labels()) {
+        let is_of_process = |i: &&Interval| i.channel == channel && i.process == label;
+        let intervals: Vec<&Interval> = file.intervals.iter().filter(is_of_process).collect();
+        let _ = writeln!(
+            out,
+            "  {{ {} }}, # {}",
+            keys(process, &intervals),
+            process.kind().units(channel.sensor.unit())
+        );
+    }
+    out.push_str("]\n");
+    Some(out)
+}
+
+fn keys(process: &Process, intervals: &[&Interval]) -> String {
+    let mut out = format!("type = \"{}\"", process.code());
+    for (name, value) in process.parameters() {
+        let _ = write!(out, ", {name} = {value:?}");
+        if let Some(i) = intervals.iter().find(|i| i.parameter == name) {
+            let _ = write!(out, ", {name}{CI} = [{:?}, {:?}]", i.low, i.high);
+        }
+    }
+    out
+}
+
+fn laws(file: &ModelFile, channel: Channel) -> Option<Vec<String>> {
+    let laws = &file.spread.as_ref()?.axes[channel.index()];
+    (!laws.is_empty()).then(|| laws.iter().map(law).collect())
+}
+
+fn law(v: &Variation) -> String {
+    let constants = match v.law {
+        Law::Beta { a, b, low, width } => {
+            format!(
+                "distribution = \"beta\"\na = {a:?}\nb = {b:?}\nlow = {low:?}\nwidth = {width:?}"
+            )
+        }
+        Law::Normal { sd } => format!("distribution = \"normal\"\nsd = {sd:?}"),
+        Law::Lognormal {
+            median,
+            sd,
+            ci95: None,
+        } => {
+            format!("distribution = \"lognormal\"\nmedian = {median:?}\nsd = {sd:?}")
+        }
+        Law::Lognormal {
+            median,
+            sd,
+            ci95: Some(ci95),
+        } => format!(
+            "distribution = \"lognormal\"\nmedian = {median:?}\nmedian{CI} = {:?}\nsd = {sd:?}\nsd{CI} = {:?}",
+            ci95.median, ci95.sd
+        ),
+    };
+    format!(
+        "process = \"{}\"\nparameter = \"{}\"\n{constants}\n",
+        v.process,
+        v.of.parameter.name()
+    )
+}

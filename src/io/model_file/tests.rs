@@ -1,4 +1,3 @@
-use super::read::parse;
 use super::*;
 use crate::io::Failure;
 use crate::io::toml_file::Source;

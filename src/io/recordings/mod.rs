@@ -4,27 +4,24 @@
 //! what was assumed, is told in the [`Report`]. What cannot be right is refused with file and line
 //! ([`Failure`]).
 
-mod files;
-mod report;
-mod samples;
-pub(in crate::io) mod timing;
-mod write;
-
-pub use report::{FileReport, Report};
-pub(in crate::io) use samples::{check_gravity, gravity_factor};
-pub(crate) use write::csv;
-
 use super::logs::LogOptions;
-use super::table::NO_COLUMN;
 use super::table::{
-    self, ACCELERATION, ANGLE, ANGULAR_RATE, Asked, Bare, Column, Dictionary, NONE, Numbers,
-    Quantity, TIME, Table, Units,
+    ACCELERATION, ANGLE, ANGULAR_RATE, Asked, Bare, Column, Dictionary, NO_COLUMN, NONE, Numbers,
+    Quantity, TIME, Table, Units, is_oxts, unreadable,
 };
-use super::{Failure, Place, help};
-use files::no_files;
-use nav_sim_signal::imu::{Channel, Recording};
+use super::{Failure, Place, help, table};
+use crate::report::six_digits;
+use nav_sim_signal::imu::{Channel, Recording, Sensor, Signal};
+use nav_sim_signal::units::STANDARD_GRAVITY;
 use rayon::prelude::*;
+use std::collections::HashSet;
+use std::fmt;
+use std::fmt::Write;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+use timing::Timing;
+
+pub(crate) mod timing;
 
 /// How recordings are read.
 #[derive(Debug, Clone)]
@@ -112,8 +109,8 @@ const GYRO_SI: &[&str] = &[
 ];
 const INCREMENT: Units = &[(&["m_s"], 1.0), (&["mps"], 1.0)];
 /// Time of measurement, preferred to the time of arrival beside it.
-pub(in crate::io) const STAMP: &[&str] = &["field_header_stamp", "header_stamp", "stamp"];
-pub(in crate::io) const OF_CLOCK: &[&str] = &[
+pub(crate) const STAMP: &[&str] = &["field_header_stamp", "header_stamp", "stamp"];
+pub(crate) const OF_CLOCK: &[&str] = &[
     "t",
     "time",
     "timestamp",
@@ -123,7 +120,7 @@ pub(in crate::io) const OF_CLOCK: &[&str] = &[
     "epoch",
 ];
 /// Time of a receiver, of the week or not: the last to be taken, because it may be that of its last fix.
-pub(in crate::io) const OF_RECEIVER: &[&str] = &[
+pub(crate) const OF_RECEIVER: &[&str] = &[
     "tow",
     "gps_tow",
     "gpstow",
@@ -220,7 +217,7 @@ const SIX: [&str; 6] = [
 const SEVEN: [&str; 7] = ["t_s", SIX[0], SIX[1], SIX[2], SIX[3], SIX[4], SIX[5]];
 
 /// Dictionary of recordings.
-pub(in crate::io) const DICTIONARY: Dictionary = Dictionary {
+pub(crate) const DICTIONARY: Dictionary = Dictionary {
     quantities: QUANTITIES.as_flattened(),
     bare: &[],
     array: &[&SIX, &SEVEN],
@@ -232,7 +229,7 @@ pub(in crate::io) const DICTIONARY: Dictionary = Dictionary {
             error.or_hint("write the time in seconds, from any instant on, and name the column t_s")
         }
         false => error
-            .or(help::REMOVE_LINE)
+            .or_hint("remove the line")
             .or_hint("record again: a sample that is made up would change the noise"),
     },
 };
@@ -252,7 +249,7 @@ fn channel_of(column: &Column) -> Option<Channel> {
 }
 
 /// Reads the columns of a file: one signal at least.
-pub(in crate::io) fn load(
+pub(crate) fn load(
     path: &Path,
     options: &ReadOptions,
     dictionary: &Dictionary,
@@ -287,7 +284,7 @@ pub(in crate::io) fn load(
             .refused(message)
             .passing_over(NO_COLUMN)
             .or_hint(dictionary.advice)
-            .or(help::COLUMN_NAMES));
+            .or_option(help::COLUMN_NAMES));
     }
     Ok(table)
 }
@@ -302,7 +299,7 @@ fn no_unit(table: &Table, column: &str) -> Failure {
     table
         .refused(format!("column \"{column}\" has no unit in its name"))
         .or_hint(units)
-        .or(help::COLUMN_NAMES)
+        .or_option(help::COLUMN_NAMES)
 }
 
 /// Fewer samples than are needed.
@@ -334,7 +331,7 @@ pub(crate) fn visit<T: Send>(
     look: &(dyn Fn(Recording) -> T + Sync),
     tell: &dyn Fn(usize, usize),
 ) -> Result<(Vec<T>, Report), Failure> {
-    let files = files::expand(paths)?;
+    let files = expand(paths)?;
     let (mut looks, mut report) = (Vec::new(), Report::default());
     tell(0, files.len());
     let mut done = 0;
@@ -361,7 +358,7 @@ pub(crate) fn visit<T: Send>(
             tell(done, files.len());
         }
     }
-    samples::same_rate(&report.files)?;
+    same_rate(&report.files)?;
     if looks.is_empty() {
         let path = paths
             .first()
@@ -379,10 +376,552 @@ fn held<T>(
     look: &(dyn Fn(Recording) -> T + Sync),
 ) -> Result<(FileReport, Vec<T>), Failure> {
     let table = load(path, options, &DICTIONARY)?;
-    let (recordings, mut report) = samples::recordings(table, options)?;
+    let (recordings, mut report) = recordings(table, options)?;
     path.clone_into(&mut report.path);
     Ok((report, recordings.into_iter().map(look).collect()))
 }
 
 #[cfg(test)]
 mod tests;
+
+// Which files are meant: directories stand for the recordings in them.
+
+/// A file to read.
+struct File {
+    pub(super) path: PathBuf,
+    /// Found in a directory, not named: may turn out to be something else.
+    from_directory: bool,
+}
+
+const ENDINGS: [&str; 10] = [
+    "csv", "tsv", "txt", "npy", "npz", "mcap", "bag", "ulg", "ubx", "parquet",
+];
+
+/// The files, in the order given, those of a directory in name order.
+fn expand(paths: &[PathBuf]) -> Result<Vec<File>, Failure> {
+    let mut files = Vec::new();
+    for path in paths {
+        let io = |e: std::io::Error| {
+            let is_missing = e.kind() == std::io::ErrorKind::NotFound;
+            let advice = "check the path; a directory stands for all its recordings";
+            unreadable(path, e).or_hint_if(is_missing.then(|| advice.to_owned()))
+        };
+        if std::fs::metadata(path).map_err(io)?.is_dir() && !is_oxts(path) {
+            let inside = listing(path).map_err(io)?;
+            if inside.is_empty() {
+                return Err(no_files(path.display().to_string()));
+            }
+            files.extend(inside.into_iter().map(|path| File {
+                path,
+                from_directory: true,
+            }));
+        } else {
+            files.push(File {
+                path: path.clone(),
+                from_directory: false,
+            });
+        }
+    }
+    let mut seen = HashSet::new();
+    for file in &files {
+        // A pipe has no path of its own.
+        if !seen.insert(
+            file.path
+                .canonicalize()
+                .unwrap_or_else(|_| file.path.clone()),
+        ) {
+            let message = "is given twice: it would count as two replicates";
+            return Err(
+                Failure::contents(file.path.display(), Place::Itself, message)
+                    .or_hint("name each file once; a directory stands for all its recordings"),
+            );
+        }
+    }
+    Ok(files)
+}
+
+/// A directory without recordings.
+fn no_files(path: String) -> Failure {
+    Failure::contents(path, Place::Within, "no recordings in it").or_hint(
+        "recordings end in .csv, .tsv, .txt (also .gz), .npy, .npz, .mcap, .bag, .ulg or .ubx",
+    )
+}
+
+fn listing(directory: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let mut paths = Vec::new();
+    for entry in std::fs::read_dir(directory)? {
+        let path = entry?.path();
+        let name = file_name(&path);
+        if !name.starts_with('.') && is_recording(&name) && path.is_file() {
+            paths.push(path);
+        }
+    }
+    paths.sort_by_key(|p| natural(&file_name(p)));
+    Ok(paths)
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default()
+}
+
+/// Whether a name ends like a recording's.
+fn is_recording(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
+    plain
+        .rsplit_once('.')
+        .is_some_and(|(stem, ending)| !stem.is_empty() && ENDINGS.contains(&ending))
+}
+
+/// Sort key: digits compare by value, so that `replicate_9` is before `replicate_10`.
+fn natural(name: &str) -> (String, String) {
+    let is_digit = |text: &[u8]| text[0].is_ascii_digit();
+    let parts = name
+        .as_bytes()
+        .chunk_by(|a, b| is_digit(&[*a]) == is_digit(&[*b]));
+    let padded = parts.map(|part| match String::from_utf8_lossy(part) {
+        number if is_digit(part) => format!("{number:0>20}"),
+        word => word.into_owned(),
+    });
+    (padded.collect(), name.to_owned())
+}
+
+#[cfg(test)]
+mod listing_tests {
+    use super::*;
+
+    #[test]
+    fn name_order_counts() {
+        let mut names = ["run10.csv", "run9.csv", "a.csv", "run1.csv", "run01.csv"];
+        names.sort_by_key(|n| natural(n));
+        assert_eq!(
+            names,
+            ["a.csv", "run01.csv", "run1.csv", "run9.csv", "run10.csv"]
+        );
+    }
+
+    #[test]
+    fn endings() {
+        for name in ["a.csv", "a.CSV.gz", "b.tsv", "mt.txt", "x.npy"] {
+            assert!(is_recording(name), "{name}");
+        }
+        for name in [
+            "manifest.json",
+            "model.toml",
+            "csv",
+            ".csv",
+            "a.gz",
+            "a.csv.partial",
+        ] {
+            assert!(!is_recording(name), "{name}");
+        }
+    }
+}
+
+// What was found in the files, for the user to check.
+
+/// What was found and assumed while reading.
+#[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Report {
+    /// One entry a file.
+    pub files: Vec<FileReport>,
+    /// Doubts that belong to no file's contents.
+    pub warnings: Vec<String>,
+}
+
+impl Report {
+    /// Every doubt, those about a file with its name.
+    #[must_use]
+    pub fn all_warnings(&self) -> Vec<String> {
+        let named = |f: &FileReport| {
+            f.warnings
+                .iter()
+                .map(|w| format!("{}: {w}", f.file))
+                .collect::<Vec<_>>()
+        };
+        self.warnings
+            .iter()
+            .cloned()
+            .chain(self.files.iter().flat_map(named))
+            .collect()
+    }
+}
+
+/// What was found and assumed in one file. Displays as one line.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
+pub struct FileReport {
+    /// The file, as shown.
+    pub file: String,
+    /// The file itself: its name need not be UTF-8.
+    pub path: PathBuf,
+    /// Columns passed over.
+    pub ignored: Vec<String>,
+    /// Sample rate (Hz).
+    pub rate_hz: f64,
+    /// Where the rate is from, in words.
+    pub rate_from: String,
+    /// Samples of each recording made of the file (several if it was split at gaps).
+    pub samples: Vec<usize>,
+    /// The mean removed from each signal of the first of them (m/s² or rad/s).
+    pub means: Vec<(Channel, f64)>,
+    /// What was assumed, in words.
+    pub assumptions: Vec<String>,
+    /// Doubts, in words.
+    pub warnings: Vec<String>,
+}
+
+/// The name of one of the recordings of a file.
+fn name_of(file: &str, index: usize, count: usize) -> String {
+    if count > 1 {
+        format!("{file}[{}]", index + 1)
+    } else {
+        file.to_owned()
+    }
+}
+
+impl FileReport {
+    pub(super) fn new(raw: &Table) -> Self {
+        let mut assumptions = raw.assumptions.clone();
+        if raw.columns.iter().any(|c| c.quantity.per_sample) {
+            assumptions.push("increments divided by the sample interval".into());
+        }
+        Self {
+            file: raw.path.clone(),
+            ignored: raw.ignored.clone(),
+            assumptions,
+            warnings: raw.warnings.clone(),
+            ..Self::default()
+        }
+    }
+
+    /// The names of its recordings, with their samples: of several, such as stretches between gaps, `a.csv[1]`, …
+    pub(crate) fn recordings(&self) -> impl Iterator<Item = (String, usize)> + Clone {
+        let count = self.samples.len();
+        self.samples
+            .iter()
+            .enumerate()
+            .map(move |(i, samples)| (name_of(&self.file, i, count), *samples))
+    }
+
+    pub(super) fn warn(&mut self, text: String) {
+        self.warnings.push(text);
+    }
+
+    fn means_of(&self, sensor: Sensor) -> Option<String> {
+        let of_sensor = self.means.iter().filter(|(c, _)| c.sensor == sensor);
+        let parts: Vec<String> = of_sensor
+            .map(|(c, m)| format!("{} {m:.6}", c.axis.name()))
+            .collect();
+        (!parts.is_empty())
+            .then(|| format!("{} {} {}", sensor.name(), parts.join(", "), sensor.unit()))
+    }
+}
+
+impl fmt::Display for FileReport {
+    /// `a.csv: 524284 samples at 100 Hz (time column), 5242.84 s; means removed: accel x 0.02, …`
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let total: usize = self.samples.iter().sum();
+        let (rate, from, seconds) = (
+            six_digits(self.rate_hz),
+            &self.rate_from,
+            crate::report::seconds(total as f64 / self.rate_hz),
+        );
+        write!(
+            f,
+            "{}: {total} samples at {rate} Hz ({from}), {seconds} s",
+            self.file
+        )?;
+        if self.samples.len() > 1 {
+            write!(f, ", in {} stretches", self.samples.len())?;
+        }
+        let means: Vec<String> = Sensor::ALL
+            .into_iter()
+            .filter_map(|s| self.means_of(s))
+            .collect();
+        write!(f, "; means removed: {}", means.join("; "))?;
+        self.assumptions.iter().try_for_each(|a| write!(f, "; {a}"))
+    }
+}
+
+// A file whose time, units and stretches are decided: what is left is to take its samples.
+
+/// The recordings of a file, and what was found in it.
+pub(super) fn recordings(
+    mut raw: Table,
+    options: &ReadOptions,
+) -> Result<(Vec<Recording>, FileReport), Failure> {
+    let mut report = FileReport::new(&raw);
+    let timing = timing::timing(&mut raw, options, &mut report)?;
+    raw.columns
+        .sort_by_key(|c| channel_of(c).map(Channel::index));
+    let factors = factors(&raw, timing.rate_hz)?;
+    let pieces = pieces(&raw.path, raw.rows(), &timing, options, &mut report)?;
+    let empty = |i| Recording {
+        name: name_of(&raw.path, i, pieces.len()),
+        rate_hz: timing.rate_hz,
+        signals: Vec::new(),
+    };
+    let mut recordings: Vec<Recording> = (0..pieces.len()).map(empty).collect();
+    // column by column, so that each is let go when it is copied
+    for (column, factor) in raw.columns.into_iter().zip(factors) {
+        let Some(channel) = channel_of(&column) else {
+            continue;
+        };
+        for (recording, piece) in recordings.iter_mut().zip(&pieces) {
+            let values = &column.values[piece.clone()];
+            let mean = mean(values, factor);
+            let mut samples = with_holes(values, piece, &timing.holes);
+            samples.iter_mut().for_each(|v| *v = *v * factor - mean);
+            recording.signals.push(Signal {
+                channel,
+                mean,
+                samples,
+            });
+        }
+    }
+    for recording in &recordings {
+        let means = recording.signals.iter().map(|s| (s.channel, s.mean));
+        let means: Vec<(Channel, f64)> = means.collect();
+        plausible(&means, &mut report)?;
+        let samples = recording.signals.first().map_or(0, |s| s.samples.len());
+        report.samples.push(samples);
+        if report.means.is_empty() {
+            report.means = means;
+        }
+    }
+    report.rate_hz = timing.rate_hz;
+    Ok((recordings, report))
+}
+
+/// The samples of a stretch with NaN where some are missing.
+fn with_holes(samples: &[f64], piece: &Range<usize>, holes: &[(usize, usize)]) -> Vec<f64> {
+    let is_inside = |(sample, _): &&(usize, usize)| *sample > piece.start && *sample < piece.end;
+    let inside = holes.iter().filter(is_inside);
+    let lost: usize = inside.clone().map(|(_, lost)| lost).sum();
+    let (mut whole, mut done) = (Vec::with_capacity(samples.len() + lost), 0);
+    for (sample, lost) in inside {
+        let next = sample - piece.start;
+        whole.extend_from_slice(&samples[done..next]);
+        whole.extend(std::iter::repeat_n(f64::NAN, *lost));
+        done = next;
+    }
+    whole.extend_from_slice(&samples[done..]);
+    whole
+}
+
+/// Of the stretches between gaps those shorter than the longest by more than this are left out.
+const LONGEST_OVER_SHORTEST: usize = 16;
+
+/// The stretches of samples that become recordings: at least one.
+fn pieces(
+    path: &str,
+    samples: usize,
+    timing: &Timing,
+    options: &ReadOptions,
+    report: &mut FileReport,
+) -> Result<Vec<Range<usize>>, Failure> {
+    let skip = ((options.skip_s.max(0.0) * timing.rate_hz).round() as usize).min(samples);
+    let inner = timing.breaks.iter().copied().filter(|b| *b > skip);
+    let ends: Vec<usize> = std::iter::once(skip)
+        .chain(inner)
+        .chain([samples])
+        .collect();
+    let all = || ends.windows(2).map(|w| w[0]..w[1]);
+    let longest = all().map(|p| p.len()).max().unwrap_or(0);
+    let needed = options.min_samples.max(2);
+    if longest < needed && options.skip_s > 0.0 {
+        let (skip_s, seconds) = (
+            options.skip_s,
+            crate::report::seconds(samples as f64 / timing.rate_hz),
+        );
+        let message = format!(
+            "leaving out the first {skip_s} s leaves {longest} samples of {seconds} s, but {needed} are needed"
+        );
+        return Err(Failure::contents(path, Place::Within, message)
+            .or_option(("skip-s", "a smaller --skip-s"))
+            .or_hint("a longer recording"));
+    }
+    if longest < needed {
+        return Err(too_short(path, longest, needed));
+    }
+    // A short one would cost all others their long scales.
+    let needed = needed.max(longest / LONGEST_OVER_SHORTEST);
+    let dropped = all().filter(|p| p.len() < needed).count();
+    if dropped > 0 {
+        report.warn(format!(
+            "{dropped} stretches between gaps have fewer than {needed} samples: left out"
+        ));
+    }
+    Ok(all().filter(|p| p.len() >= needed).collect())
+}
+
+/// Below this (m/s²) the mean was removed before: nothing to be learnt from it.
+const NO_GRAVITY: f64 = 0.3;
+
+/// What brings each column to SI units; refuses dead axes.
+fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
+    let from_gravity = gravity_factor(raw)?;
+    let factor = |column: &Column| {
+        let channel = column.quantity.name;
+        if let Some(value) = only_value(&column.values) {
+            let message = format!(
+                "{channel} (column \"{}\") is dead: every sample is {value}",
+                column.name
+            );
+            return Err(Failure::contents(&raw.path, Place::Within, message)
+                .or_option(help::CHANNELS)
+                .or_hint("record again"));
+        }
+        let per_sample = if column.quantity.per_sample {
+            rate_hz
+        } else {
+            1.0
+        };
+        Ok(column
+            .factor
+            .map_or(from_gravity, |factor| factor * per_sample))
+    };
+    raw.columns.iter().map(factor).collect()
+}
+
+/// The unit of accelerometer columns that do not say it, from the length of their mean.
+pub(crate) fn gravity_factor(raw: &Table) -> Result<f64, Failure> {
+    let is_unnamed = |c: &&Column| c.factor.is_none() && channel_of(c).is_some();
+    let unnamed: Vec<&Column> = raw.columns.iter().filter(is_unnamed).collect();
+    let Some(first) = unnamed.first() else {
+        return Ok(1.0);
+    };
+    let means = unnamed
+        .iter()
+        .map(|c| mean(&c.values, 1.0))
+        .collect::<Vec<_>>();
+    let norm = norm(&means);
+    let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
+    if unnamed.len() == 3 {
+        for factor in [1.0, STANDARD_GRAVITY, 1e-3 * STANDARD_GRAVITY] {
+            if near(STANDARD_GRAVITY / factor) {
+                return Ok(factor);
+            }
+        }
+    }
+    Err(no_unit(raw, &first.name))
+}
+
+/// The value of all samples, if two or more have the same.
+fn only_value(values: &[f64]) -> Option<f64> {
+    let (first, rest) = values.split_first()?;
+    let is_same = |value: &f64| value.to_bits() == first.to_bits();
+    (!rest.is_empty() && rest.iter().all(is_same)).then_some(*first)
+}
+
+/// Mean of values times a factor, summed about the first of them so that a large offset costs no digits.
+fn mean(values: &[f64], factor: f64) -> f64 {
+    /// Values whose sum is taken before it is added: rounding grows with their number.
+    const BLOCK: usize = 4096;
+    let Some(first) = values.first().map(|first| first * factor) else {
+        return 0.0;
+    };
+    let sum_of = |block: &[f64]| block.iter().map(|v| v * factor - first).sum::<f64>();
+    first + values.chunks(BLOCK).map(sum_of).sum::<f64>() / values.len() as f64
+}
+
+fn norm(vector: &[f64]) -> f64 {
+    vector.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// Static specific force is gravity, or nothing where the mean was removed before; rates are small.
+fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Failure> {
+    let means_of_sensor = |sensor| -> Vec<f64> {
+        means
+            .iter()
+            .filter(|(channel, _)| channel.sensor == sensor)
+            .map(|(_, mean)| *mean)
+            .collect()
+    };
+    let (accel, gyro) = (
+        means_of_sensor(Sensor::Accel),
+        means_of_sensor(Sensor::Gyro),
+    );
+    let is_gravity = |mean: &[f64]| (norm(mean) / STANDARD_GRAVITY - 1.0).abs() < 0.1;
+    if accel.len() == 3 && gyro.len() == 3 && norm(&accel) < NO_GRAVITY && is_gravity(&gyro) {
+        let (f, rate) = (norm(&accel), norm(&gyro));
+        let message = format!(
+            "accelerometers and gyroscopes are exchanged: |f| is {f:.4} m/s², the mean rate {rate:.4} rad/s"
+        );
+        return Err(Failure::contents(&report.file, Place::Within, message)
+            .or_hint("without names the first three columns are the accelerometers")
+            .or_option(help::COLUMN_NAMES));
+    }
+    if accel.len() == 3 {
+        check_gravity(&report.file, norm(&accel))?;
+    }
+    if norm(&gyro) > 0.1 {
+        let degrees = norm(&gyro).to_degrees();
+        report.warn(format!(
+            "mean angular rate {degrees:.1} deg/s: not static, or deg/s named rad/s?"
+        ));
+    }
+    Ok(())
+}
+
+pub(crate) fn check_gravity(path: &str, norm: f64) -> Result<(), Failure> {
+    let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
+    if near(STANDARD_GRAVITY) || norm < NO_GRAVITY {
+        return Ok(());
+    }
+    let guess = if near(1.0) {
+        "it looks like g"
+    } else if near(1000.0) {
+        "it looks like mg"
+    } else if near(STANDARD_GRAVITY * STANDARD_GRAVITY) {
+        "it looks like m/s² named g"
+    } else {
+        "wrong unit, or the sensor was moving"
+    };
+    let message = format!("static |f| is {norm:.4} m/s², far from 9.81 m/s²: {guess}");
+    Err(Failure::contents(path, Place::Within, message)
+        .or_hint("name the unit in the columns: accel_x_m_s2, accel_x_g or accel_x_mg"))
+}
+
+/// Replicates of one sensor have one rate (0.5 % allows for clocks).
+fn same_rate(files: &[FileReport]) -> Result<(), Failure> {
+    let Some(first) = files.first() else {
+        return Ok(());
+    };
+    match files
+        .iter()
+        .find(|f| (f.rate_hz / first.rate_hz - 1.0).abs() > 0.005)
+    {
+        None => Ok(()),
+        Some(other) => {
+            let message = format!(
+                "has {} Hz, but {} has {} Hz",
+                six_digits(other.rate_hz),
+                first.file,
+                six_digits(first.rate_hz)
+            );
+            Err(Failure::contents(&other.file, Place::Itself, message)
+                .or_hint("calibrate recordings of one rate at a time, or resample them"))
+        }
+    }
+}
+
+// Writing recordings.
+
+/// Signals of the same length (m/s² or rad/s), sampled at `rate_hz` from time 0 on, with ten significant digits.
+pub(crate) fn csv(rate_hz: f64, signals: &[(Channel, Vec<f64>)]) -> String {
+    let names: Vec<&str> = signals.iter().map(|(c, _)| column_name(*c)).collect();
+    let mut text = format!("t_s,{}\n", names.join(","));
+    for k in 0..signals.first().map_or(0, |(_, x)| x.len()) {
+        let _ = write!(text, "{}", k as f64 / rate_hz);
+        for (_, x) in signals {
+            let _ = write!(text, ",{:.9e}", x[k]);
+        }
+        text.push('\n');
+    }
+    text
+}

@@ -2,23 +2,21 @@
 //!
 //! A reader is `read(path, &DICTIONARY, &asked)`: columns with a factor to SI and the line of each row.
 
-mod containers;
-mod quantity;
-mod text;
-
-pub(crate) use containers::is_oxts;
-#[cfg(test)]
-pub(crate) use quantity::find;
-pub(crate) use quantity::{ACCELERATION, ANGLE, ANGULAR_RATE, NONE, SPEED, TIME};
-pub(crate) use quantity::{Bare, Quantity, Units, normalised};
-
 use super::suggest::nearest;
 use super::{Failure, Place, help, logs, source};
 use crate::failure::is_damage;
-use nav_sim_logs::Kind as LogKind;
+use chrono::NaiveDateTime;
+use nav_sim_logs::npy::Array;
+use nav_sim_logs::{Channel, Clock, Content, Kind as LogKind, in_seconds, npy};
+pub(crate) use quantity::find;
+pub(crate) use quantity::{
+    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, NONE, Quantity, SPEED, TIME, Units, normalised,
+};
 use std::fmt::Display;
-use std::io::Cursor;
-use std::path::Path;
+use std::io::{BufRead, Cursor, Read};
+use std::path::{Path, PathBuf};
+
+mod quantity;
 
 /// Quantities of a kind of table, and words for what is refused.
 pub(crate) struct Dictionary {
@@ -71,7 +69,7 @@ pub(crate) struct Asked<'a> {
 }
 
 /// Columns of a file, before anything is decided about time and units.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Table {
     pub(crate) path: String,
     /// Line of the header, from 1; 0 where there is none.
@@ -126,20 +124,20 @@ pub(crate) fn read(
             .is_some_and(|e| e.eq_ignore_ascii_case(ending))
     };
     let name = path.display().to_string();
-    let of = |columns| containers::table(path, columns, dictionary, asked);
+    let of = |columns| table(path, columns, dictionary, asked);
     let table = match logs::kind_of(path) {
         #[cfg(feature = "npz")]
         Some(LogKind::Npz) => {
-            let (columns, rate_hz) = containers::npz(path)?;
+            let (columns, rate_hz) = npz(path)?;
             Ok(Table {
-                rate_hz: rate_hz.map(|hz| (hz, containers::RATE)),
+                rate_hz: rate_hz.map(|hz| (hz, RATE)),
                 ..of(columns)?
             })
         }
-        Some(_) => containers::log(path, dictionary, asked),
-        None if ends_in("npy") => of(containers::npy(path, dictionary, asked)?),
+        Some(_) => log(path, dictionary, asked),
+        None if ends_in("npy") => of(npy(path, dictionary, asked)?),
         #[cfg(feature = "parquet")]
-        None if ends_in("parquet") => of(containers::parquet(path)?),
+        None if ends_in("parquet") => of(parquet(path)?),
         #[cfg(not(feature = "parquet"))]
         None if ends_in("parquet") => {
             let message = "is Apache Parquet, which this build does not read";
@@ -150,12 +148,12 @@ pub(crate) fn read(
             let assumptions = vec!["KITTI oxts, axes front, left, up".to_owned()];
             Ok(Table {
                 assumptions,
-                ..of(containers::oxts(path)?)?
+                ..of(oxts(path)?)?
             })
         }
         None => {
             let reader = source::table(path).map_err(|e| unreadable(path, e))?;
-            text::read(&name, reader, dictionary, asked)
+            read_text(&name, reader, dictionary, asked)
         }
     }?;
     table.filled()
@@ -172,7 +170,7 @@ pub(crate) fn parse(
     asked: &Asked<'_>,
 ) -> Result<Table, Failure> {
     let reader = Box::new(Cursor::new(text.to_owned()));
-    text::read(name, reader, dictionary, asked)?.filled()
+    read_text(name, reader, dictionary, asked)?.filled()
 }
 
 /// Error of the system on a table, with a hint.
@@ -229,14 +227,7 @@ impl Table {
         let mut table = Self {
             path: path.to_owned(),
             header_line,
-            columns: Vec::new(),
-            ignored: Vec::new(),
-            comments: Vec::new(),
-            rate_hz: None,
-            lines: Vec::new(),
-            is_bare: false,
-            assumptions: Vec::new(),
-            warnings: Vec::new(),
+            ..Self::default()
         };
         let unwanted = |quantity: &Quantity| asked.unwanted.is_some_and(|is| is(quantity));
         let mut places: Vec<usize> = Vec::new();
@@ -315,8 +306,8 @@ impl Table {
                 return Err(self
                     .refused(message)
                     .or_hint(format!("end its name in one of {}", endings.join(", ")))
-                    .or(help::COLUMN_NAMES)
-                    .or(help::CHANNELS));
+                    .or_option(help::COLUMN_NAMES)
+                    .or_option(help::CHANNELS));
             }
         }
         Ok(())
@@ -398,7 +389,7 @@ impl Table {
         let [needed, free] = [bytes(rows), free].map(|bytes| bytes.div_ceil(1 << 20));
         let message = format!("its samples need {needed} MiB of memory, and {free} MiB are free");
         let refusal = Failure::contents(&self.path, Place::Within, message);
-        Err(refusal.or(help::FEWER_CHANNELS))
+        Err(refusal.or_option(("axes", "take fewer signals at a time with --axes")))
     }
 
     /// Something wrong with the header.
@@ -497,3 +488,638 @@ fn free_memory() -> Option<u64> {
 
 #[cfg(test)]
 mod tests;
+
+// Tables of text: RFC 4180 with `,` `;` tab or blanks, comments and other lines before the header.
+
+type Reader = Box<dyn BufRead>;
+
+/// Longest line before the rows (bytes); what is longer is no table of text.
+const LONGEST: u64 = 1 << 16;
+/// Lines that may stand before the header.
+const MOST_BEFORE: u64 = 200;
+const BUFFER: usize = 1 << 17;
+
+/// Reads a table.
+fn read_text(
+    path: &str,
+    mut reader: Reader,
+    dictionary: &Dictionary,
+    asked: &Asked<'_>,
+) -> Result<Table, Failure> {
+    let head = Head::read(path, &mut reader, dictionary, asked)?;
+    let (mut table, places) = Table::new(
+        path,
+        head.line,
+        &head.names,
+        dictionary,
+        asked,
+        head.is_xsens,
+    )?;
+    table.rate_hz = head.rate_hz.map(|rate_hz| (rate_hz, "head of the file"));
+    table.is_bare = head.is_bare;
+    if head.is_latin_1 && asked.names.is_none() {
+        let text = "header not in UTF-8, taken as ISO-8859-1";
+        table.assumptions.push(text.to_owned());
+    }
+    if !table.columns.is_empty() {
+        head.rows(&mut table, reader, &places, dictionary)?;
+    }
+    table.comments.splice(..0, head.comments);
+    Ok(table)
+}
+
+/// Lines before the rows.
+#[derive(Default)]
+struct Head {
+    names: Vec<String>,
+    delimiter: u8,
+    /// Line of the header, from 1.
+    line: u64,
+    /// Lines before the rows, and the first row where it was read in search of a header.
+    before: u64,
+    first_row: Vec<u8>,
+    comments: Vec<String>,
+    /// True if it is that of an Xsens MT Manager export, which is in SI.
+    is_xsens: bool,
+    rate_hz: Option<f64>,
+    /// True if there is no header.
+    is_bare: bool,
+    /// True if the header is no UTF-8: `²` and `°` are one byte each then.
+    is_latin_1: bool,
+}
+
+impl Head {
+    fn read(
+        path: &str,
+        reader: &mut Reader,
+        dictionary: &Dictionary,
+        asked: &Asked<'_>,
+    ) -> Result<Self, Failure> {
+        let mut head = Self {
+            delimiter: b',',
+            ..Self::default()
+        };
+        // the first line of words, which is the header where none names a quantity
+        let mut words: Option<(u64, Vec<String>)> = None;
+        for line in 1.. {
+            let mut bytes = Vec::new();
+            let read = reader.by_ref().take(LONGEST).read_until(b'\n', &mut bytes);
+            read.map_err(|e| unreadable(Path::new(path), e))?;
+            let is_end = bytes.is_empty() || line > MOST_BEFORE;
+            if is_end && let Some((line, names)) = words.take() {
+                (head.line, head.names) = (line, names);
+                return Ok(head);
+            }
+            if is_end {
+                return Err(empty(path));
+            }
+            if let Some(what) = no_text(&bytes) {
+                let message = format!("is no table of text: {what}");
+                return Err(Failure::contents(path, Place::Itself, message).or_hint(
+                    "save it as CSV in UTF-8, one row a line; arrays end in .npy, gzipped tables in .gz",
+                ));
+            }
+            let utf_8 = std::str::from_utf8(&bytes).ok().map(str::to_owned);
+            head.is_latin_1 = utf_8.is_none();
+            let text = utf_8.unwrap_or_else(|| bytes.iter().map(|b| char::from(*b)).collect());
+            let text = text.trim_start_matches('\u{feff}').trim();
+            if let Some(comment) = text.strip_prefix("//") {
+                head.is_xsens = true;
+                head.rate_hz = head.rate_hz.or_else(|| rate_in(comment));
+                continue;
+            }
+            if text.is_empty()
+                || text
+                    .get(..4)
+                    .is_some_and(|t| t.eq_ignore_ascii_case("sep="))
+            {
+                continue;
+            }
+            let inside = text.trim_start_matches(['#', '%']).trim();
+            let delimiter = delimiter_of(inside, dictionary);
+            let cells = split(inside, delimiter);
+            let known = |cell: &&String| {
+                find(dictionary.quantities, cell).is_some_and(|(q, _)| q.rank.is_none())
+            };
+            let known = cells.iter().filter(known).count();
+            if inside.len() < text.len() {
+                head.comments.push(inside.to_owned());
+                // words between blanks may be those of a sentence
+                if known == 0 || delimiter == b' ' && 2 * known + 1 < cells.len() {
+                    continue;
+                }
+            }
+            (head.delimiter, head.line, head.before) = (delimiter, line, line);
+            if cells
+                .iter()
+                .all(|c| number(c.as_bytes(), delimiter).is_some())
+            {
+                (head.first_row, head.before) = (bytes, line - 1);
+                if let Some((line, names)) = words.take() {
+                    // what names no quantity is the header all the same: its reader says what it lacks
+                    (head.line, head.names) = (line, names);
+                    return Ok(head);
+                }
+                head.is_bare = asked.names.is_none();
+                head.names = asked
+                    .names
+                    .map(<[String]>::to_vec)
+                    .or_else(|| layout(dictionary.bare, cells.len()))
+                    .ok_or_else(|| no_header(path, line, &cells, text, dictionary))?;
+                return Ok(head);
+            }
+            let names = asked.names.map_or(cells, <[String]>::to_vec);
+            if known > 0 || asked.names.is_some() {
+                head.names = names;
+                return Ok(head);
+            }
+            words.get_or_insert((line, names));
+        }
+        unreachable!("the lines end")
+    }
+
+    /// Appends the rows; what is passed over becomes a note.
+    fn rows(
+        &self,
+        table: &mut Table,
+        reader: Reader,
+        places: &[Option<usize>],
+        dictionary: &Dictionary,
+    ) -> Result<(), Failure> {
+        let path = table.path.clone();
+        let rows = Cursor::new(self.first_row.clone()).chain(reader);
+        let rows: Box<dyn Read> = match self.delimiter {
+            b' ' => Box::new(Blanks {
+                inner: rows,
+                is_inside: false,
+            }),
+            _ => Box::new(rows),
+        };
+        let mut rows = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .delimiter(self.delimiter)
+            .buffer_capacity(BUFFER)
+            .from_reader(rows);
+        // of a packed file no more than what is read is known
+        let length = std::fs::metadata(&path).map_or(0, |m| m.len());
+        let cannot = |e| unreadable(Path::new(&path), of_csv(e));
+        let (mut record, mut row, mut has_units) = (csv::ByteRecord::new(), 0, false);
+        let expected = places.len();
+        while rows.read_byte_record(&mut record).map_err(cannot)? {
+            let line = self.before + line_of(&record, rows.position().line());
+            let found = record.len();
+            let first = record.get(0).unwrap_or_default().trim_ascii_start();
+            if first.starts_with(b"#") || first.starts_with(b"%") {
+                let cells: Vec<&[u8]> = record.iter().collect();
+                let text = String::from_utf8_lossy(&cells.join(&self.delimiter)).into_owned();
+                table
+                    .comments
+                    .push(text.trim_start_matches(['#', '%', ' ']).to_owned());
+                continue;
+            }
+            if row == 0 && !has_units && found == expected && is_words(&record) {
+                has_units = true;
+                let text = format!("line {line} has words and no numbers: passed over");
+                table.assumptions.push(text);
+                continue;
+            }
+            let is_empty = |cell: &[u8]| cell.trim_ascii().is_empty();
+            let is_trailing = found == expected + 1 && record.get(expected).is_some_and(is_empty);
+            if found != expected && !is_trailing {
+                if record.iter().all(is_empty) {
+                    continue;
+                }
+                // a logger that lost its power within a row
+                let is_cut = found < expected && row > 0;
+                if is_cut && !rows.read_byte_record(&mut record).map_err(cannot)? {
+                    let text = format!("line {line}, the last, is cut off: left out");
+                    table.assumptions.push(text);
+                    break;
+                }
+                return Err(Failure::row_length(&path, line, found, expected));
+            }
+            if row % BETWEEN == 0 {
+                let all = (row as u64).saturating_mul(length) / rows.position().byte().max(1);
+                table.fits(all.max((row + BETWEEN) as u64))?;
+            }
+            for (cell, column) in record.iter().zip(places) {
+                let Some(column) = *column else { continue };
+                let value = match number(cell, self.delimiter) {
+                    Some(value) => value,
+                    None if table.columns[column].quantity.may_be_empty => f64::NAN,
+                    None => {
+                        let value = shown(&String::from_utf8_lossy(cell.trim_ascii()), 40);
+                        let (value, reason) = (format!("\"{value}\""), "is not a number");
+                        let name = &table.columns[column].name;
+                        return Err(table.bad_cell(name, line, &value, reason, dictionary));
+                    }
+                };
+                table.push(column, value, Some(cell), line, dictionary)?;
+            }
+            table.lines.push(line);
+            row += 1;
+        }
+        Ok(())
+    }
+}
+
+/// The names of so many columns.
+fn layout(layouts: &[&[&str]], columns: usize) -> Option<Vec<String>> {
+    let found = layouts.iter().find(|names| names.len() == columns)?;
+    Some(found.iter().map(|name| (*name).to_owned()).collect())
+}
+
+fn no_header(
+    path: &str,
+    line: u64,
+    cells: &[String],
+    text: &str,
+    dictionary: &Dictionary,
+) -> Failure {
+    let refused =
+        |message: String| Failure::contents(path, line, message).or_hint(dictionary.advice);
+    if !dictionary.bare.is_empty() {
+        return refused(format!("{} columns without a header", cells.len()));
+    }
+    let found = shown(text, 60);
+    refused(format!(
+        "a header that names the columns is missing, found \"{found}\""
+    ))
+    .or_option(help::COLUMN_NAMES)
+}
+
+/// The rate in a comment such as `Update Rate: 100.0Hz`.
+fn rate_in(comment: &str) -> Option<f64> {
+    let lower = comment.to_lowercase();
+    let words = ["update rate", "sample rate", "sampling rate", "output rate"];
+    let after = words.iter().find_map(|w| lower.split_once(w))?.1;
+    let value = after.trim_start_matches(|c: char| !c.is_ascii_digit());
+    let end = value.find(|c: char| !c.is_ascii_digit() && c != '.');
+    let digits = &value[..end.unwrap_or(value.len())];
+    digits.parse().ok().filter(|r: &f64| *r > 0.0)
+}
+
+/// The separator of the cells of a line: of equals the last. Blanks do only where nothing else does and they are not inside
+/// one name.
+fn delimiter_of(line: &str, dictionary: &Dictionary) -> u8 {
+    let count = |d: u8| line.bytes().filter(|b| *b == d).count();
+    let most = [b',', b';', b'\t'].into_iter().max_by_key(|d| count(*d));
+    let is_spaced = count(b' ') > 0 && find(dictionary.quantities, line).is_none();
+    most.filter(|d| count(*d) > 0)
+        .unwrap_or(if is_spaced { b' ' } else { b',' })
+}
+
+/// The cells of a line, quotes removed, without empty ones at the end.
+fn split(text: &str, delimiter: u8) -> Vec<String> {
+    let blanks: String;
+    let text = match delimiter {
+        b' ' => {
+            blanks = text.split_ascii_whitespace().collect::<Vec<_>>().join(" ");
+            &blanks
+        }
+        _ => text,
+    };
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .delimiter(delimiter)
+        .from_reader(text.as_bytes());
+    let record = reader
+        .records()
+        .next()
+        .and_then(Result::ok)
+        .unwrap_or_default();
+    let mut cells: Vec<String> = record.iter().map(|c| c.trim().to_owned()).collect();
+    while cells.last().is_some_and(String::is_empty) {
+        cells.pop();
+    }
+    cells
+}
+
+/// True if a row has units, say, below the names: no cell begins as a number does.
+fn is_words(record: &csv::ByteRecord) -> bool {
+    let first = |cell: &[u8]| cell.trim_ascii().first().copied();
+    let is_word = |cell: &[u8]| {
+        let begins = |b: u8| !b.is_ascii_digit() && !b"+-.".contains(&b);
+        number(cell, b',').is_none() && first(cell).is_none_or(begins)
+    };
+    record.iter().all(is_word) && record.iter().any(|cell| first(cell).is_some())
+}
+
+/// Error of the system, with its kind.
+fn of_csv(e: csv::Error) -> std::io::Error {
+    match e.into_kind() {
+        csv::ErrorKind::Io(source) => source,
+        other => std::io::Error::other(format!("{other:?}")),
+    }
+}
+
+/// The reason why a line is no text, if there is one.
+fn no_text(bytes: &[u8]) -> Option<&'static str> {
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Some("it is in UTF-16");
+    }
+    if bytes.len() as u64 == LONGEST {
+        return Some("a line is longer than 64 KiB");
+    }
+    let is_control = |b: &&u8| b.is_ascii_control() && !b"\t\r\n".contains(b);
+    if bytes.contains(&0) || 20 * bytes.iter().filter(is_control).count() > bytes.len() {
+        return Some("it is binary");
+    }
+    let is_lone = |pair: &[u8]| pair[0] == b'\r' && !b"\r\n".contains(&pair[1]);
+    let has_lone = bytes.windows(2).any(is_lone);
+    has_lone.then_some("its lines end in a carriage return only")
+}
+
+/// Line of a record that ended before line `next`. (The record's own position is that before any empty
+/// lines.)
+fn line_of(record: &csv::ByteRecord, next: u64) -> u64 {
+    let start = record.position().map_or(0, csv::Position::line);
+    // behind a last row without a line end the reader stands in the row itself
+    if next <= start + 1 {
+        return start;
+    }
+    let inside = record.as_slice().iter().filter(|b| **b == b'\n').count() as u64;
+    next.saturating_sub(1 + inside)
+}
+
+/// A number; with a decimal comma where semicolons separate.
+#[inline]
+pub(super) fn number(cell: &[u8], delimiter: u8) -> Option<f64> {
+    let text = std::str::from_utf8(cell.trim_ascii()).ok()?;
+    let comma = || text.replacen(',', ".", 1).parse().ok();
+    let parsed = text.parse().ok();
+    parsed.or_else(|| if delimiter == b';' { comma() } else { None })
+}
+
+/// Bytes with one blank for several blanks and tabs, and none at the beginning of a line.
+struct Blanks<R> {
+    inner: R,
+    /// True if a blank may follow.
+    is_inside: bool,
+}
+
+impl<R: Read> Read for Blanks<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        loop {
+            let count = self.inner.read(buffer)?;
+            let mut kept = 0;
+            for i in 0..count {
+                let byte = if buffer[i] == b'\t' { b' ' } else { buffer[i] };
+                if byte != b' ' || self.is_inside {
+                    buffer[kept] = byte;
+                    kept += 1;
+                }
+                self.is_inside = !b" \r\n".contains(&byte);
+            }
+            // blanks alone are not the end
+            if kept > 0 || count == 0 {
+                return Ok(kept);
+            }
+        }
+    }
+}
+
+// Tables that are no text: arrays of NumPy, Parquet, directories of KITTI, logs.
+
+/// Columns by their names.
+type Columns = Vec<(String, Vec<f64>)>;
+
+/// The table of such columns.
+pub(super) fn table(
+    path: &Path,
+    columns: Columns,
+    dictionary: &Dictionary,
+    asked: &Asked<'_>,
+) -> Result<Table, Failure> {
+    let path = path.display().to_string();
+    let names: Vec<String> = match asked.names {
+        Some(names) if names.len() != columns.len() => {
+            return Err(Failure::row_length(&path, 1, columns.len(), names.len()));
+        }
+        Some(names) => names.to_vec(),
+        None => columns.iter().map(|(name, _)| name.clone()).collect(),
+    };
+    let (mut table, places) = Table::new(&path, 0, &names, dictionary, asked, false)?;
+    table.fits(columns.first().map_or(0, |(_, values)| values.len() as u64))?;
+    for ((_, values), place) in columns.into_iter().zip(places) {
+        let Some(column) = place else { continue };
+        for (line, value) in (1..).zip(values) {
+            table.push(column, value, None, line, dictionary)?;
+        }
+    }
+    Ok(table)
+}
+
+/// Every `step`-th number from the `first` on.
+fn strided(array: &Array, first: usize, step: usize) -> Vec<f64> {
+    array
+        .values
+        .iter()
+        .skip(first)
+        .step_by(step)
+        .copied()
+        .collect()
+}
+
+/// Reads an array: columns named by who asks, or by their number.
+fn npy(path: &Path, dictionary: &Dictionary, asked: &Asked<'_>) -> Result<Columns, Failure> {
+    let array = npy::read(path).map_err(|e| logs::refused(path, e))?;
+    let refused = |message: String| Failure::contents(path.display(), Place::Within, message);
+    let count = match array.shape[..] {
+        [_] => 1,
+        [_, columns] => columns,
+        _ => {
+            let dimensions = array.shape.len();
+            return Err(refused(format!(
+                "an array of {dimensions} dimensions, samples × columns are needed"
+            )));
+        }
+    };
+    let named = asked.names.map(|_| vec![String::new(); count]);
+    let names = named.or_else(|| layout(dictionary.array, count));
+    let names = names.ok_or_else(|| {
+        refused(format!(
+            "an array of {count} columns, which names are not known"
+        ))
+        .or_hint(dictionary.advice)
+        .or_option(help::COLUMN_NAMES)
+    })?;
+    let columns = (0..).zip(names);
+    Ok(columns
+        .map(|(k, name)| (name, strided(&array, k, count)))
+        .collect())
+}
+
+/// Name of the array of a single number that states the rate (Hz).
+#[cfg(feature = "npz")]
+const RATE: &str = "rate_hz";
+
+/// Reads named arrays: a vector is a column, an array of three columns the three axes of a sensor. Also the rate (Hz), if
+/// it is stated.
+#[cfg(feature = "npz")]
+fn npz(path: &Path) -> Result<(Columns, Option<f64>), Failure> {
+    use nav_sim_logs::{Error, Fault, npz::Archive};
+    let refused = |e| logs::refused(path, e);
+    let mut archive = Archive::open(path).map_err(refused)?;
+    let (mut columns, mut rate_hz) = (Vec::new(), None);
+    for name in archive.names() {
+        let Array { shape, values } = match archive.read(&name) {
+            // texts and the like are passed over
+            Err(Error::At(_, Fault::Encoding(_))) => {
+                columns.push((name, Vec::new()));
+                continue;
+            }
+            read => read.map_err(refused)?,
+        };
+        match shape[..] {
+            [] | [1] if name == RATE => rate_hz = values.first().copied(),
+            [_] => columns.push((name, values)),
+            [_, 3] => {
+                let array = Array { shape, values };
+                columns.extend((0..3).map(|k| (of_axis(&name, k), strided(&array, k, 3))));
+            }
+            _ => columns.push((name, Vec::new())),
+        }
+    }
+    Ok((columns, rate_hz))
+}
+
+/// The name of one axis of a sensor's array: `accel_m_s2` has `accel_x_m_s2`.
+#[cfg(feature = "npz")]
+fn of_axis(name: &str, axis: usize) -> String {
+    let units = ["_m_s2", "_rad_s", "_deg_s"];
+    let unit = units.iter().find_map(|unit| name.find(unit));
+    let (stem, unit) = name.split_at(unit.or(name.find('_')).unwrap_or(name.len()));
+    format!("{stem}_{}{unit}", ["x", "y", "z"][axis])
+}
+
+/// Reads Apache Parquet: columns by their names; what is no number is NaN.
+#[cfg(feature = "parquet")]
+fn parquet(path: &Path) -> Result<Columns, Failure> {
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use parquet::record::Field;
+    let damaged = |e: parquet::errors::ParquetError| {
+        Failure::contents(path.display(), Place::Within, e.to_string())
+    };
+    let file = std::fs::File::open(path).map_err(|e| unreadable(path, e))?;
+    let reader = SerializedFileReader::new(file).map_err(damaged)?;
+    let schema = reader.metadata().file_metadata().schema_descr_ptr();
+    let named = schema.columns().iter();
+    let named = named.map(|column| (column.name().to_owned(), Vec::new()));
+    let mut columns: Columns = named.collect();
+    for row in reader.get_row_iter(None).map_err(damaged)? {
+        let row = row.map_err(damaged)?;
+        for ((_, field), (_, values)) in row.get_column_iter().zip(&mut columns) {
+            values.push(match field {
+                Field::Double(value) => *value,
+                Field::Float(value) => f64::from(*value),
+                Field::Int(value) => f64::from(*value),
+                Field::Long(value) => *value as f64,
+                _ => f64::NAN,
+            });
+        }
+    }
+    Ok(columns)
+}
+
+/// Names of the quantities of a sample of KITTI that are read, and their places in its line.
+///
+/// The numbers are those of `dataformat.txt` there ([Geiger et al. 2013](https://doi.org/10.1177/0278364913491297), sec.
+/// III-A): accelerations and angular rates in the axes of the vehicle, front, left, up, are the 12th to 14th and 18th to 20th.
+const OXTS: [(&str, usize); 6] = [
+    ("accel_x_m_s2", 11),
+    ("accel_y_m_s2", 12),
+    ("accel_z_m_s2", 13),
+    ("gyro_x_rad_s", 17),
+    ("gyro_y_rad_s", 18),
+    ("gyro_z_rad_s", 19),
+];
+
+/// True if a directory is a recording of KITTI: one line a sample in `data/`, and their times in `timestamps.txt`.
+pub(crate) fn is_oxts(directory: &Path) -> bool {
+    directory.join("timestamps.txt").is_file() && directory.join("data").is_dir()
+}
+
+/// Reads such a directory.
+fn oxts(directory: &Path) -> Result<Columns, Failure> {
+    let times = oxts_times(&directory.join("timestamps.txt"))?;
+    let data = directory.join("data");
+    let entries = std::fs::read_dir(&data).map_err(|e| unreadable(&data, e))?;
+    let mut files: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+    files.retain(|path| path.extension().is_some_and(|e| e == "txt"));
+    files.sort();
+    if files.len() != times.len() {
+        let (samples, times) = (files.len(), times.len());
+        let message = format!("{samples} samples in data, {times} times in timestamps.txt");
+        return Err(Failure::contents(
+            directory.display(),
+            Place::Within,
+            message,
+        ));
+    }
+    let mut columns = vec![("t_s".to_owned(), times)];
+    columns.extend(OXTS.map(|(name, _)| (name.to_owned(), Vec::new())));
+    for path in &files {
+        let text = source::text(path).map_err(|e| unreadable(path, e))?;
+        let cells: Vec<&str> = text.split_ascii_whitespace().collect();
+        for ((_, values), (name, at)) in columns[1..].iter_mut().zip(OXTS) {
+            let cell = cells.get(at).copied().unwrap_or_default();
+            let finite = number(cell.as_bytes(), b' ').filter(|x| x.is_finite());
+            values.push(finite.ok_or_else(|| {
+                let (path, cell) = (path.display().to_string(), format!("\"{cell}\""));
+                Failure::cell(&path, 1, name, cell, "is not a finite number")
+            })?);
+        }
+    }
+    Ok(columns)
+}
+
+/// Times of the samples (s since 1970).
+fn oxts_times(path: &Path) -> Result<Vec<f64>, Failure> {
+    let text = source::text(path).map_err(|e| unreadable(path, e))?;
+    let time = |(i, line): (usize, &str)| {
+        let parsed = NaiveDateTime::parse_from_str(line.trim(), "%Y-%m-%d %H:%M:%S%.f");
+        let found = parsed.map_err(|_| {
+            let message = format!("\"{}\" is not a time", shown(line, 40));
+            Failure::contents(path.display(), i + 1, message)
+                .or_hint("2011-09-26 13:02:25.964389445")
+        })?;
+        let since = found.and_utc();
+        Ok(since.timestamp() as f64 + 1e-9 * f64::from(since.timestamp_subsec_nanos()))
+    };
+    let lines = text.lines().enumerate();
+    lines
+        .filter(|(_, line)| !line.trim().is_empty())
+        .map(time)
+        .collect()
+}
+
+/// Reads the samples of the IMU of a log.
+pub(super) fn log(
+    path: &Path,
+    dictionary: &Dictionary,
+    asked: &Asked<'_>,
+) -> Result<Table, Failure> {
+    let refused = |e| logs::refused(path, e);
+    let log = logs::open(path)?;
+    let channel = log.channel(Content::Imu, asked.log.topic.as_deref());
+    let channel = channel.map_err(refused)?;
+    let samples = log.imu(channel, asked.log.stamp).map_err(refused)?;
+    let times = samples.iter().map(|sample| in_seconds(sample.stamp_ns));
+    let mut columns = vec![("t_s".to_owned(), times.collect())];
+    for (k, (name, _)) in OXTS.iter().enumerate() {
+        let values = samples.iter().map(|sample| match k.checked_sub(3) {
+            None => sample.accel_m_s2[k],
+            Some(axis) => sample.gyro_rad_s[axis],
+        });
+        columns.push(((*name).to_owned(), values.collect()));
+    }
+    let mut table = table(path, columns, dictionary, asked)?;
+    table.assumptions.push(format!("topic {}", channel.topic));
+    table.warnings.extend(log.damage().map(logs::cut_off));
+    let is_other = |c: &&Channel| c.topic != channel.topic && c.clock == Clock::Unix;
+    let others = log.channels().iter().filter(is_other);
+    table.ignored = others.map(|c| c.topic.clone()).collect();
+    Ok(table)
+}

@@ -145,6 +145,6 @@ proptest! {
     #[test]
     fn never_panics_on_bytes(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
         let reader = Box::new(Cursor::new(bytes));
-        let _ = text::read("a.csv", reader, &DICTIONARY, &Asked::default());
+        let _ = read_text("a.csv", reader, &DICTIONARY, &Asked::default());
     }
 }

@@ -2,23 +2,24 @@
 //!
 //! Keys have paths, `outage[2].end_s`; entries of lists of tables are counted from 1.
 
-mod node;
-mod values;
-
-pub(crate) use values::{
-    Between, Finite, NonNegative, OneOrEach, Positive, Share, Stationary, Version,
-};
-
-use super::source;
 use super::suggest::nearest;
-use super::{Failure, Place, help};
+use super::{Failure, Place, source};
 use nav_sim_signal::units::SettingError;
-use node::{Node, Refusal, What};
-use serde::de::DeserializeOwned;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer, StrDeserializer};
+use serde::de::{
+    DeserializeOwned, DeserializeSeed, Deserializer, Error as DeserializeError, Expected,
+    IgnoredAny, IntoDeserializer, MapAccess, SeqAccess, Unexpected, Visitor,
+};
+use serde::{Deserialize, Serialize, forward_to_deserialize_any};
+use std::borrow::Cow;
+use std::fmt;
 use std::fmt::Display;
 use std::io::ErrorKind;
+use std::marker::PhantomData;
 use std::ops::Range;
 use std::path::Path;
+use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// A key with the path of its table before it.
@@ -63,7 +64,9 @@ impl Source {
             let kind = e.kind();
             let error = Failure::io(path, e);
             match kind {
-                ErrorKind::NotFound => error.or_hint("check the path").or(help::START_FILES),
+                ErrorKind::NotFound => error
+                    .or_hint("check the path")
+                    .or_hint("start from the files that nav-sim init makes"),
                 ErrorKind::InvalidData => error.or_hint("a TOML file is text in UTF-8"),
                 _ => error,
             }
@@ -264,3 +267,470 @@ fn shown(written: &str) -> String {
 
 #[cfg(test)]
 mod tests;
+
+// A value of a TOML file as serde reads it. What is refused comes with the path of its key.
+//
+// A word chooses among the kinds of a table (`type = "AR1"`), in an enum without attributes of serde for it; the keys that
+// all kinds have stand in a struct around it, whose field has the name of the word.
+
+/// Words that choose among the kinds of a table.
+const TAGS: [&str; 4] = ["type", "operation", "kind", "distribution"];
+
+/// What is wrong, and the path of the value or of its table.
+#[derive(Debug)]
+struct Refusal {
+    pub(super) path: String,
+    what: What,
+}
+
+#[derive(Debug)]
+enum What {
+    Unknown(String, &'static [&'static str]),
+    Missing(&'static str),
+    Variant(String, &'static [&'static str]),
+    NoList,
+    /// In words that follow the value.
+    Reason(String),
+}
+
+impl From<What> for Refusal {
+    fn from(what: What) -> Self {
+        Self {
+            path: String::new(),
+            what,
+        }
+    }
+}
+
+impl Refusal {
+    /// The same, within a key or an entry of a list.
+    fn within(self, part: &str) -> Self {
+        let path = match self.path.as_str() {
+            "" => part.to_owned(),
+            path if path.starts_with('[') => format!("{part}{path}"),
+            path => dotted(part, path),
+        };
+        Self { path, ..self }
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{self:?}")
+    }
+}
+
+impl std::error::Error for Refusal {}
+
+impl DeserializeError for Refusal {
+    fn custom<T: fmt::Display>(message: T) -> Self {
+        let message = message.to_string();
+        let words = match message.split(' ').next() {
+            Some("is" | "has" | "lists" | "needs" | "of") => message,
+            Some("not") => format!("is {message}"),
+            Some("expected") => message.replacen("expected", "is not", 1),
+            _ => format!("is refused: {message}"),
+        };
+        What::Reason(words).into()
+    }
+
+    fn invalid_type(_: Unexpected<'_>, expected: &dyn Expected) -> Self {
+        let expected = expected.to_string();
+        let words = match expected.as_str() {
+            "f64" => "a number",
+            "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number ≥ 0",
+            "a nonzero u64" => "a whole number ≥ 1",
+            "a string" => "a text in quotes",
+            "a sequence" => "a list",
+            "a boolean" => "true or false",
+            "path string" => "a path",
+            other if other.starts_with("struct") => "a table",
+            other => other,
+        };
+        What::Reason(format!("is not {words}")).into()
+    }
+
+    fn invalid_value(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
+        Self::invalid_type(found, expected)
+    }
+
+    fn invalid_length(_: usize, expected: &dyn Expected) -> Self {
+        What::Reason(format!("is not {expected}")).into()
+    }
+
+    fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
+        What::Variant(variant.to_owned(), expected).into()
+    }
+
+    fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
+        What::Unknown(field.to_owned(), expected).into()
+    }
+
+    fn missing_field(field: &'static str) -> Self {
+        What::Missing(field).into()
+    }
+}
+
+/// A value.
+struct Node<'a>(pub(super) &'a DeValue<'a>);
+
+impl<'de> Deserializer<'de> for Node<'_> {
+    type Error = Refusal;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
+        let no_number = || Refusal::from(What::Reason("is too large a number".to_owned()));
+        match self.0 {
+            DeValue::String(text) => visitor.visit_str(text),
+            DeValue::Integer(number) => {
+                let digits = number.as_str();
+                let parsed = i64::from_str_radix(digits, number.radix());
+                visitor.visit_i64(parsed.map_err(|_| no_number())?)
+            }
+            DeValue::Float(number) => {
+                visitor.visit_f64(number.as_str().parse().map_err(|_| no_number())?)
+            }
+            DeValue::Boolean(is) => visitor.visit_bool(*is),
+            DeValue::Datetime(time) => visitor.visit_string(time.to_string()),
+            DeValue::Array(items) => visitor.visit_seq(Entries { items, next: 0 }),
+            DeValue::Table(table) => visitor.visit_map(Keys::of(table, |_| true)),
+        }
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
+        visitor.visit_some(self)
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, Refusal> {
+        visitor.visit_newtype_struct(self)
+    }
+
+    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
+        match self.0 {
+            DeValue::Table(_) => Err(What::NoList.into()),
+            _ => self.deserialize_any(visitor),
+        }
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Refusal> {
+        if let DeValue::Array(_) = self.0 {
+            return Err(What::Reason("is not a table".to_owned()).into());
+        }
+        let tag = fields.iter().find(|field| TAGS.contains(field));
+        let (DeValue::Table(table), Some(tag)) = (self.0, tag) else {
+            return self.deserialize_any(visitor);
+        };
+        if !table.contains_key(*tag) {
+            return Err(What::Missing(tag).into());
+        }
+        let mut keys = Keys::of(table, |key| fields.contains(&key) && key != *tag);
+        keys.rest = Some((tag, fields, table));
+        visitor.visit_map(keys)
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Refusal> {
+        match self.0 {
+            DeValue::String(word) => visitor.visit_enum(word.as_ref().into_deserializer()),
+            DeValue::Table(table) => {
+                let kind = Kind { table, passed: &[] };
+                visitor.visit_enum(MapAccessDeserializer::new(kind))
+            }
+            _ => Err(What::Reason("is not a table".to_owned()).into()),
+        }
+    }
+
+    forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct tuple
+        tuple_struct map identifier ignored_any
+    }
+}
+
+/// Entries of a list, from a place on.
+struct Entries<'a> {
+    items: &'a [Spanned<DeValue<'a>>],
+    next: usize,
+}
+
+impl<'de> SeqAccess<'de> for Entries<'_> {
+    type Error = Refusal;
+
+    fn next_element_seed<T: DeserializeSeed<'de>>(
+        &mut self,
+        seed: T,
+    ) -> Result<Option<T::Value>, Refusal> {
+        let Some(item) = self.items.get(self.next) else {
+            return Ok(None);
+        };
+        self.next += 1;
+        let number = format!("[{}]", self.next);
+        let read = seed.deserialize(Node(item.get_ref()));
+        read.map(Some).map_err(|e| e.within(&number))
+    }
+}
+
+/// Keys of a table, the last one to be read first.
+struct Keys<'a> {
+    keys: Vec<(&'a str, &'a DeValue<'a>)>,
+    value: Option<(&'a str, &'a DeValue<'a>)>,
+    /// A word whose kind has the keys that are none of these fields.
+    rest: Option<(&'static str, &'static [&'static str], &'a DeTable<'a>)>,
+}
+
+impl<'a> Keys<'a> {
+    fn of(table: &'a DeTable<'a>, is_wanted: impl Fn(&str) -> bool) -> Self {
+        let all = table
+            .iter()
+            .map(|(key, value)| (key.get_ref().as_ref(), value.get_ref()));
+        let mut keys: Vec<_> = all.filter(|(key, _)| is_wanted(key)).collect();
+        keys.reverse();
+        Self {
+            keys,
+            value: None,
+            rest: None,
+        }
+    }
+}
+
+impl<'de> MapAccess<'de> for Keys<'_> {
+    type Error = Refusal;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(
+        &mut self,
+        seed: K,
+    ) -> Result<Option<K::Value>, Refusal> {
+        self.value = self.keys.pop();
+        let key = self
+            .value
+            .map(|(key, _)| key)
+            .or(self.rest.map(|(tag, ..)| tag));
+        let name = |key: &str| seed.deserialize(StrDeserializer::new(key));
+        key.map(name).transpose()
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Refusal> {
+        if let Some((key, value)) = self.value.take() {
+            return seed.deserialize(Node(value)).map_err(|e| e.within(key));
+        }
+        let Some((_, passed, table)) = self.rest.take() else {
+            return Err(What::Reason("has no value".to_owned()).into());
+        };
+        seed.deserialize(MapAccessDeserializer::new(Kind { table, passed }))
+    }
+}
+
+/// A table whose word chooses its kind, without the keys that are passed.
+struct Kind<'a> {
+    table: &'a DeTable<'a>,
+    passed: &'static [&'static str],
+}
+
+impl<'a> Kind<'a> {
+    fn tag(&self) -> Option<&'static str> {
+        TAGS.into_iter().find(|tag| self.table.contains_key(*tag))
+    }
+}
+
+/// A map of the word and the keys of its kind.
+impl<'de> MapAccess<'de> for Kind<'_> {
+    type Error = Refusal;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(
+        &mut self,
+        seed: K,
+    ) -> Result<Option<K::Value>, Refusal> {
+        let tag = self.tag().ok_or(What::Missing(TAGS[0]))?;
+        let word = self.table.get(tag).and_then(|word| word.get_ref().as_str());
+        let no_text = || What::Reason("is not a text in quotes".to_owned());
+        let variant = word.ok_or_else(|| no_text().into());
+        let variant = variant.and_then(|word| seed.deserialize(StrDeserializer::new(word)));
+        variant.map(Some).map_err(|e: Refusal| e.within(tag))
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Refusal> {
+        let tag = self.tag();
+        let is_own = |key: &str| Some(key) != tag && !self.passed.contains(&key);
+        seed.deserialize(MapAccessDeserializer::new(Keys::of(self.table, is_own)))
+    }
+}
+
+// Numbers with bounds, and one value or a list of them.
+
+/// A number that is neither nan nor inf.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(try_from = "f64", into = "f64")]
+#[schemars(inline)]
+pub(crate) struct Finite(pub(crate) f64);
+
+impl TryFrom<f64> for Finite {
+    type Error = &'static str;
+
+    fn try_from(value: f64) -> Result<Self, Self::Error> {
+        if value.is_finite() {
+            Ok(Self(value))
+        } else {
+            Err("is not a finite number such as 1.5e-4")
+        }
+    }
+}
+
+impl From<Finite> for f64 {
+    fn from(value: Finite) -> Self {
+        value.0
+    }
+}
+
+/// A number between two whole ones, or one of them unless it is open; `i64::MAX` is no end.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(try_from = "f64")]
+pub(crate) struct Between<const LOW: i64, const HIGH: i64, const OPEN: bool>(pub(crate) f64);
+
+/// A part of a whole.
+pub(crate) type Share = Between<0, 1, false>;
+pub(crate) type NonNegative = Between<0, { i64::MAX }, false>;
+pub(crate) type Positive = Between<0, { i64::MAX }, true>;
+/// Coefficients of a stationary AR(1), as [`Ar1::new`](nav_sim_signal::noise::Ar1::new) takes them.
+pub(crate) type Stationary = Between<-1, 1, true>;
+
+impl<const LOW: i64, const HIGH: i64, const OPEN: bool> TryFrom<f64> for Between<LOW, HIGH, OPEN> {
+    type Error = String;
+
+    fn try_from(value: f64) -> Result<Self, Self::Error> {
+        let (low, high) = (
+            LOW as f64,
+            if HIGH == i64::MAX {
+                f64::MAX
+            } else {
+                HIGH as f64
+            },
+        );
+        let is_inside = if OPEN {
+            low < value && value < high
+        } else {
+            (low..=high).contains(&value)
+        };
+        match (HIGH, OPEN) {
+            _ if is_inside => Ok(Self(value)),
+            (i64::MAX, true) => Err(format!("is not a finite number > {LOW}")),
+            (i64::MAX, false) => Err(format!("is not a finite number ≥ {LOW}")),
+            (_, true) => {
+                Err(format!("is not between {LOW} and {HIGH} (exclusive)").replace('-', "−"))
+            }
+            (_, false) => Err(format!("is not between {LOW} and {HIGH}")),
+        }
+    }
+}
+
+impl<const LOW: i64, const HIGH: i64, const OPEN: bool> From<Between<LOW, HIGH, OPEN>> for f64 {
+    fn from(value: Between<LOW, HIGH, OPEN>) -> Self {
+        value.0
+    }
+}
+
+impl<const LOW: i64, const HIGH: i64, const OPEN: bool> JsonSchema for Between<LOW, HIGH, OPEN> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        format!("Between_{LOW}_{HIGH}_{OPEN}").into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let (least, most) = if OPEN {
+            ("exclusiveMinimum", "exclusiveMaximum")
+        } else {
+            ("minimum", "maximum")
+        };
+        let mut schema = json_schema!({ "type": "number" });
+        schema.insert(least.to_owned(), LOW.into());
+        if HIGH < i64::MAX {
+            schema.insert(most.to_owned(), HIGH.into());
+        }
+        schema
+    }
+}
+
+/// The version of a file's layout: there is one
+#[derive(Deserialize, JsonSchema)]
+#[serde(try_from = "u64")]
+#[schemars(inline, extend("minimum" = 1, "maximum" = 1))]
+pub(crate) struct Version;
+
+impl TryFrom<u64> for Version {
+    type Error = &'static str;
+
+    fn try_from(version: u64) -> Result<Self, Self::Error> {
+        if version == 1 {
+            Ok(Self)
+        } else {
+            Err("is not a schema this version reads: it reads 1")
+        }
+    }
+}
+
+/// One value for all, or a list with one for each.
+#[derive(Debug, JsonSchema)]
+#[schemars(untagged, inline)]
+pub(crate) enum OneOrEach<One, Each = Vec<One>> {
+    One(One),
+    Each(Each),
+}
+
+impl<One: Copy + Into<f64>> OneOrEach<One> {
+    /// The one, or the i-th of a list (NaN beyond it).
+    pub(crate) fn of(&self, i: usize) -> f64 {
+        match self {
+            Self::One(value) => (*value).into(),
+            Self::Each(values) => values.get(i).map_or(f64::NAN, |value| (*value).into()),
+        }
+    }
+}
+
+impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Deserialize<'de> for OneOrEach<One, Each> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(EitherVisitor(PhantomData))
+    }
+}
+
+struct EitherVisitor<One, Each>(PhantomData<(One, Each)>);
+
+impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Visitor<'de> for EitherVisitor<One, Each> {
+    type Value = OneOrEach<One, Each>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("one value or a list of them")
+    }
+
+    fn visit_i64<E: DeserializeError>(self, number: i64) -> Result<Self::Value, E> {
+        One::deserialize(number.into_deserializer()).map(OneOrEach::One)
+    }
+
+    fn visit_f64<E: DeserializeError>(self, number: f64) -> Result<Self::Value, E> {
+        One::deserialize(number.into_deserializer()).map(OneOrEach::One)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+        One::deserialize(MapAccessDeserializer::new(map)).map(OneOrEach::One)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
+        let each = Each::deserialize(SeqAccessDeserializer::new(&mut list))?;
+        match list.next_element::<IgnoredAny>()? {
+            None => Ok(OneOrEach::Each(each)),
+            Some(_) => Err(A::Error::custom("is too long a list")),
+        }
+    }
+}

@@ -1,22 +1,27 @@
 //! Trajectory files: CSV, motion profiles (TOML), imports.
 
-mod doubts;
-mod gpx;
-mod imports;
-mod profile;
-mod reference;
-mod samples;
-mod write;
-
+use super::fusion_files::WEEK_S;
+use super::table::{
+    Asked, Column, Dictionary, Numbers, Quantity, Table, normalised, parse as parse_text,
+};
+use super::{Failure, Failure as Error, Place, source};
+use chrono::{DateTime, NaiveDateTime, Utc};
+use glam::{DQuat, DVec3};
+use nav_sim_navigation::earth::{e_to_n, ecef_to_geodetic, geodetic_to_ecef};
+use nav_sim_navigation::frames::{NavState, RollPitchYaw, q_e_n, wrap_angle};
+use nav_sim_navigation::trajectory;
+use nav_sim_navigation::trajectory::plausibility::VelocityMisfit;
+use nav_sim_navigation::trajectory::reference::{Reference, breaks, usable};
+use nav_sim_navigation::trajectory::{Trajectory, TrajectorySample};
+use nav_sim_signal::units::DEG;
 pub(crate) use profile::schema as profile_schema;
-pub(crate) use samples::parse_origin;
-pub(crate) use write::{Rows, csv};
-
-use super::table::{Asked, Numbers, parse as parse_text};
-use super::{Failure, Place, source};
-use nav_sim_navigation::trajectory::Trajectory;
-use nav_sim_navigation::trajectory::reference::Reference;
+use roxmltree::{Document, Node};
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI, TAU};
+use std::fmt::Write;
+use std::ops::Range;
 use std::path::Path;
+
+mod profile;
 
 /// How to read a trajectory file.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -63,7 +68,7 @@ pub(crate) fn load_reference(
 
 enum Parsed {
     Profile(Trajectory),
-    Rows(samples::Rows),
+    Rows(Rows),
 }
 
 fn parse(path: &Path, options: &Options, numbers: Numbers) -> Result<Parsed, Failure> {
@@ -73,9 +78,9 @@ fn parse(path: &Path, options: &Options, numbers: Numbers) -> Result<Parsed, Fai
     let text = || source::table_text(path);
     let rows = match plain.rsplit_once('.').map_or("", |(_, ending)| ending) {
         "toml" => return Ok(Parsed::Profile(profile::load(path)?)),
-        "nav" => imports::kf_gins(&name, &text()?, options, numbers),
-        "tum" => imports::tum(&name, &text()?, options, numbers),
-        "gpx" => gpx::gpx(&name, &text()?),
+        "nav" => kf_gins(&name, &text()?, options, numbers),
+        "tum" => tum(&name, &text()?, options, numbers),
+        "gpx" => gpx(&name, &text()?),
         "csv" | "tsv" | "txt" => parse_table(&name, &text()?, options, numbers),
         _ => Err(Failure::contents(
             name,
@@ -91,10 +96,1040 @@ fn parse_table(
     text: &str,
     options: &Options,
     numbers: Numbers,
-) -> Result<samples::Rows, Failure> {
-    let table = parse_text(name, text, &samples::dictionary(numbers), &Asked::default())?;
-    samples::rows(table, options, numbers)
+) -> Result<Rows, Failure> {
+    let table = parse_text(name, text, &dictionary(numbers), &Asked::default())?;
+    rows(table, options, numbers)
 }
 
 #[cfg(test)]
 mod tests;
+
+// From rows to a trajectory.
+
+/// Longest step between rows that is not doubted (s).
+const LONG_STEP_S: f64 = 1.0 + 1e-6;
+/// Positions faster than this from one row to the next are no motion (m/s).
+const MAX_SPEED: f64 = 8000.0;
+/// Heights at which the gravity model means something (m).
+const HEIGHT: std::ops::RangeInclusive<f64> = -12_000.0..=1_000_000.0;
+/// Below this speed a path has no direction (m/s).
+const MOVING: f64 = 0.5;
+/// A trajectory lasts a day at most (s), as motion profiles do: a wrong time stamp would ask for more memory
+/// than there is.
+const MAX_DURATION_S: f64 = 86_400.0;
+
+/// Quantities of a trajectory.
+static QUANTITIES: [Quantity; 16] = [
+    Quantity::time(&["t", "time", "timestamp"]),
+    Quantity::number("week", &["week", "gps_week"]),
+    Quantity::angle("lat_deg", &["lat", "latitude"]),
+    Quantity::angle("lon_deg", &["lon", "lng", "longitude"]),
+    Quantity::length("h_m", &["h", "alt", "height", "altitude"]),
+    N,
+    E,
+    D,
+    D.reversed(&["u", "up"]),
+    Quantity::angle("roll_deg", &["roll"]),
+    Quantity::angle("pitch_deg", &["pitch"]),
+    Quantity::angle("yaw_deg", &["yaw", "heading", "azimuth"]),
+    Quantity::speed("v_n_m_s", &["v_n", "vn", "v_north"]).with_unit(),
+    Quantity::speed("v_e_m_s", &["v_e", "ve", "v_east"]).with_unit(),
+    V_D,
+    V_D.reversed(&["v_u", "v_up"]),
+];
+const N: Quantity = Quantity::length("n_m", &["n", "north"]).with_unit();
+const E: Quantity = Quantity::length("e_m", &["e", "east"]).with_unit();
+const D: Quantity = Quantity::length("d_m", &["d", "down"]).with_unit();
+const V_D: Quantity = Quantity::speed("v_d_m_s", &["v_d", "vd", "v_down"]).with_unit();
+
+/// Dictionary of trajectories with such numbers.
+const fn dictionary(numbers: Numbers) -> Dictionary {
+    Dictionary {
+        numbers,
+        ..Dictionary::new(
+            &QUANTITIES,
+            "a trajectory has the columns t_s, lat_deg, lon_deg, h_m (or n_m, e_m, d_m) and may have roll_deg, pitch_deg, yaw_deg",
+        )
+    }
+}
+const DEGREES: &str = "degrees: latitude within ±89.9, longitude and yaw in (−180, 180] or [0, 360), pitch within ±90";
+
+const GEODETIC: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
+const LOCAL: [&str; 3] = ["n_m", "e_m", "d_m"];
+const ATTITUDE: [&str; 3] = ["roll_deg", "pitch_deg", "yaw_deg"];
+const VELOCITY: [&str; 3] = ["v_n_m_s", "v_e_m_s", "v_d_m_s"];
+
+/// Source of the attitude of rows.
+#[derive(Debug, PartialEq)]
+pub(super) enum Attitude {
+    /// The file.
+    Given,
+    /// Heading and pitch follow the path.
+    OfPath,
+}
+
+/// Samples of a file of any format, and the line that each comes from.
+#[derive(Debug)]
+pub(super) struct Rows {
+    pub(super) path: String,
+    /// One for each sample.
+    lines: Vec<u64>,
+    samples: Vec<TrajectorySample>,
+    attitude: Attitude,
+    /// Velocities in n that the positions are compared with (m/s), one for each sample or none at all.
+    velocities: Vec<DVec3>,
+    /// Whether positions are latitude and longitude, which may have been given in the wrong unit.
+    geodetic: bool,
+    pub(super) doubts: Vec<String>,
+}
+
+impl Rows {
+    /// Samples without velocities.
+    pub(super) fn new(
+        path: &str,
+        lines: Vec<u64>,
+        samples: Vec<TrajectorySample>,
+        attitude: Attitude,
+    ) -> Self {
+        let (velocities, doubts) = (Vec::new(), Vec::new());
+        Self {
+            path: path.to_owned(),
+            lines,
+            samples,
+            attitude,
+            velocities,
+            geodetic: false,
+            doubts,
+        }
+    }
+
+    fn doubt(&mut self, line: Option<u64>, message: impl Into<String>) {
+        let line = line.map_or(String::new(), |line| format!(", line {line}"));
+        let text = format!("{}{line}: {}", self.path, message.into());
+        self.doubts.push(text);
+    }
+
+    /// The trajectory through all rows, and what is doubtful about it. Every format comes through here, so that
+    /// what is refused in one is refused in all.
+    fn trajectory(mut self) -> Result<(Trajectory, Vec<String>), Error> {
+        self.check_heights()?;
+        self.check_steps()?;
+        self.check_jumps()?;
+        if self.attitude == Attitude::OfPath {
+            self.through(&self.samples)?; // times increase, positions are on the Earth
+            follow_path(&mut self.samples);
+        }
+        let trajectory = self.through(&self.samples)?;
+        of_trajectory(&mut self, &trajectory);
+        Ok((trajectory, self.doubts))
+    }
+
+    fn through(&self, samples: &[TrajectorySample]) -> Result<Trajectory, Error> {
+        Trajectory::from_samples(samples).map_err(|source| {
+            let index = source.index().unwrap_or(self.lines.len().saturating_sub(1));
+            let line = self.lines.get(index).copied().unwrap_or(1);
+            no_trajectory(&self.path, line, &source)
+        })
+    }
+
+    /// Heights below the deepest trench and beyond a low orbit are no heights in metres; neither is what is
+    /// not finite.
+    fn check_heights(&self) -> Result<(), Error> {
+        let Some(bad) = self.samples.iter().position(|s| !HEIGHT.contains(&s.h)) else {
+            return Ok(());
+        };
+        let message = format!(
+            "height {:?} m is not within −12 to 1000 km",
+            self.samples[bad].h
+        );
+        Err(self.refuse(
+            bad,
+            message,
+            "is a value in the wrong column, or the row damaged?",
+        ))
+    }
+
+    /// Rows a minute apart are no trajectory of a vehicle, their time is in milliseconds; and one time stamp
+    /// that is far off makes no trajectory of years. In long steps the curve between rows is a guess.
+    fn check_steps(&mut self) -> Result<(), Error> {
+        let time = |i: usize| self.samples[i].t_s;
+        let step = |i: &usize| time(*i) - time(*i - 1);
+        let mut order: Vec<usize> = (1..self.samples.len()).collect();
+        order.sort_by(|a, b| step(a).total_cmp(&step(b)));
+        let (Some(middle), Some(&longest)) = (order.get(order.len() / 2), order.last()) else {
+            return Ok(());
+        };
+        let (median_s, longest_s) = (step(middle), step(&longest));
+        let (previous_s, t_s) = (time(longest - 1), time(longest));
+        if median_s >= 50.0 {
+            let message = format!("the rows are {median_s} s apart");
+            let advice = "one row a second at least; is the time in milliseconds (t_ms)?";
+            return Err(self.refuse(1, message, advice));
+        }
+        if time(self.samples.len() - 1) - time(0) > MAX_DURATION_S {
+            let message =
+                format!("time goes from {previous_s} s to {t_s} s, and may span a day at most");
+            let advice = "is that time stamp damaged, on another clock, or in another unit?";
+            return Err(self.refuse(longest, message, advice));
+        }
+        if longest_s > LONG_STEP_S.max(1.5 * median_s) {
+            let text = format!("gap of {longest_s:.3} s before {t_s} s: the path in it is a guess");
+            self.doubt(Some(self.lines[longest]), text);
+        }
+        if median_s > LONG_STEP_S {
+            let text = format!("rows are {median_s} s apart: the path between is a guess");
+            self.doubt(None, text);
+        }
+        Ok(())
+    }
+
+    fn refuse(&self, index: usize, message: String, advice: &'static str) -> Error {
+        Error::contents(&self.path, self.lines[index], message).or_hint(advice)
+    }
+
+    fn check_jumps(&self) -> Result<(), Error> {
+        let place = |s: &TrajectorySample| geodetic_to_ecef(s.lat, s.lon, s.h);
+        for (i, pair) in self.samples.windows(2).enumerate() {
+            let (metres, seconds) = (
+                place(&pair[1]).distance(place(&pair[0])),
+                pair[1].t_s - pair[0].t_s,
+            );
+            if seconds > 0.0 && metres > MAX_SPEED * seconds {
+                let message = format!(
+                    "position jumps by {metres:.0} m in {} s",
+                    (seconds * 1e6).round() / 1e6
+                );
+                let advice =
+                    "is a latitude swapped with a longitude, a sign lost, or a row damaged?";
+                return Err(self.refuse(i + 1, message, advice));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Rows that no trajectory goes through.
+fn no_trajectory(path: &str, line: u64, source: &trajectory::Error) -> Error {
+    use trajectory::Error as E;
+    let advice = match source {
+        E::Time { .. } => {
+            "remove repeated rows, sort by time, or split the file where the clock was set back"
+        }
+        E::Rotation { .. } => {
+            "is an angle in the wrong column or unit? A vehicle that turns so fast needs more rows"
+        }
+        E::TooFew { .. } => "give at least four rows, one a second or more",
+        E::Latitude { .. } => {
+            "latitude and longitude cannot navigate at the poles; is a column swapped?"
+        }
+        E::NotFinite { .. } => return Error::contents(path, line, source.to_string()),
+    };
+    Error::contents(path, line, source.to_string()).or_hint(advice)
+}
+
+/// The rows of a table. Cells out of range are refused, or their rows left out where not every row is needed.
+pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
+    let has_any = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
+    let is_local = has_any(LOCAL) && !table.has("lat_deg");
+    let optional = [ATTITUDE, VELOCITY]
+        .into_iter()
+        .filter(|names| has_any(*names));
+    let position = if is_local { LOCAL } else { GEODETIC };
+    let needed = ["t_s"]
+        .into_iter()
+        .chain(position)
+        .chain(optional.flatten());
+    table.require(needed, &dictionary(numbers))?;
+    check_units(&table)?;
+    let all = table.rows();
+    match numbers {
+        Numbers::Finite => check_ranges(&table)?,
+        _ => table.retain(|table, row| {
+            table.columns.iter().all(|c| c.values[row].is_finite())
+                && out_of_range(table, row).is_none()
+        }),
+    }
+    let (attitude, velocity) = (table.all(ATTITUDE), table.all(VELOCITY));
+    let [time] = table.columns(["t_s"], &dictionary(numbers))?;
+    let place = table.columns(position, &dictionary(numbers))?;
+    let (week, origin) = (
+        table.get("week"),
+        is_local.then(|| origin(&table, options)).transpose()?,
+    );
+    let triad = |columns: [&Column; 3], row| columns.map(|column| column.si(row));
+    let sample = |row| {
+        let weeks = week.map_or(0.0, |week| week.si(row) - week.si(0));
+        let t_s = time.si(row) + weeks * WEEK_S;
+        let [roll, pitch, yaw] = attitude.map_or([0.0; 3], |all| triad(all, row));
+        let q_b_n = RollPitchYaw { roll, pitch, yaw }.to_quat();
+        let [lat, lon, h] = triad(place, row);
+        match origin {
+            None => TrajectorySample {
+                t_s,
+                lat,
+                lon,
+                h,
+                q_b_n,
+            },
+            Some(origin) => local(t_s, origin, [lat, lon, h].into(), q_b_n),
+        }
+    };
+    let samples = (0..table.rows()).map(sample).collect();
+    let lines = (0..table.rows()).map(|row| table.line(row)).collect();
+    let attitude = attitude.map_or(Attitude::OfPath, |_| Attitude::Given);
+    let mut rows = Rows::new(&table.path, lines, samples, attitude);
+    rows.geodetic = !is_local;
+    let velocity = velocity.into_iter();
+    rows.velocities = velocity
+        .flat_map(|own| (0..table.rows()).map(move |row| triad(own, row).into()))
+        .collect();
+    if all > rows.lines.len() {
+        let left_out = all - rows.lines.len();
+        let text = format!("{left_out} rows left out: values not finite, or out of range");
+        rows.doubt(None, text);
+    }
+    if !table.ignored.is_empty() {
+        rows.doubt(
+            None,
+            format!("columns not used: {}", table.ignored.join(", ")),
+        );
+    }
+    for text in &table.assumptions {
+        rows.doubt(None, text);
+    }
+    if rows.attitude == Attitude::OfPath {
+        let text = "no attitude columns: heading and pitch follow the path, roll is 0";
+        rows.doubt(None, text);
+    }
+    Ok(rows)
+}
+
+/// Refuses angles of the attitude without a unit in their names, of which none is too large for radians.
+fn check_units(table: &Table) -> Result<(), Error> {
+    let is_bare = |column: &&Column| {
+        let name = normalised(&column.name);
+        !name.ends_with("deg") && !name.ends_with("rad")
+    };
+    let attitude = ATTITUDE.into_iter().filter_map(|name| table.get(name));
+    let bare: Vec<&Column> = attitude.filter(is_bare).collect();
+    let values = bare.iter().flat_map(|column| &column.values);
+    let largest = values
+        .filter(|x| x.is_finite())
+        .fold(0.0, |most: f64, x| most.max(x.abs()));
+    if largest == 0.0 || largest > TAU {
+        return Ok(()); // alike in both units, or degrees
+    }
+    let names: Vec<String> = bare
+        .iter()
+        .map(|column| column.name.to_lowercase())
+        .collect();
+    let names = names.join(", ");
+    let message = format!("the unit of {names} is not in the name, and no value exceeds 2π");
+    Err(table
+        .refused(message)
+        .or_hint("end the names in _deg or _rad"))
+}
+
+/// A sample given in the axes north, east, down of the origin.
+fn local(t_s: f64, [lat0, lon0, h0]: [f64; 3], r_n0: DVec3, q_b_n0: DQuat) -> TrajectorySample {
+    let q_n0_e = q_e_n(lat0, lon0).inverse();
+    let (lat, lon, h) = ecef_to_geodetic(geodetic_to_ecef(lat0, lon0, h0) + q_n0_e * r_n0);
+    TrajectorySample {
+        t_s,
+        lat,
+        lon,
+        h,
+        q_b_n: q_e_n(lat, lon) * q_n0_e * q_b_n0,
+    }
+}
+
+/// The origin of local coordinates: the option, or the file's `# origin: lat, lon, h` line.
+fn origin(table: &Table, options: &Options) -> Result<[f64; 3], Error> {
+    if let Some(origin) = options.origin {
+        return Ok(origin);
+    }
+    let line = table.comments.iter().find_map(|c| c.strip_prefix("origin"));
+    line.and_then(|line| parse_origin(line.trim_start_matches([':', '=', ' '])))
+        .ok_or_else(|| {
+            let message = "a trajectory in local coordinates needs an origin on the Earth";
+            Error::contents(&table.path, Place::Within, message)
+                .or_option(("origin", "give --origin LAT_DEG,LON_DEG,H_M"))
+                .or_without(("origin", "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M"))
+                .or_hint("a first line \"# origin: LAT_DEG, LON_DEG, H_M\"")
+        })
+}
+
+/// An origin as it is written, `LAT_DEG,LON_DEG,H_M`: latitude, longitude (rad), height (m).
+pub(crate) fn parse_origin(text: &str) -> Option<[f64; 3]> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|x| x.trim().parse().ok()).collect();
+    match numbers?[..] {
+        [lat, lon, h] if lat.abs() <= 89.9 && lon.abs() <= 360.0 && h.is_finite() => {
+            Some([lat * DEG, lon * DEG, h])
+        }
+        _ => None,
+    }
+}
+
+/// The first value of a row that is out of its range: of which column, and why.
+fn out_of_range(table: &Table, row: usize) -> Option<(&Column, &'static str)> {
+    // a heading that was unwrapped goes on below −180 and above 180: the same angle
+    let ranges = [
+        ("lat_deg", 90.0, 90.0, "is not a latitude"),
+        ("lon_deg", 180.0, 360.0, "is not a longitude"),
+        ("roll_deg", 180.0, 180.0, "is not a roll angle"),
+        ("pitch_deg", 90.0, 90.0, "is not a pitch angle"),
+        ("yaw_deg", 360.0, 360.0, "is not a heading"),
+    ];
+    ranges.into_iter().find_map(|(name, below, above, reason)| {
+        let column = table.get(name)?;
+        let is_within = (-below - 1e-9..=above + 1e-9).contains(&(column.si(row) / DEG));
+        (!is_within).then_some((column, reason))
+    })
+}
+
+fn check_ranges(table: &Table) -> Result<(), Error> {
+    let mut found = (0..table.rows()).filter_map(|row| Some((row, out_of_range(table, row)?)));
+    found.next().map_or(Ok(()), |(row, (column, reason))| {
+        let (line, value) = (table.line(row), column.values[row].to_string());
+        Err(Error::cell(&table.path, line, &column.name, value, reason).or_hint(DEGREES))
+    })
+}
+
+/// Heading and pitch along the path; at rest between those before and after.
+fn follow_path(samples: &mut [TrajectorySample]) {
+    let moving = |i: usize| Some((samples[i].t_s, direction(samples, i)?));
+    let moving: Vec<(f64, (f64, f64))> = (0..samples.len()).filter_map(moving).collect();
+    let direction_of = |k: usize| moving.get(k.min(moving.len().saturating_sub(1)));
+    for sample in samples {
+        let next = moving.partition_point(|(t_s, ..)| *t_s < sample.t_s);
+        let from = direction_of(next.saturating_sub(1));
+        let (Some(from), Some(to)) = (from, direction_of(next)) else {
+            continue;
+        };
+        let share = match to.0 - from.0 {
+            span if span > 0.0 => ((sample.t_s - from.0) / span).clamp(0.0, 1.0),
+            _ => 0.0,
+        };
+        let ((yaw, pitch), (to_yaw, to_pitch)) = (from.1, to.1);
+        sample.q_b_n = RollPitchYaw {
+            roll: 0.0,
+            pitch: pitch + share * (to_pitch - pitch),
+            yaw: yaw + share * wrap_angle(to_yaw - yaw),
+        }
+        .to_quat();
+    }
+}
+
+/// Heading and pitch of the parabola through a row and its neighbours (at the ends through the nearest three), if that is a
+/// motion. The chord from the row before to the one after has the direction of the path halfway between them, which is not
+/// that at the row where the steps are unequal.
+fn direction(samples: &[TrajectorySample], i: usize) -> Option<(f64, f64)> {
+    let position = |k: usize| geodetic_to_ecef(samples[k].lat, samples[k].lon, samples[k].h);
+    let slope =
+        |a: usize, b: usize| (position(b) - position(a)) / (samples[b].t_s - samples[a].t_s);
+    let velocity = if samples.len() < 3 {
+        slope(0, samples.len() - 1)
+    } else {
+        // Of the parabola through three rows the slope between two is that at their middle, and linear in time.
+        let middle = i.clamp(1, samples.len() - 2);
+        let [before, at, after] = [middle - 1, middle, middle + 1].map(|k| samples[k].t_s);
+        let (first, second) = (slope(middle - 1, middle), slope(middle, middle + 1));
+        let share = (2.0 * samples[i].t_s - before - at) / (after - before);
+        first.lerp(second, share)
+    };
+    let v = e_to_n(samples[i].lat, samples[i].lon, velocity);
+    (v.length() > MOVING).then(|| (v.y.atan2(v.x), (-v.z).atan2(v.x.hypot(v.y))))
+}
+
+#[cfg(test)]
+mod attitude_tests {
+    use super::*;
+    use crate::io::table::find;
+
+    #[test]
+    fn names_of_many_tools() {
+        for (name, quantity, factor) in [
+            ("t_s", "t_s", 1.0),
+            ("time_s", "t_s", 1.0),
+            ("timestamp_ns", "t_s", 1e-9),
+            ("Latitude", "lat_deg", DEG),
+            ("lon_deg", "lon_deg", DEG),
+            ("lat_rad", "lat_deg", 1.0),
+            ("alt_m", "h_m", 1.0),
+            ("height_m", "h_m", 1.0),
+            ("heading_deg", "yaw_deg", DEG),
+            ("roll", "roll_deg", DEG),
+            ("pitch_rad", "pitch_deg", 1.0),
+            ("vn_mps", "v_n_m_s", 1.0),
+            ("v_d_m_s", "v_d_m_s", 1.0),
+            ("v_up_m_s", "v_d_m_s", -1.0),
+            ("up_m", "d_m", -1.0),
+            ("e_m", "e_m", 1.0),
+        ] {
+            let found = find(&QUANTITIES, name).map(|(own, factor)| (own.name, factor));
+            assert_eq!(found, Some((quantity, Some(factor))), "{name}");
+        }
+        for name in [
+            "sd_roll_deg",
+            "gnss",
+            "e",
+            "n",
+            "roll_m",
+            "lat_m",
+            "t_deg",
+            "v_n_deg",
+        ] {
+            assert!(find(&QUANTITIES, name).is_none(), "{name}");
+        }
+        let is_own =
+            |own: &Quantity| find(&QUANTITIES, own.name).is_some_and(|q| q.0.name == own.name);
+        assert!(
+            QUANTITIES
+                .iter()
+                .filter(|own| own.name != "week")
+                .all(is_own)
+        );
+    }
+}
+
+// Doubts about a trajectory file that can be used all the same: gaps, units, conventions.
+
+/// Instants at which path and attitude are compared: more tell no more.
+const LOOKS: usize = 2000;
+
+/// The path against the other columns.
+fn of_trajectory(rows: &mut Rows, trajectory: &Trajectory) {
+    let small = |angle: f64| angle.abs() <= PI * DEG + 1e-8;
+    if rows.geodetic
+        && rows
+            .samples
+            .iter()
+            .all(|s| small(s.lat) && small(0.5 * s.lon))
+    {
+        rows.doubt(
+            None,
+            "lat_deg and lon_deg never exceed π: radians? Then name the columns lat_rad, lon_rad",
+        );
+    }
+    if rows.attitude == Attitude::Given {
+        heading(rows, trajectory)
+            .into_iter()
+            .for_each(|text| rows.doubt(None, text));
+    }
+    let times = rows.samples.iter().map(|s| s.t_s);
+    let given: Vec<_> = times.zip(rows.velocities.iter().copied()).collect();
+    let misfit = VelocityMisfit::new(trajectory, &given).filter(VelocityMisfit::contradicts);
+    if let Some(VelocityMisfit { rms, worst_s, .. }) = misfit {
+        let line = given
+            .iter()
+            .position(|(t_s, _)| *t_s == worst_s)
+            .map(|i| rows.lines[i]);
+        let text = format!(
+            "velocity columns differ from the positions, which are used, by {rms:.3} m/s rms"
+        );
+        rows.doubt(line, text);
+    }
+}
+
+/// A heading far from the course that another convention or unit brings near it: four times as near, where it is
+/// more than 20° off. A vehicle that drifts, or a drone, agrees with none.
+fn heading(rows: &Rows, trajectory: &Trajectory) -> Option<String> {
+    type Convention = (&'static str, fn(f64) -> f64);
+    const CONVENTIONS: [Convention; 6] = [
+        ("in radians (name the column yaw_rad)", |yaw| yaw / DEG),
+        ("anticlockwise from north", |yaw| -yaw),
+        (
+            "anticlockwise from east, or with latitude and longitude swapped",
+            |yaw| FRAC_PI_2 - yaw,
+        ),
+        ("clockwise from east", |yaw| FRAC_PI_2 + yaw),
+        ("clockwise from west", |yaw| yaw - FRAC_PI_2),
+        ("backwards", |yaw| yaw + PI),
+    ];
+    let look = |i: usize| {
+        let NavState { v_n, q_b_n, .. } = trajectory.state(rows.samples[i].t_s);
+        let moves = v_n.x.hypot(v_n.y) > MOVING;
+        moves.then(|| (v_n.y.atan2(v_n.x), RollPitchYaw::from_quat(q_b_n).yaw))
+    };
+    let n = rows.samples.len();
+    let looks: Vec<(f64, f64)> = (0..n).step_by(n.div_ceil(LOOKS)).filter_map(look).collect();
+    let off = |meant: fn(f64) -> f64| {
+        let sum: f64 = looks
+            .iter()
+            .map(|(course, yaw)| wrap_angle(course - meant(*yaw)).abs())
+            .sum();
+        sum / looks.len() as f64 / DEG
+    };
+    let given = off(|yaw| yaw);
+    let tried = CONVENTIONS
+        .iter()
+        .map(|(words, meant)| (off(*meant), words));
+    let (best, words) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (given > 20.0 && best < 0.25 * given).then(|| {
+        format!("yaw is {given:.0}° from the course in the mean, {best:.1}° when read {words}")
+    })
+}
+
+// A recorded trajectory that is only compared with: what jumps is left out.
+
+impl Rows {
+    /// The stretches of the rows between what no vehicle does, and what is doubtful about them.
+    fn reference(mut self) -> Result<(Reference, Vec<String>), Error> {
+        let found = breaks(&self.samples);
+        let mut refused = None;
+        let (mut stretches, mut seconds) = (Vec::new(), 0.0);
+        for range in usable(&self.samples, &found) {
+            match self.stretch(range.clone()) {
+                Ok(stretch) => {
+                    seconds += stretch.end_s() - stretch.start_s();
+                    stretches.push(stretch);
+                }
+                Err(source) => refused = refused.or(Some(source)),
+            }
+        }
+        let parts = stretches.len();
+        let Some(reference) = Reference::of_stretches(stretches) else {
+            let whole = self.stretch(0..self.samples.len()).err();
+            let none = "no stretch of five seconds without a jump in position or attitude";
+            let none = || Error::contents(&self.path, Place::Within, none);
+            return Err(refused.or(whole).unwrap_or_else(none));
+        };
+        if let Some(first) = found.first() {
+            let (line, at) = (self.lines[first.index], self.samples[first.index].t_s);
+            let other = found.len() - 1;
+            let text = format!(
+                "{} at {at:.2} s and {other} more: compared with {seconds:.1} s in {parts} stretches",
+                first.fault
+            );
+            self.doubt(Some(line), text);
+        } else if let Some(source) = refused {
+            self.doubt(None, format!("left out of the comparison: {source}"));
+        }
+        Ok((reference, self.doubts))
+    }
+
+    fn stretch(&self, range: Range<usize>) -> Result<Trajectory, Error> {
+        let first = range.start;
+        let mut samples = self.samples[range].to_vec();
+        if self.attitude == Attitude::OfPath && samples.len() > 1 {
+            follow_path(&mut samples);
+        }
+        Trajectory::from_samples(&samples).map_err(|source| {
+            let index = first + source.index().unwrap_or(0);
+            let line = self.lines.get(index).copied().unwrap_or(1);
+            no_trajectory(&self.path, line, &source)
+        })
+    }
+}
+
+// Trajectories of other tools: KF-GINS results, TUM.
+
+/// The table of a text without a header.
+fn bare(path: &str, text: &str, names: &[&str], dictionary: &Dictionary) -> Result<Table, Error> {
+    let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+    let asked = Asked {
+        names: Some(&names),
+        ..Asked::default()
+    };
+    parse_text(path, text, dictionary, &asked)
+}
+
+/// A KF-GINS navigation result or truth: week, seconds of week, latitude, longitude (deg), height (m), velocity
+/// north, east, down (m/s), roll, pitch, yaw (deg), between blanks. Time is counted on from the first week.
+fn kf_gins(path: &str, text: &str, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
+    let names = [
+        "week",
+        "t_s",
+        "lat_deg",
+        "lon_deg",
+        "h_m",
+        "v_n_m_s",
+        "v_e_m_s",
+        "v_d_m_s",
+        "roll_deg",
+        "pitch_deg",
+        "yaw_deg",
+    ];
+    rows(
+        bare(path, text, &names, &dictionary(numbers))?,
+        options,
+        numbers,
+    )
+}
+
+/// Quantities of a TUM file.
+static TUM: [Quantity; 8] = [
+    Quantity::time(&["t"]),
+    Quantity::number("x", &["x"]),
+    Quantity::number("y", &["y"]),
+    Quantity::number("z", &["z"]),
+    Quantity::number("qx", &["qx"]),
+    Quantity::number("qy", &["qy"]),
+    Quantity::number("qz", &["qz"]),
+    Quantity::number("qw", &["qw"]),
+];
+
+/// A TUM file: time, x, y, z (m), quaternion x, y, z, w, between blanks. The axes are taken as ROS has them
+/// (REP 103): position east, north, up of the origin; body forward, left, up.
+fn tum(path: &str, text: &str, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
+    let dictionary = Dictionary {
+        quantities: &TUM,
+        ..dictionary(numbers)
+    };
+    let names = ["t_s", "x", "y", "z", "qx", "qy", "qz", "qw"];
+    let mut table = bare(path, text, &names, &dictionary)?;
+    table.retain(|table, row| table.columns.iter().all(|c| c.values[row].is_finite()));
+    let origin = origin(&table, options)?;
+    // East-north-up to north-east-down, front-right-down to front-left-up: half turns.
+    let q_enu_ned = DQuat::from_xyzw(FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0, 0.0);
+    let q_frd_flu = DQuat::from_rotation_x(PI);
+    let mut samples = Vec::with_capacity(table.rows());
+    for row in 0..table.rows() {
+        let value = |column: &Column| column.si(row);
+        let all: Vec<f64> = table.columns.iter().map(value).collect();
+        let q_flu_enu = DQuat::from_slice(&all[4..]);
+        if (q_flu_enu.length() - 1.0).abs() > 0.01 {
+            let reason = "does not make a unit quaternion with the others";
+            let line = table.line(row);
+            return Err(Error::cell(path, line, "qw", all[7].to_string(), reason));
+        }
+        let r_ned = q_enu_ned * DVec3::from_slice(&all[1..4]);
+        samples.push(local(
+            all[0],
+            origin,
+            r_ned,
+            q_enu_ned * q_flu_enu * q_frd_flu,
+        ));
+    }
+    let lines = (0..table.rows()).map(|row| table.line(row)).collect();
+    let mut rows = Rows::new(path, lines, samples, Attitude::Given);
+    rows.doubt(
+        None,
+        "axes taken as ROS has them: position east, north, up; body forward, left, up",
+    );
+    Ok(rows)
+}
+
+#[cfg(test)]
+mod import_tests {
+    use super::*;
+    use crate::io::fusion_files::WEEK_S;
+    use nav_sim_navigation::frames::RollPitchYaw;
+    use nav_sim_navigation::trajectory::Trajectory;
+
+    type Loaded = Result<(Trajectory, Vec<String>), Error>;
+
+    fn nav(text: &str) -> Loaded {
+        kf_gins("truth.nav", text, &Options::default(), Numbers::Finite)?.trajectory()
+    }
+
+    fn tum(path: &str, text: &str, options: &Options) -> Loaded {
+        super::tum(path, text, options, Numbers::Finite)?.trajectory()
+    }
+
+    #[test]
+    fn kf_gins_results_run_on_across_the_week() {
+        let row = |k: i32| {
+            let sow = 604_798.5 + 0.5 * f64::from(k);
+            let (week, sow) = if sow >= WEEK_S {
+                (2017, sow - WEEK_S)
+            } else {
+                (2016, sow)
+            };
+            let lon = 114.0 + 1e-4 * f64::from(k);
+            format!("{week}  {sow:.3} 30.5 {lon:.6} 20.0 0.0 19.2 0.0 0.1 0.2 90.0\n")
+        };
+        let text: String = (0..9).map(row).collect();
+        let (t, warnings) = nav(&text).unwrap();
+        assert!(warnings.is_empty(), "{warnings:?}");
+        assert_eq!((t.start_s(), t.end_s()), (604_798.5, 604_802.5));
+        assert!(
+            (t.state(604_800.0).v_n.y - 19.2).abs() < 0.02,
+            "{}",
+            t.state(604_800.0).v_n
+        );
+        let e = nav("2016 1 2 3\n").unwrap_err();
+        assert_eq!(e.to_string(), "truth.nav, line 1: 4 values, but 11 columns");
+    }
+
+    /// East along x at 3 m/s, facing east (ROS: no rotation): heading 90°, level.
+    #[test]
+    fn tum_files_are_read_with_the_axes_of_ros() {
+        let text: String = (0..6)
+            .map(|k| format!("{k}.5 {} 0 0 0 0 0 1\n", 3 * k))
+            .collect();
+        let options = Options {
+            origin: Some([0.8, 0.1, 50.0]),
+        };
+        let (t, warnings) = tum("a.tum", &text, &options).unwrap();
+        assert!(warnings[0].contains("ROS"));
+        let state = t.state(2.0);
+        let rpy = RollPitchYaw::from_quat(state.q_b_n);
+        assert!(
+            (state.v_n - DVec3::Y * 3.0).length() < 1e-4,
+            "{}",
+            state.v_n
+        );
+        assert!(
+            (rpy.yaw - 0.5 * PI).abs() < 1e-5 && rpy.roll.abs() < 1e-5 && rpy.pitch.abs() < 1e-5,
+            "{rpy:?}"
+        );
+        let e = tum("a.tum", &text, &Options::default()).unwrap_err();
+        assert!(
+            e.to_string().contains("needs an origin on the Earth"),
+            "{e}"
+        );
+        let e = tum("a.tum", "0 0 0 0 0 0 0 2\n", &options)
+            .unwrap_err()
+            .to_string();
+        assert_eq!(
+            e,
+            "a.tum, line 1: column \"qw\": 2 does not make a unit quaternion with the others"
+        );
+    }
+}
+
+// GPX tracks: time, latitude, longitude, elevation of every track point.
+//
+// Format: <https://www.topografix.com/GPX/1/1/>. Elements are known by their names without the prefix of a
+// namespace; comments, extensions and everything outside track points are passed over.
+
+/// A GPX track; heading and pitch follow the path.
+fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
+    let document = Document::parse(text).map_err(|e| {
+        let line = u64::from(e.pos().row);
+        Error::contents(path, line, format!("not well-formed XML: {e}"))
+    })?;
+    let mut rows = Rows::new(path, Vec::new(), Vec::new(), Attitude::OfPath);
+    let (mut start, mut line, mut counted) = (None, 1, 0);
+    let nodes = document.descendants();
+    for point in nodes.filter(|node| node.tag_name().name() == "trkpt") {
+        let begin = point.range().start;
+        line += text[counted..begin].matches('\n').count() as u64;
+        counted = begin;
+        // extensions have times and elevations of their own
+        let child = |name| point.children().find(|own| own.tag_name().name() == name);
+        let text = |name| {
+            let child = || child(name)?.children().find(Node::is_text)?.text();
+            point.attribute(name).or_else(child)
+        };
+        let absent = |column| {
+            let reason = "does not have it, or not as a number";
+            Error::cell(path, line, column, "the track point", reason).or_hint(
+                "every <trkpt> needs lat, lon, <ele> and <time>: export them with the track",
+            )
+        };
+        let number = |column| {
+            let number = text(column).and_then(|text| text.trim().parse::<f64>().ok());
+            number.ok_or_else(|| absent(column))
+        };
+        let time = text("time").and_then(|text| instant(text.trim()));
+        let time = time.ok_or_else(|| absent("time"))?;
+        rows.samples.push(TrajectorySample {
+            t_s: (time - *start.get_or_insert(time)).as_seconds_f64(),
+            lat: number("lat")? * DEG,
+            lon: number("lon")? * DEG,
+            h: number("ele")?,
+            q_b_n: DQuat::IDENTITY,
+        });
+        rows.lines.push(line);
+    }
+    if rows.samples.is_empty() {
+        return Err(Error::contents(path, Place::Within, "no rows in it"));
+    }
+    rows.doubt(
+        None,
+        "GPX: heading and pitch follow the path, roll is 0; elevations are taken as ellipsoidal heights",
+    );
+    Ok(rows)
+}
+
+/// A time as GPX has it: 2024-05-01T10:20:30.5Z, with another offset, or without one (UTC).
+fn instant(text: &str) -> Option<DateTime<Utc>> {
+    let local =
+        || NaiveDateTime::parse_from_str(text, "%Y-%m-%dT%H:%M:%S%.f").map(|time| time.and_utc());
+    DateTime::parse_from_rfc3339(text)
+        .map(|time| time.to_utc())
+        .or_else(|_| local())
+        .ok()
+}
+
+#[cfg(test)]
+mod gpx_tests {
+    use super::*;
+    use glam::DVec3;
+    use nav_sim_navigation::frames::RollPitchYaw;
+    use nav_sim_navigation::trajectory::Trajectory;
+
+    fn load(path: &str, text: &str) -> Result<(Trajectory, Vec<String>), Error> {
+        gpx(path, text)?.trajectory()
+    }
+
+    /// Nine points north, 1e-4 degrees and a metre up a second, across a leap day and into another time zone.
+    fn track() -> String {
+        let point = |k: u32| {
+            let lat = 46.0 + 1e-4 * f64::from(k);
+            format!(
+                "<trkpt lon='7.0' lat=\"{lat}\">\n<ele>{}</ele><time>2024-02-29T23:59:{}Z</time></trkpt>\n",
+                500 + k,
+                52 + k
+            )
+        };
+        let last = "<trkpt lat=\"46.0008\" lon=\"7\"><ele>508</ele><time>2024-03-01T02:00:00+02:00</time></trkpt>";
+        let points: String = (0..8).map(point).collect();
+        format!("<gpx>\n<trk><trkseg>\n{points}{last}</trkseg></trk></gpx>")
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_a_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.gpx");
+        std::fs::write(&path, format!("\u{feff}{}", track())).unwrap();
+        let (t, _) = super::load(&path, &Options::default()).unwrap();
+        assert_eq!((t.start_s(), t.end_s()), (0.0, 8.0));
+    }
+
+    #[test]
+    fn tracks_get_their_heading_from_the_path() {
+        let text = track();
+        let (t, warnings) = load("a.gpx", &text).unwrap();
+        assert_eq!((t.start_s(), t.end_s(), warnings.len()), (0.0, 8.0, 1));
+        let (state, rpy) = (t.state(4.0), RollPitchYaw::from_quat(t.state(4.0).q_b_n));
+        assert!(
+            (state.v_n - DVec3::new(11.117, 0.0, -1.0)).length() < 0.01,
+            "{}",
+            state.v_n
+        );
+        assert!(
+            rpy.yaw.abs() < 1e-6 && (rpy.pitch - (1.0_f64 / 11.117).atan()).abs() < 1e-3,
+            "{rpy:?}"
+        );
+        let e = load("a.gpx", &text.replacen("<ele>500</ele>", "", 1)).unwrap_err();
+        assert!(e.advice().unwrap().contains("<ele> and <time>"), "{e:?}");
+        let e = e.to_string();
+        assert_eq!(
+            e,
+            "a.gpx, line 3: column \"ele\": the track point does not have it, or not as a number"
+        );
+        assert_eq!(
+            load("a.gpx", "<gpx></gpx>").unwrap_err().to_string(),
+            "a.gpx: no rows in it"
+        );
+    }
+
+    #[test]
+    fn prefixes_comments_and_extensions_change_nothing() {
+        let written = track()
+            .replace("<trk", "<g:trk")
+            .replace("</trk", "</g:trk")
+            .replace("<ele>", "<g:ele><!-- metres --><![CDATA[")
+            .replace("</ele>", "]]></g:ele>")
+            .replace(
+                "<time>",
+                "<g:extensions><ele>9</ele><x:time/></g:extensions><g:time>\n  ",
+            )
+            .replace("</time>", "\n</g:time>")
+            .replace(
+                "<gpx>",
+                "<?xml version=\"1.0\"?>\n<gpx xmlns:g='u' xmlns:x='v'><!-- <trkpt lat='1'> -->",
+            );
+        let (plain, other) = (
+            gpx("a.gpx", &track()).unwrap(),
+            gpx("a.gpx", &written).unwrap(),
+        );
+        assert_eq!(plain.samples, other.samples);
+        assert_eq!((plain.lines[0], other.lines[0]), (3, 4));
+    }
+
+    #[test]
+    fn what_is_not_xml_is_refused_with_its_line() {
+        let e = load("a.gpx", &track().replacen("</trkpt>", "</trkseg>", 1))
+            .unwrap_err()
+            .to_string();
+        assert!(e.starts_with("a.gpx, line 4: not well-formed XML: "), "{e}");
+    }
+
+    #[test]
+    fn times_have_fractions_offsets_and_leap_seconds() {
+        let start = instant("2016-12-31T23:59:59.75Z").unwrap();
+        for (text, seconds) in [
+            ("2016-12-31T23:59:60.5Z", 0.75),
+            ("2017-01-01T00:00:00Z", 0.25),
+            ("2017-01-01T00:00:01.125", 1.375),
+            ("2017-01-01T01:30:00+01:30", 0.25),
+        ] {
+            assert_eq!(
+                (instant(text).unwrap() - start).as_seconds_f64(),
+                seconds,
+                "{text}"
+            );
+        }
+        assert!(
+            ["", "2017-02-29T00:00:00Z", "2017-01-01", "noon"]
+                .iter()
+                .all(|text| instant(text).is_none())
+        );
+    }
+}
+
+// Trajectories as CSV.
+
+/// Which instants become rows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Instants {
+    /// Evenly spaced ones, from the start (Hz).
+    Rate(f64),
+    /// Those the trajectory was made from.
+    Knots,
+}
+
+impl Instants {
+    pub(crate) fn times(self, trajectory: &Trajectory) -> Vec<f64> {
+        match self {
+            Self::Knots => trajectory.knots().to_vec(),
+            Self::Rate(rate_hz) => {
+                let start_s = trajectory.start_s();
+                let steps = ((trajectory.end_s() - start_s) * rate_hz + 1e-6).floor() as u64;
+                (0..=steps).map(|k| start_s + k as f64 / rate_hz).collect()
+            }
+        }
+    }
+}
+
+/// A trajectory as CSV. Positions are written with the digits that read back to them, since accelerations are their second
+/// differences; times to the nanosecond, velocities to 1e-9 m/s, angles to 1e-12 degrees.
+pub(crate) fn csv(trajectory: &Trajectory, rows: Instants) -> String {
+    let mut text =
+        "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n".to_owned();
+    for t_s in rows.times(trajectory) {
+        let state = trajectory.state(t_s);
+        let (v, rpy) = (state.v_n, RollPitchYaw::from_quat(state.q_b_n));
+        let [v_n, v_e, v_d] = v.to_array().map(|v| tidy(v, 9));
+        let [roll, pitch, yaw] = [rpy.roll, rpy.pitch, rpy.yaw].map(|a| tidy(a / DEG, 12));
+        let (lat, lon) = (state.lat / DEG + 0.0, wrap_angle(state.lon) / DEG + 0.0);
+        let (t_s, h) = (tidy(t_s, 9), state.h + 0.0);
+        let _ = writeln!(
+            text,
+            "{t_s},{lat},{lon},{h},{v_n},{v_e},{v_d},{roll},{pitch},{yaw}"
+        );
+    }
+    text
+}
+
+/// The nearest number of so many decimals; no negative zero.
+fn tidy(x: f64, decimals: i32) -> f64 {
+    let scale = 10_f64.powi(decimals);
+    (x * scale).round() / scale + 0.0
+}
+
+#[cfg(test)]
+mod csv_tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_tidy() {
+        let shown =
+            [-0.0, 0.1 + 0.2, -1e-14, 45.000_000_000_000_01].map(|x| tidy(x, 9).to_string());
+        assert_eq!(shown, ["0", "0.3", "0", "45"]);
+    }
+}

@@ -1,16 +1,16 @@
 //! Motion profiles in TOML.
 
-mod description;
-
-use crate::io::Failure;
-use crate::io::file_kind::{self, FileKind};
-use crate::io::toml_file::{Finite, Positive, Source};
-use description::{Described, Description, Point, Roll, SegmentTable};
-use nav_sim_navigation::trajectory::Trajectory;
+use crate::io::file_kind::FileKind;
+use crate::io::toml_file::{Between, Finite, NonNegative, Positive, Source};
+use crate::io::{Failure, file_kind};
+use nav_sim_navigation::earth::MAX_LATITUDE_DEG;
 use nav_sim_navigation::trajectory::profile::{
-    self, Acceleration, Bank, Kind, Length, Place, Profile, Segment, Start, Turning, Waypoint,
+    Acceleration, Bank, Kind, Length, Place, Profile, Segment, Start, Turning, Waypoint,
 };
+use nav_sim_navigation::trajectory::{Trajectory, profile};
 use nav_sim_signal::units::DEG;
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::path::Path;
 
 /// Ramps of accelerations and rates unless said otherwise (s).
@@ -231,4 +231,167 @@ fn waypoint(keys: &Keys<'_>, point: &Point) -> Result<Waypoint, Failure> {
     };
     let h = point.h_m.map(|h| h.0);
     Ok(Waypoint { place, h })
+}
+
+// Keys of a motion profile: their types, ranges and words, for the reader and for editors.
+
+/// Heights at which the gravity model means something (m).
+type Height = Between<-12_000, 1_000_000, false>;
+
+/// A drive by what the vehicle does: the trajectory of nav-sim run
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Motion profile")]
+struct Description {
+    start: Origin,
+    #[serde(default)]
+    vehicle: Vehicle,
+    /// What the vehicle does, in order
+    #[schemars(length(min = 1))]
+    segment: Vec<SegmentTable>,
+}
+
+/// Where and how it starts
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Origin {
+    /// Time (s; default: 0)
+    #[serde(default)]
+    t_s: Finite,
+    /// Geodetic latitude (degrees)
+    #[schemars(range(min = -MAX_LATITUDE_DEG, max = MAX_LATITUDE_DEG))]
+    lat_deg: Finite,
+    /// Longitude (degrees)
+    lon_deg: Finite,
+    /// Height above the ellipsoid (m)
+    h_m: Height,
+    /// Heading from north (degrees)
+    heading_deg: Finite,
+    /// Speed (m/s; default: 0)
+    speed_m_s: Option<NonNegative>,
+}
+
+/// How the vehicle moves
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Vehicle {
+    /// Roll in turns: level as a land vehicle (default), or as an aircraft
+    #[serde(default)]
+    bank: Roll,
+    /// Time over which accelerations and rates build up and fade (s; default: 2)
+    ramp_s: Option<Positive>,
+}
+
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+enum Roll {
+    #[default]
+    None,
+    Coordinated,
+}
+
+/// One segment
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+struct SegmentTable {
+    /// Overrides that of the vehicle (s)
+    ramp_s: Option<Positive>,
+    #[schemars(flatten)]
+    kind: Described,
+}
+
+/// The kinds of segment, each with its keys.
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
+#[schemars(tag = "kind", !deny_unknown_fields)]
+enum Described {
+    /// Constant speed and heading; at speed zero, standing
+    Straight {
+        /// Duration (s), or …
+        duration_s: Option<Positive>,
+        /// … distance along the path (m)
+        distance_m: Option<Positive>,
+        /// Height gained (m; default: 0)
+        #[serde(default)]
+        climb_m: Finite,
+    },
+    /// Speed changes
+    Accelerate {
+        /// Final speed (m/s)
+        to_speed_m_s: NonNegative,
+        /// Duration (s), or …
+        duration_s: Option<Positive>,
+        /// … largest acceleration (m/s²)
+        accel_m_s2: Option<Positive>,
+        /// Height gained (m; default: 0)
+        #[serde(default)]
+        climb_m: Finite,
+    },
+    /// Heading changes
+    Turn {
+        /// Change of heading, positive to the right (degrees)
+        angle_deg: Finite,
+        /// Duration (s), or …
+        duration_s: Option<Positive>,
+        /// … largest rate (degrees/s), or …
+        rate_deg_s: Option<Positive>,
+        /// … smallest radius (m), or …
+        radius_m: Option<Positive>,
+        /// … largest lateral acceleration (m/s²)
+        lateral_accel_m_s2: Option<Positive>,
+        /// Height gained (m; default: 0)
+        #[serde(default)]
+        climb_m: Finite,
+    },
+    /// Height changes
+    Climb {
+        /// Height gained (m)
+        height_m: Finite,
+        /// Duration (s), or …
+        duration_s: Option<Positive>,
+        /// … distance along the path (m)
+        distance_m: Option<Positive>,
+    },
+    /// Brakes if moving, then stands
+    Stop {
+        /// Time at rest (s)
+        duration_s: Positive,
+        /// Largest deceleration while braking (m/s²; default: 1.5)
+        decel_m_s2: Option<Positive>,
+        /// Height gained (m; default: 0)
+        #[serde(default)]
+        climb_m: Finite,
+    },
+    /// From point to point on straight legs, cutting the corners with turns
+    Waypoints {
+        /// The points; the path ends at the last and passes inside the others
+        #[schemars(length(min = 1))]
+        points: Vec<Point>,
+        /// Largest rate of turns (degrees/s), or …
+        rate_deg_s: Option<Positive>,
+        /// … smallest radius (m), or …
+        radius_m: Option<Positive>,
+        /// … largest lateral acceleration (m/s²)
+        lateral_accel_m_s2: Option<Positive>,
+        /// Height gained (m; default: 0)
+        #[serde(default)]
+        climb_m: Finite,
+    },
+}
+
+/// A point, by latitude and longitude or by metres from the start
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Point {
+    /// Geodetic latitude (degrees)
+    #[schemars(range(min = -MAX_LATITUDE_DEG, max = MAX_LATITUDE_DEG))]
+    lat_deg: Option<Finite>,
+    /// Longitude (degrees)
+    lon_deg: Option<Finite>,
+    /// North of the start (m)
+    n_m: Option<Finite>,
+    /// East of the start (m)
+    e_m: Option<Finite>,
+    /// Height above the ellipsoid (m; default: that before it)
+    h_m: Option<Height>,
 }

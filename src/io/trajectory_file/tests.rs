@@ -343,7 +343,7 @@ fn what_is_written_reads_back_the_same() {
     let (t, _) = read(&drive(None)).unwrap();
     {
         let path = dir.path().join("t.csv");
-        std::fs::write(&path, csv(&t, Rows::Rate(10.0))).unwrap();
+        std::fs::write(&path, csv(&t, Instants::Rate(10.0))).unwrap();
         let (back, warnings) = load(&path, &Options::default()).unwrap();
         assert!(warnings.is_empty(), "{warnings:?}");
         assert_eq!((back.knots().len(), back.end_s()), (96, 9.5));
@@ -355,7 +355,7 @@ fn what_is_written_reads_back_the_same() {
         );
     }
     let path = dir.path().join("knots.csv");
-    std::fs::write(&path, csv(&t, Rows::Knots)).unwrap();
+    std::fs::write(&path, csv(&t, Instants::Knots)).unwrap();
     assert_eq!(
         load(&path, &Options::default()).unwrap().0.knots(),
         t.knots()
@@ -391,7 +391,7 @@ fn a_far_time_stamp_is_refused_with_its_line_in_every_format() {
             )
         })
         .collect();
-    let tum = imports::tum(
+    let tum = super::tum(
         "a.tum",
         &format!("# origin: 45, 7, 0\n{tum}"),
         &Options::default(),
@@ -413,12 +413,12 @@ fn a_far_time_stamp_is_refused_with_its_line_in_every_format() {
             .collect();
         format!("<gpx>{points}</gpx>")
     };
-    let e = gpx::gpx("a.gpx", &track(0)).unwrap_err().to_string();
+    let e = gpx("a.gpx", &track(0)).unwrap_err().to_string();
     assert_eq!(
         e,
         "a.gpx, line 5: column \"time\": the track point does not have it, or not as a number"
     );
-    let e = gpx::gpx("a.gpx", &track(4))
+    let e = gpx("a.gpx", &track(4))
         .unwrap()
         .trajectory()
         .unwrap_err()
@@ -438,7 +438,7 @@ fn jumps_and_heights_of_other_formats_are_refused_as_those_of_tables() {
             .map(|k| format!("{k} {} 0 0 0 0 0 1\n", place(k)))
             .collect();
         let text = format!("# origin: 45, 7, 0\n{text}");
-        let rows = imports::tum("a.tum", &text, &Options::default(), Numbers::Finite).unwrap();
+        let rows = tum("a.tum", &text, &Options::default(), Numbers::Finite).unwrap();
         rows.trajectory().unwrap_err().to_string()
     };
     assert!(
@@ -457,7 +457,7 @@ fn jumps_and_heights_of_other_formats_are_refused_as_those_of_tables() {
         )
     };
     let points: String = (0..6).map(point).collect();
-    let e = gpx::gpx("a.gpx", &format!("<gpx>{points}</gpx>"))
+    let e = gpx("a.gpx", &format!("<gpx>{points}</gpx>"))
         .unwrap()
         .trajectory()
         .unwrap_err()

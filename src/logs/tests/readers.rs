@@ -212,19 +212,23 @@ fn formats_are_told_by_their_first_bytes() {
         "     3.04           OBSERVATION DATA    M"
     );
     let zip = b"PK\x03\x04\x14\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\x07\0\0\0imu.csv";
-    let not_read: [(&[u8], Kind); 9] = [
-        (b"SQLite format 3\0", Kind::Sqlite),
-        (b"\xa3\x95\x80\x80\x59FMT\0BBnNZ", Kind::DataFlash),
-        (b"MATLAB 5.0 MAT-file, Platform: GLNXA64", Kind::Mat5),
-        (b"MATLAB 7.3 MAT-file, Platform: GLNXA64", Kind::Hdf5),
-        (b"\x89HDF\r\n\x1a\n\0\0", Kind::Hdf5),
-        (b"\xfa\xff\x0c\x04", Kind::Mtb),
-        (b"$@\x34\x12\xa7\x0f\x60\0", Kind::Sbf),
-        (rinex.as_bytes(), Kind::Rinex),
-        (zip, Kind::Zip),
+    let not_read: [(&[u8], &str); 9] = [
+        (b"SQLite format 3\0", "a SQLite database"),
+        (
+            b"\xa3\x95\x80\x80\x59FMT\0BBnNZ",
+            "an ArduPilot DataFlash log",
+        ),
+        (b"MATLAB 5.0 MAT-file, Platform: GLNXA64", "a MATLAB .mat"),
+        (b"MATLAB 7.3 MAT-file, Platform: GLNXA64", "an HDF5 file"),
+        (b"\x89HDF\r\n\x1a\n\0\0", "an HDF5 file"),
+        (b"\xfa\xff\x0c\x04", "an Xsens .mtb log"),
+        (b"$@\x34\x12\xa7\x0f\x60\0", "a Septentrio SBF log"),
+        (rinex.as_bytes(), "a RINEX file"),
+        (zip, "a zip archive"),
     ];
-    for (head, kind) in not_read {
-        assert_eq!(recognise(head), Some(kind));
+    for (head, name) in not_read {
+        let kind = recognise(head).unwrap();
+        assert!(kind.name().starts_with(name), "{}", kind.name());
         let place = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(place.path(), head).unwrap();
         let error = Log::open(place.path()).unwrap_err();

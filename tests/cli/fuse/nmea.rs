@@ -119,7 +119,7 @@ fn sentences_give_the_solution_of_the_table() {
     };
     let (day, said) = fused(place.path(), "day.csv", "log.nmea", "--gnss-sigma 9:0.04");
     assert!(
-        said.contains("100 with a horizontal velocity, 0 left out, times are seconds of the day"),
+        said.contains("NMEA sentences: 100 fixes, times are seconds of the day"),
         "{said}"
     );
     assert!(

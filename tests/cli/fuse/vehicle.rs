@@ -60,7 +60,7 @@ fn a_wheel_without_a_speed_is_refused() {
         (
             "t_s,wheel_ticks",
             1.0,
-            "wheel.csv, line 1: column \"wheel_ticks\" counts turns",
+            "wheel.csv, line 1: column \"wheel_ticks\" has no unit",
         ),
         (
             "t_s,speed",

@@ -8,7 +8,7 @@ fn parse(bytes: &[u8]) {
     let options = ReadOptions::default();
     let text = String::from_utf8_lossy(bytes);
     if let Ok(raw) = table::parse("a.csv", &text, &DICTIONARY, &Asked::default()) {
-        let _ = samples::recordings(raw, &options);
+        let _ = recordings(raw, &options);
     }
 }
 

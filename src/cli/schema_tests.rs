@@ -1,6 +1,6 @@
 //! The ranges of schemas are those of the readers.
 
-use super::{Kind, schema};
+use super::{Kind, schema_of};
 use crate::io::{
     Failure, contamination_file, fusion_files, model_file, scenario_file, trajectory_file,
 };
@@ -134,10 +134,6 @@ operation = \"step\"
 amplitude = 1.0
 at_s = 10.0
 [[accel]]
-operation = \"step\"
-amplitude = 1.0
-at_samples = 10
-[[accel]]
 operation = \"drift\"
 amplitude = 1.0
 [[accel]]
@@ -147,7 +143,7 @@ sigma = 1.0
 mean = 0.5
 [[gyro]]
 operation = \"replace\"
-points = 7
+share = 0.07
 length_samples = 3
 sigma = 1.0
 [[gyro]]
@@ -355,7 +351,7 @@ fn schemas_have_the_bounds_of_their_readers() {
         };
         assert_eq!(refused(text.to_owned()), None, "{kind:?}");
         let sample = toml::Value::Table(text.parse().unwrap());
-        let root = schema(kind);
+        let root = schema_of(kind);
         let mut all = Vec::new();
         numbers(&sample, &[&root], &root, "", &mut all);
         for (at, said) in all
