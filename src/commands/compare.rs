@@ -329,7 +329,7 @@ pub struct Comparison {
     pub(crate) candidates: Vec<CandidateResult>,
     /// Start and end of each outage (s).
     #[serde(skip)]
-    pub(crate) outages: Vec<(f64, f64)>,
+    outages: Vec<(f64, f64)>,
     /// Why runs are not paired with the reference.
     #[serde(skip)]
     doubts: Vec<String>,
