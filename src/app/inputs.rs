@@ -1,6 +1,6 @@
 //! Inputs that several commands share: files, settings, outages.
 
-use super::{Context, Failure, Refuse, Result};
+use super::{Context, Failure, Refuse, Result, refused};
 use crate::io::model_file::{self, ModelFile, TurnOn};
 use crate::io::recordings::{self, ReadOptions};
 use crate::io::toml_file::Source;
@@ -198,8 +198,10 @@ impl FromStr for OutageFlag {
 /// The windows among the values of `--outage`, of which "none" stands alone.
 pub(crate) fn windows_of(outages: &[OutageFlag]) -> Result<Vec<Outage>> {
     if outages.len() > 1 && outages.contains(&OutageFlag::None) {
-        return Err(Failure::input("--outage none stands beside other outages")
-            .hint("give the windows, or none alone"));
+        return refused(
+            "--outage none stands beside other outages",
+            "give the windows, or none alone",
+        );
     }
     let window = |flag: &OutageFlag| match flag {
         OutageFlag::None => None,

@@ -7,8 +7,8 @@ mod manifest;
 mod outputs;
 pub mod reading;
 
-pub(crate) use crate::failure::Refuse;
 pub use crate::failure::{Failure, Result};
+pub(crate) use crate::failure::{Refuse, refused};
 pub use crate::io::input::Input;
 pub use command::{Answer, Answered, Asked, Command, Out, OutputFile, answered};
 pub(crate) use command::{argument, is_path, is_repeated};

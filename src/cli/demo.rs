@@ -3,6 +3,7 @@
 use super::{Cli, Common, Failure, Session};
 use crate::app::{Answer, Front, inputs};
 use crate::commands::batch::{BatchRequest, Outcome};
+use crate::failure::refused;
 use crate::io::atomic::Written;
 use crate::io::{atomic, model_file};
 use crate::report;
@@ -81,7 +82,7 @@ impl Progress {
                 let path = path.display();
                 let message = format!("{path} is of a demo of another seed, size or version");
                 let hint = "name another directory with --out, or replace it with --force";
-                return Err(Failure::input(message).hint(hint));
+                return refused(message, hint);
             }
             new.commands_done = 0;
         }
@@ -202,9 +203,7 @@ estimator = \"awv\"
 /// Refuses no runs, and recordings in which no window is as long as the trajectory, before anything is made.
 fn refuse_the_impossible(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.runs == 0 {
-        return Err(
-            Failure::input("--runs 0: there is nothing to compare").hint("at least --runs 1")
-        );
+        return refused("--runs 0: there is nothing to compare", "at least --runs 1");
     }
     let of_repository = |e: Failure| {
         e.hint("the demo takes its IMU and its trajectory from the top of the repository: run it there")
@@ -219,11 +218,13 @@ fn refuse_the_impossible(args: &Args, session: &Session) -> Result<(), Failure> 
     if args.samples as f64 >= needed {
         return Ok(());
     }
-    let message = format!(
-        "--samples {}: the INS errors are windows of a recording, as long as the trajectory",
-        args.samples
-    );
-    Err(Failure::input(message).hint(format!("at least --samples {needed}")))
+    refused(
+        format!(
+            "--samples {}: the INS errors are windows of a recording, as long as the trajectory",
+            args.samples
+        ),
+        format!("at least --samples {needed}"),
+    )
 }
 
 /// The commands, as words.

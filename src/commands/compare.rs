@@ -1,6 +1,8 @@
 //! `nav-sim compare`: run directories → ratios between runs.
 
-use crate::app::{Answer, Command, Context, Failure, Manifest, Out, OutputFile, Refuse, Result};
+use crate::app::{
+    Answer, Command, Context, Failure, Manifest, Out, OutputFile, Refuse, Result, refused,
+};
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::io::atomic::Written;
@@ -210,17 +212,18 @@ fn compared(
     is_reference: bool,
 ) -> Result<CandidateResult> {
     if candidate.manifest.hashes("trajectory") != reference.manifest.hashes("trajectory") {
-        return Err(
-            Failure::input(format!("{run}: not the trajectory of the reference"))
-                .hint("compare runs along one and the same trajectory file"),
+        return refused(
+            format!("{run}: not the trajectory of the reference"),
+            "compare runs along one and the same trajectory file",
         );
     }
     let runs = [candidate, reference].map(|side| side.experiment.runs.len());
     if is_paired && runs[0] != runs[1] {
         let [own, other] = runs;
-        let message =
-            format!("{run}: {own} runs against {other} of the reference, of the same seed");
-        return Err(Failure::input(message).hint("make both with one number of --runs"));
+        return refused(
+            format!("{run}: {own} runs against {other} of the reference, of the same seed"),
+            "make both with one number of --runs",
+        );
     }
     let mut outages = metrics::compare(&candidate.experiment, &reference.experiment, is_paired)
         .refuse_within(&run)?;

@@ -1,7 +1,7 @@
 //! `nav-sim synthesize`: replicate recordings of a noise model.
 
 use crate::app::reading::ChannelSet;
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result, refused};
 use crate::io::model_file::{self, ModelFile};
 use crate::io::{contamination_file, recordings};
 use crate::parse;
@@ -117,8 +117,10 @@ impl Command for Synthesize {
         let (shown, rate_hz) = (self.model.display(), file.model.rate_hz);
         if self.spread && file.spread.is_none() {
             let hint = "see the head of calib_data/consumer_mems.toml, or leave --spread out";
-            let message = format!("{shown}: no [spread] to draw parameters from");
-            return Err(Failure::input(message).hint(hint));
+            return refused(
+                format!("{shown}: no [spread] to draw parameters from"),
+                hint,
+            );
         }
         if file.turn_on.is_some() {
             context.remark(format!(
@@ -285,10 +287,10 @@ fn reaches(
     };
     let Contamination { name, rules } = contamination;
     if !(1..=replicates).any(|replicate| contamination.touches(replicate)) {
-        let message =
-            format!("--contaminate {name}: it touches none of the replicates 1 to {replicates}");
-        return Err(Failure::input(message)
-            .hint("replicates are counted from 1; more of them with --replicates"));
+        return refused(
+            format!("--contaminate {name}: it touches none of the replicates 1 to {replicates}"),
+            "replicates are counted from 1; more of them with --replicates",
+        );
     }
     let made = |rule: &Rule| channels.iter().any(|c| c.sensor == rule.sensor);
     let Some(Rule { sensor, place, .. }) = rules.iter().find(|rule| !made(rule)) else {
@@ -299,7 +301,7 @@ fn reaches(
         context.detail(message);
         return Ok(());
     }
-    Err(Failure::input(message).hint("another contamination, or --axes with that sensor"))
+    refused(message, "another contamination, or --axes with that sensor")
 }
 
 fn find(name: &str, rate_hz: f64) -> Result<Contamination> {

@@ -1,7 +1,7 @@
 //! `nav-sim tune`: the smallest factors on the variances of a noise model that make its filter consistent with other truths.
 
 use crate::app::inputs::{self, SettingsArgs, files};
-use crate::app::{Answer, Command, Context, Failure, Input, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Failure, Input, Out, OutputFile, Result, refused};
 use crate::io::atomic::Written;
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::{self, ModelFile, PROGRAM};
@@ -93,8 +93,10 @@ impl Command for Tune {
     fn run(&self, context: &Context<'_>) -> Result<TuneAnswer> {
         let mut scenario = self.settings.checked()?;
         if self.truths.is_empty() && !self.intervals && scenario.has_no_errors() {
-            return Err(Failure::input("no truth to be consistent with: neither --truth nor --intervals is given")
-                .hint("give models (--truth OTHER.toml, one a recording), --intervals for a MODEL of `nav-sim calibrate`, or a scenario with errors"));
+            return refused(
+                "no truth to be consistent with: neither --truth nor --intervals is given",
+                "give models (--truth OTHER.toml, one a recording), --intervals for a MODEL of `nav-sim calibrate`, or a scenario with errors",
+            );
         }
         let file = inputs::model(&self.model, context)?;
         let model = inputs::at_rate(&self.model, &file.model, scenario.imu.rate_hz, context)?;
@@ -128,11 +130,10 @@ impl Tune {
         };
         match self.truths.iter().find(is_samples) {
             None => Ok(()),
-            Some(path) => Err(Failure::input(format!(
-                "--truth {}: recordings, not a model",
-                path.display()
-            ))
-            .hint("make a model of each: nav-sim calibrate FILE --estimator gmwm -o FILE.toml")),
+            Some(path) => refused(
+                format!("--truth {}: recordings, not a model", path.display()),
+                "make a model of each: nav-sim calibrate FILE --estimator gmwm -o FILE.toml",
+            ),
         }
     }
 
@@ -230,10 +231,10 @@ impl Tune {
                 || scenario.baro.is_some()
                 || scenario.imu.temperature.is_some()
             {
-                return Err(Failure::input(
+                return refused(
                     "aiding, a barometer and a temperature profile belong to a trajectory",
-                )
-                .hint("give it with --trajectory"));
+                    "give it with --trajectory",
+                );
             }
             let outages = scenario.outages_on((0.0, DAY_S), seed)?.windows;
             let lengths: Vec<f64> = outages.iter().map(|o| o.end_s - o.start_s).collect();

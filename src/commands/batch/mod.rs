@@ -10,7 +10,7 @@ pub use results::StudyAnswer;
 use crate::app::inputs::merge;
 use crate::app::{
     Answer, Asked, Command, Context, Failure, Front, Input, Manifest, Refuse, Result, argument,
-    is_path, is_repeated,
+    is_path, is_repeated, refused,
 };
 use crate::commands::run::{PreparedRun, Run, block_of, columns};
 use crate::io::{atomic, input, source};
@@ -142,9 +142,10 @@ impl BatchRequest {
         }
         let changed = adopt(&place, &cells, self.dry_run, context);
         if let (Some((name, what)), false) = (changed.first(), self.force || self.dry_run) {
-            let message = format!("cell {name} is of another study: {what}");
-            return Err(Failure::input(message)
-                .hint("choose another directory with --out, or compute it again with --force"));
+            return refused(
+                format!("cell {name} is of another study: {what}"),
+                "choose another directory with --out, or compute it again with --force",
+            );
         }
         let units = units(&cells, context)?;
         if self.dry_run {
@@ -417,8 +418,10 @@ impl Study {
         let cells = all.into_iter().map(|(labels, run)| {
             let name = name_of(&labels);
             if !names.insert(name.to_lowercase()) {
-                return Err(Failure::input(format!("two cells have the name {name}"))
-                    .hint("name the values under [vary], a table of keys each"));
+                return refused(
+                    format!("two cells have the name {name}"),
+                    "name the values under [vary], a table of keys each",
+                );
             }
             door.cell(name.clone(), labels, run)
                 .map_err(|e| e.within(&format!("cell {name}")))
@@ -447,8 +450,10 @@ impl Study {
             let on_axis = labels.filter(|(other, _)| other == axis);
             let known = in_order(on_axis.map(|(_, label)| label.as_str()));
             if !known.contains(&label.as_str()) {
-                let message = format!("\"reference.{axis}\" = \"{label}\" is no label of an axis");
-                return Err(Failure::input(message).hint(format!("labels: {}", known.join(", "))));
+                return refused(
+                    format!("\"reference.{axis}\" = \"{label}\" is no label of an axis"),
+                    format!("labels: {}", known.join(", ")),
+                );
             }
         }
         Ok(())
@@ -547,9 +552,9 @@ impl Door {
                 .map(|one| stem(text(one)))
                 .collect::<Vec<_>>()
                 .join("+")),
-            Value::Table(_) => Err(
-                Failure::input(format!("\"run.{path}\" is a list of tables"))
-                    .hint(format!("name them: [vary.{path}] LABEL = {{ {path} = … }}")),
+            Value::Table(_) => refused(
+                format!("\"run.{path}\" is a list of tables"),
+                format!("name them: [vary.{path}] LABEL = {{ {path} = … }}"),
             ),
             one => Ok(stem(text(one))),
         }
@@ -559,10 +564,10 @@ impl Door {
     fn cell(&mut self, name: String, labels: Labels, mut run: Table) -> Result<Cell> {
         for key in ["out", "plot"] {
             if run.contains_key(key) {
-                return Err(Failure::input(format!(
-                    "\"run.{key}\": a study has its own directory"
-                ))
-                .hint("name it with -o"));
+                return refused(
+                    format!("\"run.{key}\": a study has its own directory"),
+                    "name it with -o",
+                );
             }
         }
         let seed = match run.remove("seed") {
@@ -667,10 +672,10 @@ fn fill(value: &mut Value, labels: &Labels) -> Result<()> {
                 .split_once('{')
                 .and_then(|(_, rest)| rest.split_once('}'))
             {
-                Some((unknown, _)) => Err(Failure::input(format!(
-                    "\"{text}\": there is no axis {unknown}"
-                ))
-                .hint("name it under [vary]")),
+                Some((unknown, _)) => refused(
+                    format!("\"{text}\": there is no axis {unknown}"),
+                    "name it under [vary]",
+                ),
                 None => Ok(()),
             }
         }

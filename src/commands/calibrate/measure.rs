@@ -4,7 +4,7 @@ use super::document::ShownCalibration;
 use super::fits::{fit_json, turn_on_json};
 use super::model_file::CalibrationNote;
 use crate::app::reading::note_report;
-use crate::app::{Context, Failure};
+use crate::app::{Context, Failure, refused};
 use crate::io::recordings::{FileReport, ReadOptions, Report};
 use crate::io::{curve_file, hash, recordings};
 use crate::report::CurvesFile;
@@ -81,12 +81,12 @@ impl EstimatorChoice {
     /// The estimators for so many recordings.
     fn estimators(self, recordings: usize) -> Result<Vec<Estimator>, Failure> {
         match self {
-            Self::One(estimator) if estimator.is_single() && recordings > 1 => {
-                let message = format!(
+            Self::One(estimator) if estimator.is_single() && recordings > 1 => refused(
+                format!(
                     "--estimator {estimator} takes one recording at a time; there are {recordings}"
-                );
-                Err(Failure::input(message).hint("awv, sr-awv and dr-awv take several"))
-            }
+                ),
+                "awv, sr-awv and dr-awv take several",
+            ),
             Self::One(estimator) => Ok(vec![estimator]),
             Self::All if recordings == 1 => Ok(vec![Estimator::Gmwm, Estimator::Rgmwm]),
             Self::All => Ok(vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv]),
@@ -219,8 +219,10 @@ pub(crate) fn measure(
         ..settings.clone()
     };
     if *pool == Some(Pool::Sensor) && settings.pool() == Pool::Axes {
-        let message = "--pool sensor: gmwm, rgmwm and avlr take one signal at a time";
-        return Err(Failure::input(message).hint("--pool axes"));
+        return refused(
+            "--pool sensor: gmwm, rgmwm and avlr take one signal at a time",
+            "--pool axes",
+        );
     }
     let mut measured: Vec<_> = looks.into_iter().flat_map(|look| look.replicates).collect();
     one_switching_on(&report, &mut measured);
@@ -370,8 +372,10 @@ fn distinct(looks: &[MeasuredRecording]) -> Result<(), Failure> {
         };
         if let Some(first) = looks[..i].iter().find(copy) {
             let (copy, first) = (&look.recording, &first.recording);
-            let message = format!("{copy} is a copy of {first}: it would count as two replicates");
-            return Err(Failure::input(message).hint("leave one of them out"));
+            return refused(
+                format!("{copy} is a copy of {first}: it would count as two replicates"),
+                "leave one of them out",
+            );
         }
     }
     Ok(())
@@ -472,11 +476,13 @@ pub(crate) fn read_curves(
     let path = || path.display().to_string();
     let rate_hz = match (named[0].rate_hz, rate_hz) {
         (Some(stated), Some(given)) => {
-            let message = format!(
-                "{}: the curve says its rate, {stated} Hz; --rate-hz {given} is another",
-                path()
+            return refused(
+                format!(
+                    "{}: the curve says its rate, {stated} Hz; --rate-hz {given} is another",
+                    path()
+                ),
+                "leave --rate-hz out: it is for a CSV curve",
             );
-            return Err(Failure::input(message).hint("leave --rate-hz out: it is for a CSV curve"));
         }
         (stated, given) => stated.or(given).ok_or_else(|| {
             Failure::input(format!(
@@ -501,13 +507,14 @@ pub(crate) fn read_curves(
             .iter()
             .any(|(s, e, _)| (*s, *e) == (scope, estimator))
         {
-            let message = format!(
-                "{}: there are two curves of {} for {estimator}",
-                path(),
-                scope.name()
+            return refused(
+                format!(
+                    "{}: there are two curves of {} for {estimator}",
+                    path(),
+                    scope.name()
+                ),
+                "calibrate the recordings themselves: it averages them",
             );
-            return Err(Failure::input(message)
-                .hint("calibrate the recordings themselves: it averages them"));
         }
         curves.push((scope, estimator, named.curve));
     }

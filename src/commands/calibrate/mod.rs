@@ -32,7 +32,7 @@ pub(crate) use model_file::CalibrationNote;
 
 use crate::app::inputs::{files, listed};
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Out, OutputFile, Result, refused};
 use crate::io::atomic::Written;
 use crate::io::draws_file::DrawsFile;
 use crate::io::hash;
@@ -183,11 +183,13 @@ impl Command for Calibrate {
         let (.., is_unsaid) = self.curves(path, &self.settings()?)?;
         match is_unsaid {
             false => Ok(()),
-            true => Err(Failure::input(format!(
-                "{}: the curve does not say of which sensor it is",
-                path.display()
-            ))
-            .hint("--axes accel or --axes gyro")),
+            true => refused(
+                format!(
+                    "{}: the curve does not say of which sensor it is",
+                    path.display()
+                ),
+                "--axes accel or --axes gyro",
+            ),
         }
     }
 
@@ -302,10 +304,9 @@ impl Calibrate {
             return Ok(chosen);
         }
         if self.tuning.fitted().is_some() {
-            let message =
-                "--scales FROM:TO with --estimator avlr: slopes are read where they are found";
-            return Err(
-                Failure::input(message).hint("--estimator gmwm fits the same curve over a range")
+            return refused(
+                "--scales FROM:TO with --estimator avlr: slopes are read where they are found",
+                "--estimator gmwm fits the same curve over a range",
             );
         }
         let without = match &chosen {
@@ -319,10 +320,10 @@ impl Calibrate {
         let Some(name) = without else {
             return Ok(chosen);
         };
-        let message =
-            format!("--estimator avlr: {name} has no slope of its own in the Allan deviation");
-        Err(Failure::input(message)
-                .hint("--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm"))
+        refused(
+            format!("--estimator avlr: {name} has no slope of its own in the Allan deviation"),
+            "--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm",
+        )
     }
 }
 

@@ -2,9 +2,9 @@
 
 use super::ChoiceMade;
 use super::ranking::{Mean, Placed};
-use crate::report::curves::{Dots, dot_chart};
-use nav_sim_document::{Axis, Chart, Colour, Document, Importance, Table, Tone, readable, window};
-use nav_sim_navigation::simulation::NEES_DOF;
+use nav_sim_document::{
+    Axis, Chart, Colour, Document, Importance, Panel, Series, Table, Tone, readable, window,
+};
 use serde_json::json;
 
 impl super::Ranking {
@@ -75,7 +75,7 @@ impl ChoiceMade {
             ("RMSE (m)", "rmse_m"),
         ];
         document.lead(Table::of(&json, "/candidates/*", &columns));
-        document.charts(&self.charts(), CAPTION);
+        document.chart(&self.chart(), CAPTION);
         let columns = [
             ("candidate", "candidate"),
             ("RMSE (m)", "rmse_m"),
@@ -132,63 +132,45 @@ impl ChoiceMade {
         }
     }
 
-    /// Log scores, NEES, and errors beside what is believed of them.
-    fn charts(&self) -> [Chart; 3] {
-        let placed = &self.ranking.candidates;
-        let dots = |name, colour, value: &dyn Fn(&Placed) -> Mean| {
-            let point = |p: &Placed| {
-                let Mean {
-                    value,
-                    ci95: (low, high),
-                } = value(p);
-                [value, low, high]
-            };
-            let points = placed.iter().map(point).collect();
-            Dots {
-                name,
-                colour,
-                points,
-            }
+    /// Log scores against the best, a row a candidate.
+    fn chart(&self) -> Chart {
+        let placed = self.ranking.candidates.iter().rev().enumerate();
+        let (mut names, mut points, mut bars) = (Vec::new(), Vec::new(), Vec::new());
+        for (
+            row,
+            Placed {
+                candidate,
+                difference,
+                ..
+            },
+        ) in placed
+        {
+            let Mean {
+                value,
+                ci95: (low, high),
+            } = difference.log_score;
+            let height = row as f64;
+            names.push(candidate.clone());
+            points.push((value, height, f64::NAN));
+            bars.extend([(low, height), (high, height), (f64::NAN, f64::NAN)]);
+        }
+        let rows = names.len() as f64;
+        let best = vec![(0.0, -0.5), (0.0, rows - 0.5)];
+        let series = vec![
+            Series::dashed("best", Colour::RIGHT, best),
+            Series::line("", Colour::BELIEVED, bars),
+            Series::points("", Colour::BELIEVED, points),
+        ];
+        let panel = Panel {
+            height: 0.1 * (rows + 1.0),
+            ..Panel::new(Axis::names(names), series)
         };
-        let chart = |title, axis, level, dots: &[Dots<'_>]| {
-            dot_chart(
-                title,
-                axis,
-                placed.iter().map(|p| p.candidate.clone()),
-                level,
-                dots,
-            )
-        };
-        let alone = |value: f64| Mean {
-            value,
-            ci95: (f64::NAN, f64::NAN),
-        };
-        let scores = dots("", Colour::BELIEVED, &|p| p.difference.log_score);
-        let nees = dots("NEES", Colour::Ink, &|p| p.nees);
-        let real = dots("true RMSE", Colour::REAL, &|p| alone(p.rmse_m));
-        let believed = dots("believed", Colour::BELIEVED, &|p| alone(p.believed_m));
-        let (best, right) = (Some(("best", 0.0)), Some(("right", NEES_DOF as f64)));
-        [
-            chart(
-                "Log score against the best",
-                Axis::linear("nats"),
-                best,
-                &[scores],
-            ),
-            chart(
-                "Consistency at the ends of outages",
-                Axis::log("NEES"),
-                right,
-                &[nees],
-            ),
-            chart(
-                "Accuracy",
-                Axis::log("horizontal error (m)"),
-                None,
-                &[real, believed],
-            ),
-        ]
+        Chart::new(
+            "Log score against the best",
+            Axis::linear("nats"),
+            vec![panel],
+        )
     }
 }
 
-const CAPTION: &str = "Log score: the mean log density of the true errors under the filter's covariance, less that of the best. NEES above 9: overconfident. Bars: 95 % intervals over recordings.";
+const CAPTION: &str = "Log score: the mean log density of the true errors under the filter's covariance, less that of the best. Bars: 95 % intervals over recordings.";

@@ -13,7 +13,7 @@ pub mod ranking;
 
 use crate::app::inputs::{self, SettingsArgs, files, listed};
 use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Out, OutputFile, Result, refused};
 use crate::commands::calibrate::{
     Calibration, CalibrationNote, CalibrationOptions, ESTIMATORS, EstimatorChoice, Measured,
     measure, without_warm_up,
@@ -161,8 +161,10 @@ impl Command for Choose {
         let seed = context.seed_or(scenario.run.seed);
         let outages = inputs::placed(&scenario, &trajectory, seed, context)?;
         if outages.is_empty() {
-            let message = "there is no outage, and candidates are judged at the ends of outages";
-            return Err(Failure::input(message).hint("give one with --outage START:END"));
+            return refused(
+                "there is no outage, and candidates are judged at the ends of outages",
+                "give one with --outage START:END",
+            );
         }
         // the candidates have estimators and models of their own
         let options = CalibrationOptions {
@@ -197,7 +199,7 @@ impl Command for Choose {
                 files.len()
             );
             let hint = "each recording is a file; nav-sim calibrate takes fewer";
-            return Err(Failure::input(message).hint(hint));
+            return refused(message, hint);
         }
         let units = units(&measured);
         let samples: Vec<usize> = units.iter().map(samples_in).collect();
@@ -290,10 +292,10 @@ impl Choose {
         if candidates.iter().any(Candidate::is_eligible) {
             return Ok(candidates);
         }
-        Err(Failure::input(
+        refused(
             "no candidate uses all recordings: gmwm, rgmwm and avlr take one at a time",
+            "add awv, sr-awv or dr-awv to --estimator",
         )
-        .hint("add awv, sr-awv or dr-awv to --estimator"))
     }
 }
 

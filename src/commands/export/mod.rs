@@ -10,7 +10,7 @@ pub use targets::Target;
 pub(crate) use words::Quantity;
 
 use crate::app::inputs::files;
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Refuse, Result};
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Refuse, Result, refused};
 use crate::io::atomic::Written;
 use crate::io::model_file;
 use crate::io::model_file::ModelFile;
@@ -260,10 +260,12 @@ impl Export {
             && (accel.t_corr_s / gyro.t_corr_s - 1.0).abs() > 1e-9
         {
             let (name, accel_s, gyro_s) = (target.name, accel.t_corr_s, gyro.t_corr_s);
-            return Err(Failure::input(format!(
-                "{name} has one correlation time, the model's sensors have {accel_s:.3} s and {gyro_s:.3} s"
-            ))
-            .hint(MATCHED));
+            return refused(
+                format!(
+                    "{name} has one correlation time, the model's sensors have {accel_s:.3} s and {gyro_s:.3} s"
+                ),
+                MATCHED,
+            );
         }
         Ok(Self {
             target,
@@ -294,10 +296,10 @@ fn check(
 ) -> Result<(), Failure> {
     let (name, sensor) = (target.name, sensor.name());
     if axes.is_empty() {
-        return Err(Failure::input(format!(
-            "the model has no {sensor}, and {name} needs both sensors"
-        ))
-        .hint("calibrate recordings of both sensors, or write the other one's section by hand"));
+        return refused(
+            format!("the model has no {sensor}, and {name} needs both sensors"),
+            "calibrate recordings of both sensors, or write the other one's section by hand",
+        );
     }
     let has = |kind: fn(&Process) -> bool| axes.iter().any(|a| a.processes.iter().any(kind));
     let walks = has(|p| matches!(p, Process::RandomWalk(_)));
@@ -308,10 +310,10 @@ fn check(
         _ => walks.then_some("random walk"),
     };
     match lacking {
-        Some(bias) if policy == Policy::Strict => {
-            let message = format!("{name} has no {bias}, and the model's {sensor} has one");
-            Err(Failure::input(message).hint(MATCHED))
-        }
+        Some(bias) if policy == Policy::Strict => refused(
+            format!("{name} has no {bias}, and the model's {sensor} has one"),
+            MATCHED,
+        ),
         _ => Ok(()),
     }
 }

@@ -4,7 +4,7 @@ mod document;
 
 use crate::app::inputs::files;
 use crate::app::{
-    Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result, inputs,
+    Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result, inputs, refused,
 };
 use crate::commands::run::reduction_of;
 use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
@@ -631,8 +631,10 @@ impl Drive {
         let asked = (self.reference.as_ref(), self.request.gnss_correlation);
         let weighed = fuse_correlated(&recorded, &belief, &start, &settings, asked)?;
         if self.reference.is_some() && weighed.solution.rows.iter().all(|row| row.error.is_none()) {
-            let message = "the reference and the solution have no time in common";
-            return Err(Failure::input(message).hint("both need one clock"));
+            return refused(
+                "the reference and the solution have no time in common",
+                "both need one clock",
+            );
         }
         doubt_heading(&weighed.solution, &settings.outages)
             .iter()
@@ -743,15 +745,16 @@ impl Drive {
         let is_within =
             |w: &WheelSpeed| span.is_some_and(|(a, b)| (a.t_s..=b.t_s).contains(&w.t_s));
         if !self.wheel.is_empty() && !self.wheel.iter().any(is_within) {
-            let message = "the wheel and the IMU have no time in common";
-            return Err(Failure::input(message).hint("both need one clock"));
+            return refused(
+                "the wheel and the IMU have no time in common",
+                "both need one clock",
+            );
         }
         match wheel_ratio(recorded, &self.wheel, outages) {
-            Some(ratio) if !RATIO.contains(&ratio) => {
-                let message = format!("the wheel reads {ratio:.2} times the speed of the fixes");
-                Err(Failure::input(message)
-                    .hint("check the unit in the header: _m_s, _km_h or _mph"))
-            }
+            Some(ratio) if !RATIO.contains(&ratio) => refused(
+                format!("the wheel reads {ratio:.2} times the speed of the fixes"),
+                "check the unit in the header: _m_s, _km_h or _mph",
+            ),
             _ => Ok(()),
         }
     }

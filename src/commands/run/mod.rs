@@ -1,7 +1,9 @@
 //! `nav-sim run`: the main job.
 
 use crate::app::inputs::{self, FilterArgs, SettingsArgs, files};
-use crate::app::{Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result};
+use crate::app::{
+    Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result, refused,
+};
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::ModelFile;
 use crate::io::scenario_file;
@@ -204,9 +206,10 @@ impl Run {
             .find(|r| outages.is_empty() && r.needs_outage());
         if let Some(wanting) = wanting {
             let name = wanting.name();
-            let message =
-                format!("--require {wanting}: {name} is of the ends of outages, and there is none");
-            return Err(Failure::input(message).hint("give an outage with --outage START:END"));
+            return refused(
+                format!("--require {wanting}: {name} is of the ends of outages, and there is none"),
+                "give an outage with --outage START:END",
+            );
         }
         if scenario.run.method == Method::Lincov && self.runs.is_some() {
             context.warn(
@@ -252,10 +255,10 @@ impl Run {
     fn drawn(&self, file: &ModelFile, scenario: &Scenario, seed: u64) -> Result<Vec<Model>> {
         let path = self.truth.as_ref().unwrap_or(&self.model).display();
         let Some(spread) = &file.spread else {
-            let message = format!("{path}: no [spread] to draw parameters from");
-            return Err(Failure::input(message).hint(
+            return refused(
+                format!("{path}: no [spread] to draw parameters from"),
                 "nav-sim calibrate writes one where three recordings or more differ, or leave --spread out",
-            ));
+            );
         };
         let of_run = |run| {
             let drawn = spread.draw(&file.model, seed, run);
@@ -690,14 +693,14 @@ fn with_runs(
 /// Refuses what covariance analysis cannot do.
 fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<()> {
     match inputs.truth {
-        TrueImu::Recordings(_) => Err(Failure::input(
+        TrueImu::Recordings(_) => refused(
             "covariance analysis needs a model of what makes the errors; static recordings have none",
-        )
-        .hint("calibrate the recordings and give the model with --truth, or use --method monte-carlo")),
-        TrueImu::Drawn(_) => Err(Failure::input(
+            "calibrate the recordings and give the model with --truth, or use --method monte-carlo",
+        ),
+        TrueImu::Drawn(_) => refused(
             "covariance analysis is of one truth; --spread draws one for each run",
-        )
-        .hint("leave --spread out, or use --method monte-carlo")),
+            "leave --spread out, or use --method monte-carlo",
+        ),
         TrueImu::AsBelieved | TrueImu::Model(_) => scenario
             .analysable()
             .refuse()
