@@ -7,16 +7,17 @@ use crate::commands::calibrate::{visit, without_warm_up};
 use crate::io::atomic::Written;
 use crate::io::recordings::ReadOptions;
 use crate::parse;
+use crate::report::csv::{csv, flat};
 use crate::report::curves::{Band, CONFIDENCE, SignalCurves, SignalsFile, recording_names};
 use crate::report::curves::{band, curve, scale_axis, sensor_name, variance_axis};
 use crate::report::in_order;
-use crate::report::json;
 use nav_sim_calibration::{Replicate, replicates};
 use nav_sim_calibration::{duration, median};
-use nav_sim_document::{Cell, Chart, Colour, Document, Panel, Series, Table, Tone, shortest};
+use nav_sim_document::{Cell, Chart, Colour, Document, Panel, Series, Table, Tone};
 use nav_sim_signal::imu::{Channel, Recording};
 use nav_sim_signal::wavelet::{WaveletError, haar, interval};
 use rayon::prelude::*;
+use serde_json::json;
 use std::path::PathBuf;
 
 /// Compute wavelet variances (classical, robust) and Allan deviations of static recordings
@@ -147,7 +148,7 @@ impl Answer for SignalsFile {
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {
-        vec![OutputFile::whole("", json(self))]
+        vec![OutputFile::whole("", crate::report::json(self))]
     }
 
     fn document(&self) -> Document {
@@ -257,45 +258,26 @@ fn digest(file: &SignalsFile) -> Table {
 
 /// All scales of all signals as CSV.
 fn signals_csv(file: &SignalsFile) -> String {
-    let mut table = Table::new([
-        "file",
-        "sensor",
-        "axis",
-        "tau_s",
-        "edof",
-        "classical_wv",
-        "classical_ci_low",
-        "classical_ci_high",
-        "robust_wv",
-        "robust_ci_low",
-        "robust_ci_high",
-        "robust_status",
-        "allan_tau_s",
-        "allan_deviation",
-    ]);
-    for s in &file.signals {
-        for (i, deviation) in (0..).map_while(|i| Some((i, s.allan_deviation(i)?))) {
-            let band = |b: &Band| {
-                [b.wv[i], b.ci_low[i], b.ci_high[i]]
-                    .map(shortest)
-                    .map(Cell::from)
-            };
-            let cells = [s.file.as_str(), s.sensor.name(), s.axis.name()].map(Cell::from);
-            let scale = [s.tau_s[i], s.edof[i]].map(shortest).map(Cell::from);
-            let allan = [0.5 * s.tau_s[i], deviation].map(shortest).map(Cell::from);
-            let status = Cell::from(s.robust.status[i].as_str());
-            let bands = band(&s.classical).into_iter().chain(band(&s.robust));
-            table.row(
-                cells
-                    .into_iter()
-                    .chain(scale)
-                    .chain(bands)
-                    .chain([status])
-                    .chain(allan),
-            );
-        }
-    }
-    table.csv()
+    let of_signal = |s: &SignalCurves| {
+        let row = |i: usize| {
+            let band =
+                |b: &Band| json!({ "wv": b.wv[i], "ci_low": b.ci_low[i], "ci_high": b.ci_high[i] });
+            flat(&json!({
+                "file": s.file,
+                "sensor": s.sensor,
+                "axis": s.axis,
+                "tau_s": s.tau_s[i],
+                "edof": s.edof[i],
+                "classical": band(&s.classical),
+                "robust": band(&s.robust),
+                "robust_status": s.robust.status[i],
+                "allan_tau_s": 0.5 * s.tau_s[i],
+                "allan_deviation": s.allan_deviation(i),
+            }))
+        };
+        (0..s.tau_s.len()).map(row).collect::<Vec<_>>()
+    };
+    csv(&file.signals.iter().flat_map(of_signal).collect::<Vec<_>>())
 }
 
 fn signals_of(file: &SignalsFile, channel: Channel) -> Vec<&SignalCurves> {

@@ -3,7 +3,7 @@
 use super::fits::{interval_of, intervals};
 use crate::commands::export::Quantity;
 use crate::report::curves::{CurvesFile, FittedCurve, recording_names};
-use crate::report::curves::{band, curve, scale_axis, sensor_name, variance_axis};
+use crate::report::curves::{band, curve, sensor_name};
 use crate::report::in_order;
 use nav_sim_calibration::{
     Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE,
@@ -74,12 +74,8 @@ impl ShownCalibration<'_> {
         for (index, (outcome, fitted)) in self.outcomes.iter().zip(&self.curves.curves).enumerate()
         {
             document.section(&format!("{} · {}", group_name(fitted), outcome.spec));
-            let diagnoses = self.diagnoses;
-            document.chart(
-                &allan(fitted, outcome, diagnoses, self.settings.rate_hz),
-                &format!("Allan deviation: recordings, model, and what is exported: {policy}. N is read at 1 s, K at 3 s, 0.664 B at the floor."),
-            );
-            document.chart(&variance(fitted, diagnoses), CAPTION);
+            let chart = chart(fitted, outcome, self.diagnoses, self.settings.rate_hz);
+            document.chart(&chart, CAPTION);
             document.table(&parameters(outcome));
             if outcome.ranking.is_some() {
                 document.heading("Candidate models");
@@ -253,8 +249,9 @@ fn parameters(outcome: &Outcome) -> Table {
 
 // The charts of a calibration: wavelet variance and model, and what is exported on the Allan deviation.
 
-/// Caption of [`variance`].
-const CAPTION: &str = "Wavelet variance with its 95 % band, the recordings, the model and its processes; below: data over model.";
+/// Caption of [`chart`].
+const CAPTION: &str = "Allan deviation with its 95 % band, the recordings, the model and its processes, and what is exported: N is \
+     read at 1 s, K at 3 s, 0.664 B at the floor; below: wavelet variance, data over model.";
 
 /// `Accelerometer x`, or `Gyroscope, all axes`.
 fn group_name(fitted: &FittedCurve) -> String {
@@ -265,8 +262,8 @@ fn group_name(fitted: &FittedCurve) -> String {
     }
 }
 
-/// The wavelet variance, and its ratio to that of the model.
-fn variance(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
+/// The Allan deviation, with N, B and K where they are read off it, and the ratio of the wavelet variance to that of the model.
+fn chart(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_hz: f64) -> Chart {
     let FittedCurve {
         tau_s,
         wv,
@@ -275,107 +272,57 @@ fn variance(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
         implied,
         ..
     } = fitted;
-    let ratio = |values: &[f64]| -> Vec<f64> {
-        values
-            .iter()
-            .zip(implied)
-            .map(|(nu, model)| nu / model)
-            .collect()
+    // a scale is two averages long, the wavelet variance half the Allan variance
+    let averages_s: Vec<f64> = tau_s.iter().map(|tau_s| 0.5 * tau_s).collect();
+    let allan = |wv: &[f64]| wv.iter().map(|nu| (2.0 * nu).sqrt()).collect::<Vec<f64>>();
+    let ratio = |wv: &[f64]| -> Vec<f64> {
+        let both = wv.iter().zip(implied);
+        both.map(|(nu, model)| nu / model).collect()
     };
-    let data = |wv: &[f64], low: &[f64], high: &[f64]| {
+    let data = |[mid, low, high]: [Vec<f64>; 3]| {
         [
-            Series::new("data, 95 %", Colour::Ink, band(tau_s, low, high)),
-            Series::line("data, 95 %", Colour::Ink, curve(tau_s, wv)),
+            Series::new("data, 95 %", Colour::Ink, band(&averages_s, &low, &high)),
+            Series::line("data, 95 %", Colour::Ink, curve(&averages_s, &mid)),
         ]
     };
-    let mut upper = recordings(fitted, diagnoses, |tau, nu| (tau, nu));
-    let parts = fitted
-        .processes
-        .iter()
-        .filter(|(_, wv)| wv.iter().any(|nu| *nu > 0.0));
+    let line = |wv: &[f64]| curve(&averages_s, &allan(wv));
+    let mut upper = recordings(fitted, diagnoses, line);
+    let parts = fitted.processes.iter();
+    let parts = parts.filter(|(_, wv)| wv.iter().any(|nu| *nu > 0.0));
+    let hues = PROCESSES.into_iter().cycle();
     upper.extend(
         parts
-            .zip(PROCESSES.into_iter().cycle())
-            .map(|((name, wv), hue)| Series::dashed(name, Colour::Hue(hue), curve(tau_s, wv))),
+            .zip(hues)
+            .map(|((name, wv), hue)| Series::dashed(name, Colour::Hue(hue), line(wv))),
     );
-    upper.extend(data(wv, ci_low, ci_high));
-    upper.push(Series::line("model", Colour::REAL, curve(tau_s, implied)));
-    let mut lower = data(&ratio(wv), &ratio(ci_low), &ratio(ci_high)).to_vec();
+    upper.extend(data([wv, ci_low, ci_high].map(|wv| allan(wv))));
+    upper.push(Series::line("model", Colour::REAL, line(implied)));
+    if let Some(practical) = outcome.practical(rate_hz) {
+        let (pair, minimum) = (practical.parameters.walk, practical.parameters.minimum);
+        let k = practical.walk_is_observed();
+        let read = [
+            (pair.density > 0.0).then_some(("N", 1.0, pair.density)),
+            k.then_some(("K", 3.0, pair.walk)),
+            minimum.map(|m| ("0.664 B", m.tau_s, m.deviation)),
+        ];
+        let reading = |(name, x, y)| Series::new(name, Colour::RIGHT, Mark::Reading(x, y));
+        upper.extend(read.into_iter().flatten().map(reading));
+    }
+    let mut lower = data([wv, ci_low, ci_high].map(|wv| ratio(wv))).to_vec();
     lower.push(Series::new("model", Colour::REAL, Mark::Level(1.0)));
+    let deviation = format!("Allan deviation ({})", fitted.sensor.unit());
     let ratios = ChartAxis::log("data / model").including(0.8, 1.25);
-    let panels = vec![
-        Panel {
-            height: 1.4,
-            ..Panel::new(variance_axis(fitted.sensor), upper)
-        },
-        Panel {
-            height: 0.5,
-            ..Panel::new(ratios, lower)
-        },
+    let panels = [
+        (1.4, ChartAxis::log(&deviation), upper),
+        (0.5, ratios, lower),
     ];
+    let panels = panels.map(|(height, axis, series)| Panel {
+        height,
+        ..Panel::new(axis, series)
+    });
     let (group, estimator) = (group_name(fitted), fitted.estimator.to_uppercase());
-    let title = format!("Wavelet variance: {group}, {estimator}");
-    Chart::new(&title, scale_axis(), panels).in_group("scales")
-}
-
-/// Allan deviation at a scale: of averages half as long, √(2 nu).
-fn deviation(tau_s: f64, nu: f64) -> (f64, f64) {
-    (0.5 * tau_s, (2.0 * nu).sqrt())
-}
-
-/// The Allan deviation with N, B and K, where they are read off it.
-fn allan(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_hz: f64) -> Chart {
-    let of = |wv: &[f64]| -> Vec<(f64, f64)> {
-        fitted
-            .tau_s
-            .iter()
-            .zip(wv)
-            .map(|(t, nu)| deviation(*t, *nu))
-            .collect()
-    };
-    let mut series = recordings(fitted, diagnoses, deviation);
-    if series.is_empty() {
-        series.push(Series::line("data", Colour::Ink, of(&fitted.wv)));
-    }
-    let model = of(&fitted.implied);
-    series.push(Series::line("model", Colour::REAL, model.clone()));
-    series.extend(exported(outcome, &model, rate_hz));
-    let y = ChartAxis::log(&format!("Allan deviation ({})", fitted.sensor.unit()));
-    let title = format!("Allan deviation: {}", group_name(fitted));
-    Chart::new(
-        &title,
-        ChartAxis::log("averaging time (s)"),
-        vec![Panel::new(y, series)],
-    )
-}
-
-/// Lines of N and K over the times of a model, with the points where they are read, and the floor.
-fn exported(outcome: &Outcome, model: &[(f64, f64)], rate_hz: f64) -> Vec<Series> {
-    let Some(practical) = outcome.practical(rate_hz) else {
-        return Vec::new();
-    };
-    let (pair, minimum) = (practical.parameters.walk, practical.parameters.minimum);
-    // Beyond the model's own values the lines would only stretch the axis.
-    let lowest = 0.3 * model.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
-    let highest = 1.5 * model.iter().map(|p| p.1).fold(0.0, f64::max);
-    let line = |name, colour, value: &dyn Fn(f64) -> f64| {
-        let points = model.iter().map(|(t, _)| (*t, value(*t)));
-        let shown = points.filter(|(_, y)| (lowest..highest).contains(y));
-        Series::dashed(name, colour, shown.collect())
-    };
-    let reading = |name, colour, x, y| Series::new(name, colour, Mark::Reading(x, y));
-    let [n, k, b] = [0, 2, 3].map(Colour::Hue);
-    let mut series = Vec::new();
-    if pair.density > 0.0 {
-        series.push(line("N/√τ", n, &|t| pair.density / t.sqrt()));
-        series.push(reading("N", n, 1.0, pair.density));
-    }
-    if practical.walk_is_observed() {
-        series.push(line("K√(τ/3)", k, &|t| pair.walk * (t / 3.0).sqrt()));
-        series.push(reading("K", k, 3.0, pair.walk));
-    }
-    series.extend(minimum.map(|m| reading("0.664 B", b, m.tau_s, m.deviation)));
-    series
+    let title = format!("Allan deviation: {group}, {estimator}");
+    Chart::new(&title, ChartAxis::log("averaging time (s)"), panels.into()).in_group("scales")
 }
 
 /// Hues of processes: those that neither model nor recordings have.
@@ -387,7 +334,7 @@ const ABNORMAL: [usize; 2] = [6, 7];
 fn recordings(
     fitted: &FittedCurve,
     diagnoses: &[Diagnosis],
-    point: impl Fn(f64, f64) -> (f64, f64),
+    line: impl Fn(&[f64]) -> Vec<(f64, f64)>,
 ) -> Vec<Series> {
     if fitted.replicates.len() < 2 {
         return Vec::new();
@@ -403,8 +350,7 @@ fn recordings(
         .iter()
         .zip(names)
         .map(|(replicate, name)| {
-            let points = fitted.tau_s.iter().zip(&replicate.wv);
-            let points = points.map(|(t, nu)| point(*t, *nu)).collect();
+            let points = line(&replicate.wv);
             match abnormal.iter().position(|file| *file == replicate.file) {
                 None => Series::thin("recordings", Colour::Soft, points),
                 Some(k) => {
