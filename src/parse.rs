@@ -70,7 +70,7 @@ pub(crate) fn seconds_range(text: &str) -> Result<(f64, f64), String> {
 }
 
 /// Numbers between commas.
-fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+pub(crate) fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     let parsed: Option<Vec<f64>> = text
         .split(',')
         .map(|x| x.trim().parse().ok().filter(|x: &f64| x.is_finite()))

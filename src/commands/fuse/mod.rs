@@ -10,6 +10,7 @@ use crate::commands::run::reduction_of;
 use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
 use crate::io::model_file::ModelFile;
 use crate::io::trajectory_file::{self, load_reference};
+use crate::parse::{self, numbers};
 use crate::report::json;
 use glam::{DMat3, DQuat, DVec3};
 use nav_sim_document::{Document, Importance, seconds, shortest, window};
@@ -159,7 +160,7 @@ pub struct Fuse {
     pub filter: FilterStates,
     /// Constant biases that the filter expects beside the model: standard deviations, accelerometer in m/s²,
     /// gyroscope in rad/s
-    #[arg(long, value_name = "ACCEL,GYRO", value_parser = at_least_zero)]
+    #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair)]
     pub turn_on_bias: Option<[f64; 2]>,
     /// Standard deviations where the GNSS file states none: of the position in m, and after a colon of the velocity in
     /// m/s; each one number or north,east,down. x3 or x3:2: times what it states
@@ -270,7 +271,7 @@ impl FromStr for MountingChoice {
         }
         // nobody mounts by less, and what a drive shows is known no better
         let (angles, sigma) = text.split_once(':').unwrap_or((text, "1,1,1"));
-        match (list(angles), list(sigma)) {
+        match (numbers(angles), numbers(sigma)) {
             (Some([roll, pitch, yaw]), Some(sigma_deg))
                 if sigma_deg.iter().all(|s: &f64| (0.0..=MAX_SIGMA_DEG).contains(s)) =>
             {
@@ -289,12 +290,6 @@ impl FromStr for MountingChoice {
 /// Standard deviations of fixes where the file states none, and factors of what it states, of position and of velocity.
 pub type GnssSigma = (Option<FixSigma>, [f64; 2]);
 
-/// Finite numbers between commas.
-fn list<const N: usize>(text: &str) -> Option<[f64; N]> {
-    let all: Option<Vec<f64>> = text.split(',').map(|x| number(x.trim()).ok()).collect();
-    all?.try_into().ok()
-}
-
 fn number(text: &str) -> Result<f64, &'static str> {
     text.parse()
         .ok()
@@ -303,16 +298,11 @@ fn number(text: &str) -> Result<f64, &'static str> {
 }
 
 fn arm(text: &str) -> Result<[f64; 3], String> {
-    let arm: [f64; 3] = list(text).ok_or("expected 3 numbers between commas")?;
+    let arm: [f64; 3] = numbers(text).ok_or("expected 3 numbers between commas")?;
     match arm.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
         true => Ok(arm),
         false => Err(format!("more than {MAX_LEVER_ARM_M} m")),
     }
-}
-
-fn at_least_zero(text: &str) -> Result<[f64; 2], &'static str> {
-    let pair = list(text).filter(|pair| pair.iter().all(|x| *x >= 0.0));
-    pair.ok_or("expected two numbers ≥ 0, such as 0.1,0.002")
 }
 
 fn correlation(text: &str) -> Result<Correlation, &'static str> {
@@ -341,7 +331,7 @@ fn gnss_sigma(text: &str) -> Result<GnssSigma, &'static str> {
 /// `POS` or `N,E,D` in metres, then `:VEL` or `:N,E,D` in m/s.
 fn fix_sigma(text: &str) -> Result<FixSigma, &'static str> {
     let three = |part: &str| {
-        let three = list::<3>(part).or(list::<1>(part).map(|[all]| [all; 3]));
+        let three = numbers::<3>(part).or(numbers::<1>(part).map(|[all]| [all; 3]));
         three.filter(|sigma| sigma.iter().all(|x| *x > 0.0)).ok_or(
             "expected metres above 0, one or three (north, east, down), and after a colon m/s: 2,2,4:0.1",
         )

@@ -50,7 +50,7 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     notes(summary, answer, &mut page);
     page.facts(&assumptions(summary, answer));
     page.chart(
-        &track_map(&answer.track, "Reference trajectory", &windows),
+        &track_map("reference", &answer.track, "Reference trajectory", &windows),
         "",
     );
     page.chart(&horizontal(epochs, summary), HORIZONTAL);
