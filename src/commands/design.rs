@@ -46,7 +46,7 @@ pub struct Design {
     #[arg(long, value_name = "HOURS", value_parser = parse::positive)]
     pub hours: Option<f64>,
     /// How they will be calibrated
-    #[arg(long, value_name = "ESTIMATOR", value_parser = parse::words::<Estimator>(AVERAGES), default_value_t)]
+    #[arg(long, value_name = "ESTIMATOR", value_parser = parse::one_of::<Estimator>(AVERAGES), default_value_t)]
     pub estimator: Estimator,
     /// Draws of the bootstrap
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(40..=10_000))]
@@ -65,7 +65,7 @@ pub struct Design {
 }
 
 /// The estimators of several recordings.
-const AVERAGES: &[(&str, &str)] = ESTIMATORS.split_at(3).0;
+const AVERAGES: &[&str] = ESTIMATORS.split_at(3).0;
 
 /// Longest recording that is planned (h): a year.
 const LONGEST_H: f64 = 8766.0;

@@ -37,21 +37,11 @@ pub struct Wv {
     /// Scales and robustness.
     #[command(flatten)]
     pub tuning: VarianceRequest,
-    /// Where the degrees of freedom of the intervals come from
-    #[arg(long, value_parser = parse::words::<Intervals>(&INTERVALS), default_value_t, help_heading = "Wavelet variance")]
+    /// Where the degrees of freedom of the intervals come from: eta3, the field's usual ones, conservative beyond the
+    /// first scale; large-sample, the autocovariance of the coefficients: with the stated coverage
+    #[arg(long, value_parser = parse::one_of::<Intervals>(&Intervals::NAMES), default_value_t, help_heading = "Wavelet variance")]
     pub intervals: Intervals,
 }
-
-const INTERVALS: [(&str, &str); 2] = [
-    (
-        Intervals::Eta3.name(),
-        "The field's usual ones, conservative beyond the first scale",
-    ),
-    (
-        Intervals::LargeSample.name(),
-        "From the autocovariance of the coefficients: with the stated coverage",
-    ),
-];
 
 impl Command for Wv {
     type Answer = SignalsFile;

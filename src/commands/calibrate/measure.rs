@@ -19,7 +19,6 @@ use nav_sim_signal::noise::Model;
 use nav_sim_signal::wavelet::{Curve, Tuning, default_levels};
 use rayon::prelude::*;
 use serde_json::json;
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -30,21 +29,6 @@ pub enum EstimatorChoice {
     One(Estimator),
     /// The three averages; of a single recording GMWM and RGMWM.
     All,
-}
-
-impl Default for EstimatorChoice {
-    fn default() -> Self {
-        Self::One(Estimator::default())
-    }
-}
-
-impl fmt::Display for EstimatorChoice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::One(estimator) => estimator.fmt(f),
-            Self::All => f.write_str("all"),
-        }
-    }
 }
 
 impl FromStr for EstimatorChoice {
@@ -119,7 +103,7 @@ impl Default for CalibrationOptions {
             reading: ReadOptions::default(),
             skip_warm_up: false,
             scales: None,
-            estimators: EstimatorChoice::default(),
+            estimators: EstimatorChoice::One(Estimator::default()),
             pool: None,
             settings: Settings::default(),
             bootstrap: Some(Bootstrap::default()),

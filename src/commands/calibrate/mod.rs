@@ -76,8 +76,9 @@ pub struct Calibrate {
     #[arg(long, value_name = "FILE", conflicts_with_all = OF_RECORDINGS)]
     pub curve: Option<PathBuf>,
     /// Which curve is fitted: an average over the replicates (awv; sr-awv, robust to outliers; dr-awv, robust to
-    /// abnormal replicates too), or the curve of a single recording (gmwm, rgmwm; avlr: slopes of its Allan deviation)
-    #[arg(long, value_parser = parse::words::<EstimatorChoice>(&ESTIMATORS), default_value_t)]
+    /// abnormal replicates too), or the curve of a single recording (gmwm, classical; rgmwm, robust; avlr: slopes of its
+    /// Allan deviation, read off one by one: WN, QN, RW, DR); all: the three averages (of one recording: gmwm and rgmwm)
+    #[arg(long, value_parser = parse::one_of::<EstimatorChoice>(&ESTIMATORS), default_value = "dr-awv")]
     pub estimator: EstimatorChoice,
     /// Sum of WN QN AR1 GM MA1 FN RW DR such as 2*AR1+RW+WN+QN, N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN, or auto: the
     /// simplest sum of WN QN RW DR and up to two AR1 that fits as well as the best one, with the reasons
@@ -86,11 +87,13 @@ pub struct Calibrate {
     /// Replicates that dr-awv drops at each end of each scale: a number, or a percentage of all
     #[arg(long, value_name = "A", default_value_t)]
     pub trim: Trim,
-    /// Weight of a scale in the fit
-    #[arg(long, value_parser = parse::words::<Weighting>(&WEIGHTINGS), default_value_t)]
+    /// Weight of a scale in the fit: model, the inverse variance by the fitted model, where a scale far above it weighs
+    /// less; edof, the same with the observed wv: the convention of the literature, low where wv is low by chance
+    #[arg(long, value_parser = parse::one_of::<Weighting>(&Weighting::NAMES), default_value_t)]
     pub weighting: Weighting,
-    /// Which signals are replicates of one another (default: sensor; axes for gmwm, rgmwm and avlr)
-    #[arg(long, value_parser = parse::words::<Pool>(&POOLS))]
+    /// Which signals are replicates of one another: axes, those of one axis (a model per axis), or sensor, those of all
+    /// axes of a sensor (default: sensor; axes for gmwm, rgmwm and avlr)
+    #[arg(long, value_parser = parse::one_of::<Pool>(&Pool::NAMES))]
     pub pool: Option<Pool>,
     /// Draws behind intervals and goodness of fit (0: neither), fewer for tests
     #[arg(long, value_name = "B", hide = true, default_value_t = Bootstrap::DRAWS as u32, value_parser = clap::value_parser!(u32).range(0..=100_000))]
@@ -107,55 +110,8 @@ pub struct Calibrate {
 const OF_RECORDINGS: [&str; 6] = ["estimator", "trim", "pool", "skip_s", "gaps", "efficiency"];
 
 /// Those of several recordings first, then those of one.
-pub(crate) const ESTIMATORS: [(&str, &str); 7] = [
-    (
-        Estimator::Awv.name(),
-        "Average of the classical wavelet variances",
-    ),
-    (
-        Estimator::SrAwv.name(),
-        "Average of the robust wavelet variances",
-    ),
-    (
-        Estimator::DrAwv.name(),
-        "Trimmed average of the robust wavelet variances",
-    ),
-    (
-        Estimator::Gmwm.name(),
-        "Classical wavelet variance of one recording",
-    ),
-    (
-        Estimator::Rgmwm.name(),
-        "Robust wavelet variance of one recording",
-    ),
-    (
-        Estimator::Avlr.name(),
-        "Slopes of the Allan deviation of one recording, read off one by one: WN, QN, RW, DR",
-    ),
-    (
-        "all",
-        "The three averages (of one recording: gmwm and rgmwm)",
-    ),
-];
-
-const WEIGHTINGS: [(&str, &str); 2] = [
-    (
-        Weighting::Model.name(),
-        "Inverse variance by the fitted model; a scale far above it weighs less",
-    ),
-    (
-        Weighting::Edof.name(),
-        "The same with the observed wv: the convention of the literature, low where wv is low by chance",
-    ),
-];
-
-const POOLS: [(&str, &str); 2] = [
-    (Pool::Axes.name(), "Those of one axis: one model per axis"),
-    (
-        Pool::Sensor.name(),
-        "Those of all axes of a sensor: one model per sensor",
-    ),
-];
+pub(crate) const ESTIMATORS: [&str; 7] =
+    ["awv", "sr-awv", "dr-awv", "gmwm", "rgmwm", "avlr", "all"];
 
 impl Command for Calibrate {
     type Answer = Calibration;

@@ -61,7 +61,7 @@ pub struct Choose {
     #[command(flatten)]
     pub settings: SettingsArgs,
     /// Estimators to compare [default: awv, sr-awv, dr-awv and, for comparison, gmwm and avlr of single recordings]
-    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = parse::words::<Estimator>(EACH))]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = parse::one_of::<Estimator>(EACH))]
     pub estimator: Vec<Estimator>,
     /// Models to compare, such as N2,N1,WN+RW,auto [default: N2, and WN+RW with awv]
     #[arg(long, value_name = "MODELS", value_delimiter = ',')]
@@ -79,8 +79,8 @@ pub struct Choose {
     /// What DR-AWV drops at each end of each scale: a number, or a share such as 30%
     #[arg(long, value_name = "A", default_value_t)]
     pub trim: Trim,
-    /// What to do where the time jumps or stands still
-    #[arg(long, value_parser = parse::words::<Gaps>(WHOLE), default_value_t)]
+    /// What to do where the time jumps or stands still: refuse the file, split it there, or ignore it
+    #[arg(long, value_parser = parse::one_of::<Gaps>(WHOLE), default_value_t)]
     pub gaps: Gaps,
     /// How recordings are read.
     #[command(flatten)]
@@ -88,7 +88,7 @@ pub struct Choose {
 }
 
 /// The estimators that are one.
-const EACH: &[(&str, &str)] = ESTIMATORS.split_at(6).0;
+const EACH: &[&str] = ESTIMATORS.split_at(6).0;
 
 /// The ranking (`ranking.json`), and the winner's calibration of all recordings.
 #[derive(Serialize)]
