@@ -450,51 +450,27 @@ impl Comparison {
         })
     }
 
-    /// Departure of the ASEE over time: a chart a scenario, with a curve an estimator; where the names of the runs tell
-    /// neither, one with all runs.
-    fn charts(&self) -> Vec<Chart> {
+    /// Departure of the ASEE over time: a curve a run.
+    fn chart(&self) -> Chart {
         let others = self.others();
-        let title = format!("ASEE against {}", self.name_of_reference());
-        let [scenarios, estimators] = layout(&self.candidates);
-        let is_grid = scenarios.len() > 1 && estimators.len() > 1 && !estimators.contains(&"");
-        if !is_grid || scenarios.len() > SCENARIOS {
-            let curves = others.iter().enumerate();
-            let curves = curves.map(|(hue, (name, c))| (name.as_str(), hue, *c));
-            return vec![self.chart(&title, &curves.collect::<Vec<_>>())];
-        }
-        let of_scenario = |scenario: &&str| {
-            let curves = others.iter().filter(|(_, c)| c.label.scenario == *scenario);
-            let curves = curves.filter_map(|(_, c)| {
-                let estimator = c.label.estimator.as_str();
-                let hue = estimators.iter().position(|e| *e == estimator)?;
-                Some((estimator, hue, *c))
-            });
-            let curves: Vec<_> = curves.collect();
-            let title = format!("{title}, scenario {scenario}");
-            (!curves.is_empty()).then(|| self.chart(&title, &curves))
-        };
-        scenarios.iter().filter_map(of_scenario).collect()
-    }
-
-    fn chart(&self, title: &str, curves: &[(&str, usize, &CandidateResult)]) -> Chart {
         let panel = |state: &usize| {
-            let line = |(name, hue, c): &(&str, usize, &CandidateResult)| {
+            let line = |(hue, (name, c)): (usize, &(String, &CandidateResult))| {
                 let points = c.curve.iter().map(|(t, pct)| (*t, pct[*state]));
-                Series::line(name, Colour::Hue(*hue), points.collect())
+                Series::line(name, Colour::Hue(hue), points.collect())
             };
             let zero = Series::new("", Colour::Ink, Mark::Level(0.0));
             let axis = Axis::linear(&format!("{}: (ratio − 1)·100 (%)", SPOKEN[*state]))
                 .including(-1.0, 1.0);
-            let series = std::iter::once(zero)
-                .chain(curves.iter().map(line))
-                .collect();
+            let lines = others.iter().enumerate().map(line);
+            let series = std::iter::once(zero).chain(lines).collect();
             Panel {
                 height: 0.8,
                 ..Panel::new(axis, series)
             }
         };
+        let title = format!("ASEE against {}", self.name_of_reference());
         let panels = self.states.iter().map(panel).collect();
-        Chart::over_time(title, panels, &self.outages)
+        Chart::over_time(&title, panels, &self.outages)
     }
 
     /// A row a run and outage, as they stand in comparison.json.
@@ -558,8 +534,7 @@ impl Answer for Comparison {
             ));
             document.lead(self.table());
         }
-        document.text(CAPTION);
-        document.charts(&self.charts(), "");
+        document.chart(&self.chart(), CAPTION);
         if !self.outages.is_empty() {
             document.section("Consistency and errors");
             document.text("NEES (9 if right) and coverage over the outage; RMSE at its end against the reference, (ratio − 1)·100.");
@@ -571,8 +546,6 @@ impl Answer for Comparison {
 
 /// Runs that the verdict names.
 const NAMED: usize = 3;
-/// Scenarios that have a chart each; of more, one chart has all runs.
-const SCENARIOS: usize = 6;
 
 const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's own standard deviation: 0 % is as the reference believes.";
 

@@ -10,9 +10,7 @@ use crate::parse;
 use nav_sim_calibration::{
     Anticipated, Bootstrap, Estimator, Outcome, ParameterInterval, Scattering, Settings,
 };
-use nav_sim_document::{
-    Axis, Chart, Colour, Document, Importance, Panel, Series, Table, Tone, readable, window,
-};
+use nav_sim_document::{Document, Importance, Table, Tone, readable, window};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::metrics::OutageSummary;
 use nav_sim_navigation::scenario::{Method, Scenario};
@@ -419,9 +417,6 @@ impl Answer for Designs {
         }
         document.note(Importance::Remark, STATED);
         document.lead(self.lead());
-        let parameters = designs.first().map_or(0, |d| d.parameters.len());
-        let charts = (0..parameters).filter_map(|k| against_hours(designs, k));
-        document.charts(&charts.collect::<Vec<_>>(), AGAINST);
         if designs.iter().any(|d| !d.horizontal_p95.is_empty()) {
             document.section("What that is in navigation");
             document.table(&Table::of(
@@ -463,40 +458,9 @@ impl Answer for Designs {
     }
 }
 
-const AGAINST: &str = "Half of the 95 % interval to expect (% of the value) against the length of each recording; dashed: however long they are.";
-
-/// One parameter of several designs: a curve over hours for each number of recordings.
-fn against_hours(designs: &[DesignOutcome], k: usize) -> Option<Chart> {
-    let name = designs.first()?.parameters[k].name();
-    let (mut series, mut floors) = (Vec::new(), Vec::new());
-    let of_count = designs.chunk_by(|a, b| a.recordings == b.recordings);
-    for (hue, designs) in of_count.enumerate() {
-        let point = |d: &DesignOutcome| {
-            let half = d.parameters.get(k).and_then(|p| p.half_width_pct);
-            (d.hours, half.unwrap_or(f64::NAN))
-        };
-        let name = format!("{} recordings", designs[0].recordings);
-        let points = designs.iter().map(point).collect();
-        series.extend(Series::dotted_line(&name, Colour::Hue(hue), points));
-        let last = designs.last()?;
-        let floor = last
-            .parameters
-            .get(k)
-            .and_then(|p| p.endless_half_width_pct);
-        floors.extend(floor.map(|floor| {
-            let ends = [designs[0].hours, last.hours].map(|hours| (hours, floor));
-            Series::dashed("", Colour::Hue(hue), ends.to_vec())
-        }));
-    }
-    series.extend(floors);
-    let panel = Panel::new(Axis::log("half width (%)"), series);
-    Some(Chart::new(&name, Axis::log("hours"), vec![panel]).small())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nav_sim_document::Mark;
 
     fn designed(
         recordings: usize,
@@ -528,22 +492,5 @@ mod tests {
         for (floor, count) in [(None, 0), (Some(31.9), 0), (Some(32.1), 1)] {
             assert_eq!(designed(4, 1.0, 40.0, floor).lengths_do_not_help(), count);
         }
-    }
-
-    #[test]
-    fn a_curve_has_the_designs_of_its_number_of_recordings() {
-        let designs = [(4, 1.0, 40.0), (4, 2.0, 30.0), (6, 1.0, 35.0)]
-            .map(|(n, h, w)| designed(n, h, w, None));
-        let mut chart = against_hours(&designs, 0).unwrap();
-        let drawn = chart.panels.remove(0).series;
-        let line = |series: Series| {
-            if let Mark::Line(points, _) = series.mark {
-                Some(points)
-            } else {
-                None
-            }
-        };
-        let lines: Vec<_> = drawn.into_iter().filter_map(line).collect();
-        assert_eq!(lines, [vec![(1.0, 40.0), (2.0, 30.0)], vec![(1.0, 35.0)]]);
     }
 }

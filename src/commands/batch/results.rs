@@ -8,9 +8,7 @@ use crate::io::atomic::AtomicDir;
 use crate::report::csv::{csv, flat};
 use crate::report::json;
 use crate::report::verdict::{tone, verdict_counts};
-use nav_sim_document::{
-    Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke, Table, Tone,
-};
+use nav_sim_document::{Axis, Chart, Colour, Document, Importance, Panel, Series, Table, Tone};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -284,7 +282,7 @@ impl Answer for StudyAnswer {
         document.lead(Table::of(self, "/cells/*/outages/*", &columns).with_keys(2));
         document.charts(
             &self.charts(),
-            "Horizontal error at the end of the first outage: p95 and, thin, the median.",
+            "95 % quantile of the horizontal error at the end of the first outage.",
         );
         for comparison in &self.comparisons {
             document.section(&format!("ASEE relative to {}", comparison.reference));
@@ -312,42 +310,27 @@ impl StudyAnswer {
     fn charts(&self) -> Vec<Chart> {
         const LINES: usize = 12;
         let chart = |axis: &String| {
-            let mut lines: BTreeMap<String, Vec<(f64, f64, f64)>> = BTreeMap::new();
+            let mut lines: BTreeMap<Vec<&str>, Vec<(f64, f64)>> = BTreeMap::new();
             for cell in &self.cells {
                 let x: f64 = cell.labels[axis].parse().ok()?;
-                let others = cell
-                    .labels
-                    .iter()
-                    .filter(|(other, _)| *other != axis)
-                    .map(|(_, label)| label.as_str());
-                let name = others.collect::<Vec<_>>().join(" ");
-                let outage = cell.outages.first()?;
-                if let (Some(p50), Some(p95)) = (outage["p50_m"].as_f64(), outage["p95_m"].as_f64())
-                {
-                    lines.entry(name).or_default().push((x, p50, p95));
-                }
+                let others = cell.labels.iter().filter(|(other, _)| *other != axis);
+                let name = others.map(|(_, label)| label.as_str()).collect();
+                let p95 = cell.outages.first()?["p95_m"].as_f64();
+                lines.entry(name).or_default().extend(p95.map(|y| (x, y)));
             }
-            let series =
-                lines
-                    .iter_mut()
-                    .take(LINES)
-                    .enumerate()
-                    .flat_map(|(hue, (name, points))| {
-                        points.sort_by(|a, b| a.0.total_cmp(&b.0));
-                        let p50 = points.iter().map(|(x, p50, _)| (*x, *p50)).collect();
-                        let p95 = points.iter().map(|(x, _, p95)| (*x, *p95)).collect();
-                        [
-                            Series::new(name, Colour::Hue(hue), Mark::Line(p95, Stroke::Bold)),
-                            Series::new("", Colour::Hue(hue), Mark::Line(p50, Stroke::Thin)),
-                        ]
-                    });
-            let series: Vec<Series> = series.collect();
-            let panel = Panel::new(Axis::log("horizontal error (m)"), series);
-            Some(Chart::new(
-                &format!("Error against {axis}"),
-                Axis::linear(axis),
-                vec![panel],
-            ))
+            let line = |(hue, (name, mut points)): (usize, (Vec<&str>, Vec<(f64, f64)>))| {
+                points.sort_by(|a, b| a.0.total_cmp(&b.0));
+                Series::line(&name.join(" "), Colour::Hue(hue), points)
+            };
+            let series = lines
+                .into_iter()
+                .take(LINES)
+                .enumerate()
+                .map(line)
+                .collect();
+            let panel = Panel::new(Axis::log("horizontal error, p95 (m)"), series);
+            let title = format!("Error against {axis}");
+            Some(Chart::new(&title, Axis::linear(axis), vec![panel]))
         };
         self.axes.iter().filter_map(chart).collect()
     }
