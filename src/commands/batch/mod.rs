@@ -16,6 +16,7 @@ use crate::commands::run::{PreparedRun, Run, block_of, columns};
 use crate::io::{atomic, input, source};
 use crate::report::in_order;
 use clap::Args;
+use indexmap::IndexMap;
 use nav_sim_document::{Importance, Note};
 use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::simulation::RunResult;
@@ -24,7 +25,7 @@ use results::{first_of, withdraw};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Map;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -430,17 +431,16 @@ impl Study {
     }
 
     /// The labels that references have: those of the study, else the first model.
-    fn fixed(&self, cells: &[Cell]) -> Labels {
+    fn fixed(&self, cells: &[Cell]) -> HashMap<String, String> {
         let given = self.reference.iter();
-        let given: Labels = given
-            .map(|(axis, label)| (axis.clone(), text(label)))
-            .collect();
-        if !given.is_empty() {
-            return given;
+        if self.reference.is_empty() {
+            let mut labels = cells.iter().flat_map(|cell| &cell.labels);
+            let model = labels.find(|(axis, _)| axis == "model");
+            return model.cloned().into_iter().collect();
         }
-        let mut labels = cells.iter().flat_map(|cell| &cell.labels);
-        let model = labels.find(|(axis, _)| axis == "model");
-        model.cloned().into_iter().collect()
+        given
+            .map(|(axis, label)| (axis.clone(), text(label)))
+            .collect()
     }
 
     fn check_reference(&self, all: &[(Labels, Table)]) -> Result<()> {
@@ -811,24 +811,19 @@ impl Place<'_> {
 
 /// All units, passes in the order of their first cells.
 fn units<'a>(cells: &'a [Cell], context: &Context<'_>) -> Result<Vec<Unit<'a>>> {
-    let mut passes: Vec<Vec<&Cell>> = Vec::new();
-    let mut places: HashMap<&str, usize> = HashMap::new();
+    let mut passes: IndexMap<&str, Vec<&Cell>> = IndexMap::new();
     for cell in cells {
-        let place = *places.entry(&cell.noise).or_insert(passes.len());
-        if place == passes.len() {
-            passes.push(Vec::new());
-        }
-        passes[place].push(cell);
+        passes.entry(&cell.noise).or_default().push(cell);
     }
-    let mut blocks: BTreeMap<PathBuf, u64> = BTreeMap::new();
+    let mut blocks: HashMap<&Path, u64> = HashMap::new();
     let mut units = Vec::new();
-    for pass in passes {
+    for pass in passes.into_values() {
         let (request, runs) = (&pass[0].asked.request, pass[0].runs);
-        let block = match blocks.get(&request.trajectory) {
+        let block = match blocks.get(&*request.trajectory) {
             Some(block) => *block,
             None => block_of(request, context)?,
         };
-        blocks.insert(request.trajectory.clone(), block);
+        blocks.insert(&request.trajectory, block);
         let unit = |first| Unit {
             cells: pass.clone(),
             first,

@@ -8,6 +8,7 @@ use crate::io::atomic::AtomicDir;
 use crate::report::csv::{csv, flat};
 use crate::report::json;
 use crate::report::verdict::{tone, verdict_counts};
+use indexmap::IndexMap;
 use nav_sim_document::{Axis, Chart, Colour, Document, Importance, Panel, Series, Table, Tone};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::Serialize;
@@ -18,7 +19,7 @@ use std::fs;
 const FILES: [&str; 3] = ["results.csv", "summary.json", "report.html"];
 
 /// The cells that are there, against their references.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct StudyAnswer {
     schema_version: u32,
     complete: bool,
@@ -59,64 +60,43 @@ pub(super) fn merge(
         cells.iter().map(|cell| (&cell.labels, cell)).collect();
     let reference_of = |cell: &Cell| {
         let label = |(axis, label): &(String, String)| {
-            let fixed = fixed.iter().find(|(fixed, _)| fixed == axis);
-            (
-                axis.clone(),
-                fixed.map_or(label, |(_, label)| label).clone(),
-            )
+            (axis.clone(), fixed.get(axis).unwrap_or(label).clone())
         };
         let labels: Labels = cell.labels.iter().map(label).collect();
         let found = by_labels.get(&labels).copied();
         found.filter(|cell| !fixed.is_empty() && place.is_done(cell))
     };
+    let axes = cells.iter().take(1).flat_map(|cell| &cell.labels);
     let mut answer = StudyAnswer {
         schema_version: 1,
-        complete: true,
-        missing: Vec::new(),
-        cells: Vec::new(),
-        rows: Vec::new(),
-        versions: BTreeSet::new(),
-        axes: cells.first().map_or(Vec::new(), |cell| {
-            cell.labels.iter().map(|(axis, _)| axis.clone()).collect()
-        }),
-        comparisons: Vec::new(),
-        unmet: None,
+        axes: axes.map(|(axis, _)| axis.clone()).collect(),
+        ..StudyAnswer::default()
     };
     // of each reference its cells: one setting of the other axes
-    let mut settings: Vec<(Option<&Cell>, Vec<&Cell>)> = Vec::new();
-    let mut at = HashMap::new();
+    let mut settings: IndexMap<&str, Vec<&Cell>> = IndexMap::new();
     for cell in cells {
-        let reference = reference_of(cell);
-        let name = &reference.unwrap_or(cell).name;
-        let index = *at.entry(name).or_insert(settings.len());
-        if index == settings.len() {
-            settings.push((reference, Vec::new()));
-        }
-        settings[index].1.push(cell);
+        let reference = reference_of(cell).unwrap_or(cell);
+        settings.entry(&reference.name).or_default().push(cell);
     }
     for (reference, members) in settings {
         let mut read = Vec::new();
         for cell in members {
-            match place
-                .is_done(cell)
-                .then(|| run_directory::read(&place.cell(&cell.name)))
-            {
-                Some(Ok(found)) => read.push((cell, found)),
-                Some(Err(e)) if e.code() == 1 => return Err(e),
-                damaged => {
-                    if let Some(Err(e)) = damaged {
-                        context.warn(format!("{e}; {} is set aside", cell.name));
-                        let (path, aside) = (
-                            place.cell(&cell.name),
-                            place.cell(&format!("{}.damaged", cell.name)),
-                        );
-                        drop(fs::rename(path, aside));
-                    }
-                    answer.missing.push(cell.name.clone());
+            let (path, name) = (place.cell(&cell.name), &cell.name);
+            match place.is_done(cell).then(|| run_directory::read(&path)) {
+                Some(Ok(found)) => {
+                    read.push((cell, found));
+                    continue;
                 }
+                Some(Err(e)) if e.code() == 1 => return Err(e),
+                Some(Err(e)) => {
+                    context.warn(format!("{e}; {name} is set aside"));
+                    drop(fs::rename(path, place.cell(&format!("{name}.damaged"))));
+                }
+                None => {}
             }
+            answer.missing.push(name.clone());
         }
-        let of = reference.and_then(|r| read.iter().position(|(cell, _)| cell.name == r.name));
+        let of = read.iter().position(|(cell, _)| cell.name == reference);
         answer.add(&read, of, states)?;
     }
     answer.complete = answer.missing.is_empty();
@@ -147,10 +127,11 @@ impl StudyAnswer {
             let mut ends = Vec::new();
             for (i, (outage, own)) in outages.zip(&candidate.outages).enumerate() {
                 let horizontal = &outage["horizontal_error_end_m"];
-                let time = |key: &str| outage[key].as_f64().unwrap_or(f64::NAN);
+                let [start_s, end_s] = [&outage["start_s"], &outage["end_s"]];
+                let duration_s = end_s.as_f64().zip(start_s.as_f64()).map(|(b, a)| b - a);
                 ends.push(json!({
-                    "start_s": outage["start_s"],
-                    "end_s": outage["end_s"],
+                    "start_s": start_s,
+                    "end_s": end_s,
                     "p50_m": horizontal["p50"],
                     "p95_m": horizontal["p95"],
                     "nees": outage["nees_end"],
@@ -162,9 +143,9 @@ impl StudyAnswer {
                         "runs": summary["runs"],
                         "diverged": summary["diverged"],
                         "outage": i,
-                        "start_s": outage["start_s"],
-                        "end_s": outage["end_s"],
-                        "duration_s": time("end_s") - time("start_s"),
+                        "start_s": start_s,
+                        "end_s": end_s,
+                        "duration_s": duration_s,
                         "state": state,
                         "asee_mean": outage["asee_mean"][*state],
                         "asee_end": outage["asee_end"][*state],
@@ -183,12 +164,9 @@ impl StudyAnswer {
                         "log_density_end": outage["log_density_end"],
                         "verdict": outage["verdict"]["kind"],
                     });
-                    let mut row = Map::from_iter([("cell".to_owned(), cell.name.clone().into())]);
-                    row.extend(
-                        cell.labels
-                            .iter()
-                            .map(|(axis, label)| (axis.clone(), label.as_str().into())),
-                    );
+                    let mut row = flat(&json!({ "cell": cell.name }));
+                    let labels = cell.labels.iter().cloned();
+                    row.extend(labels.map(|(axis, label)| (axis, label.into())));
                     let ratio = (!candidate.is_reference).then(|| flat(ratio));
                     for (key, value) in flat(&own).into_iter().chain(ratio.into_iter().flatten()) {
                         row.entry(key).or_insert(value);
@@ -197,10 +175,10 @@ impl StudyAnswer {
                 }
             }
             self.versions.insert(found.manifest.version.clone());
-            let missed = |required: &Value| required["met"] == Value::Bool(false);
-            if summary["require"]
-                .as_array()
-                .is_some_and(|all| all.iter().any(missed))
+            let required = summary["require"].as_array().into_iter().flatten();
+            if required
+                .into_iter()
+                .any(|required| required["met"] == false)
             {
                 let message = format!("{}: a required limit is not kept", cell.name);
                 self.unmet.get_or_insert(Failure::bound(message));
