@@ -21,7 +21,7 @@ use std::str::FromStr;
 /// A trajectory; where no vehicle moves so.
 pub(crate) fn trajectory(path: &Path, context: &Context<'_>) -> Result<Trajectory> {
     let (trajectory, warnings) = trajectory_file::load(path, &trajectory_file::Options::default())?;
-    warnings.iter().for_each(|doubt| context.warn(doubt));
+    context.warn_each(&warnings);
     let (_, beyond) = examine(&trajectory, &Limits::default());
     let farthest = |e: &&Excess| e.worst / e.limit;
     if let Some(worst) = beyond
@@ -43,9 +43,7 @@ pub(crate) fn trajectory(path: &Path, context: &Context<'_>) -> Result<Trajector
 /// A model; the axes that it does not name.
 pub(crate) fn model(path: &Path, context: &Context<'_>) -> Result<ModelFile> {
     let file = model_file::read(path)?;
-    file.doubts(path)
-        .iter()
-        .for_each(|doubt| context.warn(doubt));
+    context.warn_each(&file.doubts(path));
     Ok(file)
 }
 
@@ -84,10 +82,7 @@ pub(crate) fn recordings(
         ..ReadOptions::default()
     };
     let (recordings, report) = recordings::read(paths, &options)?;
-    report
-        .all_warnings()
-        .iter()
-        .for_each(|doubt| context.warn(doubt));
+    context.warn_each(&report.all_warnings());
     report
         .files
         .iter()
@@ -103,10 +98,7 @@ pub(crate) fn placed(
     context: &Context<'_>,
 ) -> Result<Vec<Outage>> {
     let placed = scenario.outages_on((trajectory.start_s(), trajectory.end_s()), seed)?;
-    placed
-        .remarks
-        .into_iter()
-        .for_each(|remark| context.warn(remark));
+    context.warn_each(placed.remarks);
     Ok(placed.windows)
 }
 

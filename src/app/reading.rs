@@ -284,5 +284,5 @@ pub(crate) fn note_report(report: &Report, context: &Context<'_>) {
         }
     }
     let doubts = report.all_warnings();
-    doubts.iter().for_each(|doubt| context.warn(doubt));
+    context.warn_each(&doubts);
 }

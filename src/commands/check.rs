@@ -5,7 +5,7 @@ use super::inspect::inspect;
 use crate::app::{Answer, Command, Context, Failure, Result, inputs};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::fusion_files::{ImuFile, read_gnss, read_imu, read_initial};
-use crate::io::{contamination_file, curve_file, datasheet, model_file, scenario_file};
+use crate::io::{contamination_file, curve_file, datasheet, scenario_file};
 use crate::parse;
 use crate::report::six_digits;
 use nav_sim_document::{Document, Note, Tone, seconds};
@@ -36,9 +36,6 @@ pub struct CheckFiles {
     /// Sample rate of recordings without a time column
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
     rate_hz: Option<f64>,
-    /// Also print the contents: scenarios and studies with every key, defaults included; models axis by axis
-    #[arg(long)]
-    dry_run: bool,
 }
 
 /// Files that were looked at.
@@ -56,8 +53,6 @@ struct CheckedFile {
     ok: bool,
     /// Its kind, or its error.
     found: String,
-    #[serde(skip)]
-    contents: Option<String>,
 }
 
 impl Command for CheckFiles {
@@ -72,28 +67,21 @@ impl Command for CheckFiles {
     fn run(&self, context: &Context<'_>) -> Result<Checked> {
         let (mut files, mut failures) = (Vec::new(), Vec::new());
         for path in &self.files {
-            let found = check(path, self.rate_hz, context).and_then(|found| {
-                let contents = self.dry_run.then(|| resolved(path)).transpose()?;
-                Ok((found, contents.flatten()))
-            });
+            let found = check(path, self.rate_hz, context);
             let ok = found.is_ok();
-            let (found, contents) = found.unwrap_or_else(|failure| {
+            let found = found.unwrap_or_else(|failure| {
                 let message = failure.to_string();
                 failures.push(failure);
-                (message, None)
+                message
             });
-            files.push(CheckedFile {
-                file: path.display().to_string(),
-                ok,
-                found,
-                contents,
-            });
+            let file = path.display().to_string();
+            files.push(CheckedFile { file, ok, found });
         }
         let unmet = match failures.len() {
             0 => None,
             1 if files.len() == 1 => failures.pop(),
             wrong => {
-                failures.iter().for_each(|failure| context.warn(failure));
+                context.warn_each(&failures);
                 let message = format!("{wrong} of {} files are refused", files.len());
                 Some(match failures.iter().any(|failure| failure.code() == 1) {
                     true => Failure::could_not(message),
@@ -112,30 +100,9 @@ impl Answer for Checked {
         Document::new("Files", Tone::Good, lines)
     }
 
-    fn text(&self) -> Option<String> {
-        let sound = self.files.iter().filter(|file| file.ok);
-        let lines = sound.flat_map(|checked| {
-            let line = format!("{}: {}\n", checked.file, checked.found);
-            [line, checked.contents.clone().unwrap_or_default()]
-        });
-        Some(lines.collect())
-    }
-
     fn unmet(&self) -> Option<Failure> {
         self.unmet.clone()
     }
-}
-
-/// The configuration that a file stands for, every key of it.
-fn resolved(path: &Path) -> Result<Option<String>> {
-    Ok(match file_kind::of(path)? {
-        FileKind::Scenario => {
-            let scenario = scenario_file::read(path)?;
-            Some(toml::to_string(&scenario).map_err(Failure::could_not)?)
-        }
-        FileKind::Model => Some(model_file::to_toml(&model_file::read(path)?)),
-        _ => None,
-    })
 }
 
 fn tell(notes: &[Note], context: &Context<'_>) {

@@ -83,7 +83,7 @@ impl Source {
     fn read(&self, context: &Context<'_>) -> Result<(Trajectory, Vec<String>)> {
         let origin = self.origin.map(|o| o.0);
         let read = trajectory_file::load(&self.path, &Options { origin })?;
-        read.1.iter().for_each(|doubt| context.warn(doubt));
+        context.warn_each(&read.1);
         Ok(read)
     }
 
@@ -278,10 +278,6 @@ struct Closed {
 
 impl Answer for TrajectoryCheck {
     fn document(&self) -> Document {
-        Document::new("Trajectory", Tone::Good, self.text())
-    }
-
-    fn text(&self) -> Option<String> {
         let rows = [
             ("path (m)", "path_m -"),
             ("speed (m/s)", "largest/speed_m_s limits/speed_m_s"),
@@ -306,7 +302,7 @@ impl Answer for TrajectoryCheck {
             ("attitude (rad)", "closure/attitude_rad bounds/attitude_rad"),
         ];
         let c = &self.closure.closure;
-        Some(format!(
+        let text = format!(
             "{}: {} s from {} s, {} points\nclosure at {} Hz over {} s: {}\n{}",
             self.file,
             self.end_s - self.start_s,
@@ -320,7 +316,8 @@ impl Answer for TrajectoryCheck {
                 "BEYOND A BOUND"
             },
             Table::of_keys(self, &["", "largest", "limit"], &rows).columns(usize::MAX)
-        ))
+        );
+        Document::new("Trajectory", Tone::Good, [text])
     }
 
     fn unmet(&self) -> Option<Failure> {

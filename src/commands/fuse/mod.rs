@@ -517,7 +517,7 @@ impl Drive {
             .map(|path| load_reference(path, &options))
             .transpose()?;
         let reference = reference.map(|(reference, warnings)| {
-            warnings.iter().for_each(|warning| context.warn(warning));
+            context.warn_each(&warnings);
             reference
         });
         let mut configuration = json!({
@@ -570,10 +570,7 @@ impl Drive {
         };
         let times_s: Vec<f64> = self.gnss.iter().map(|fix| fix.t_s).collect();
         let placed = plan.on(&FixedData::recorded(&times_s), 0)?;
-        placed
-            .remarks
-            .iter()
-            .for_each(|remark| context.warn(remark));
+        context.warn_each(&placed.remarks);
         settings.outages = placed.windows;
         let mounting = match self.request.mounting {
             Some(MountingChoice::Auto) => {
@@ -626,9 +623,7 @@ impl Drive {
                 "both need one clock",
             );
         }
-        doubt_heading(&weighed.solution, &settings.outages)
-            .iter()
-            .for_each(|doubt| context.warn(doubt));
+        context.warn_each(doubt_heading(&weighed.solution, &settings.outages));
         let outcome = outcome(&weighed.solution, &settings.outages);
         let Assessment { verdict, findings } = assess(&weighed, &outcome, &doubts);
         let is_correlated = weighed

@@ -25,7 +25,7 @@ use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
     FilterPass, Instant, NamedSource, Track, TruthSide, assess, strapdown_over_sigma, weak_heading,
 };
-use nav_sim_navigation::simulation::{Experiment, Plan, RunResult};
+use nav_sim_navigation::simulation::{Experiment, Plan, REPORTED, RunResult};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::{Recording, Sensor};
 use nav_sim_signal::noise::reduction::is_exact;
@@ -611,9 +611,7 @@ fn with_runs(
     });
     // Where the motion hardly shows the heading, no filter of this kind is to be believed.
     let yaw = FilterPass::new(&merged, belief).yaw_while_measured();
-    weak_heading(yaw.into_iter())
-        .iter()
-        .for_each(|doubt| context.warn(doubt));
+    context.warn_each(&weak_heading(yaw.into_iter()));
     let experiment = scenario.experiment(
         &inputs.trajectory,
         inputs.truth(),
@@ -897,9 +895,7 @@ pub(crate) fn reduction_of(
     let full = full.map(|full| assess(track, full, model));
     let quality = ReductionQuality::of(&assess(track, belief, model), full.as_ref());
     context.remark(reduction_line(&quality));
-    reduction_doubt(&quality)
-        .iter()
-        .for_each(|doubt| context.warn(doubt));
+    context.warn_each(&reduction_doubt(&quality));
     Some(quality)
 }
 
@@ -932,13 +928,13 @@ impl Analysis<'_> {
             ends.iter().map(|end| figures(&end.errors)).collect()
         };
         for (outage, interval) in outages.iter_mut().zip(intervals(truth, draws, &figures)) {
-            let rmse = outage.rmse_end.0;
-            let about = |i: usize, value: f64| (value * interval[i].0, value * interval[i].1);
-            outage.rmse_end_ci95 = Some(PerState(std::array::from_fn(|i| about(i, rmse[i]))));
             let h = &mut outage.horizontal_error_end_m;
-            let ends = |(low, high): (f64, f64)| (Some(low), Some(high));
-            h.p50_ci95 = ends(about(rmse.len(), h.p50));
-            h.p95_ci95 = ends(about(rmse.len() + 1, h.p95));
+            let rmse = about(&outage.rmse_end.0, &interval);
+            outage.rmse_end_ci95 = rmse.try_into().ok().map(PerState);
+            let ends = |value, (low, high)| (Some(value * low), Some(value * high));
+            if let [.., p50, p95] = interval[..] {
+                (h.p50_ci95, h.p95_ci95) = (ends(h.p50, p50), ends(h.p95, p95));
+            }
         }
     }
 
@@ -966,14 +962,21 @@ impl Analysis<'_> {
                 .collect()
         };
         for (outage, interval) in outages.iter_mut().zip(intervals(model, draws, &figures)) {
-            let (end, mean) = (outage.asee_end.0, outage.asee_mean.0);
-            let about = |i: usize, value: f64| (value * interval[i].0, value * interval[i].1);
-            outage.asee_end_ci95 = Some(PerState(std::array::from_fn(|i| about(i, end[i]))));
-            let of_mean = PerState(std::array::from_fn(|i| about(end.len() + i, mean[i])));
+            let (end, mean) = interval.split_at(REPORTED);
+            let [end, mean] = [(&outage.asee_end, end), (&outage.asee_mean, mean)]
+                .map(|(asee, ratios)| about(&asee.0, ratios).try_into().ok().map(PerState));
+            outage.asee_end_ci95 = end;
             // An outage between two reports has no mean.
-            outage.asee_mean_ci95 = Some(of_mean).filter(|_| mean.iter().all(|x| x.is_finite()));
+            let has_mean = outage.asee_mean.0.iter().all(|x| x.is_finite());
+            outage.asee_mean_ci95 = mean.filter(|_| has_mean);
         }
     }
+}
+
+/// Intervals of values, by their ends over the values.
+fn about(values: &[f64], ratios: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let ends = |(value, (low, high)): (&f64, &(f64, f64))| (value * low, value * high);
+    values.iter().zip(ratios).map(ends).collect()
 }
 
 /// The ends of the interval that the draws give to each figure, over the estimate.
