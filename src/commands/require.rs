@@ -6,7 +6,7 @@ use crate::io::atomic::Written;
 use crate::io::datasheet::{self, CATALOGUE, Datasheet};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::input::listed;
-use crate::io::model_file::{self, ModelFile, PROGRAM, TurnOn};
+use crate::io::model_file::{self, ModelFile, PROGRAM, TurnOn, known};
 use crate::io::scenario_file;
 use crate::parse;
 use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds, window};
@@ -639,16 +639,15 @@ impl Requirements {
             imu,
             file: ModelFile::new(model),
         };
-        let mut provenance = toml::Table::new();
-        let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
-        put("program", PROGRAM.into());
-        put("made_by", "require".into());
-        put("label", "what a limit needs: not a calibration".into());
-        put("question", needed.question.in_words().into());
-        put("turn_on_bias", needed.turn_on_in_words().into());
-        for (i, name) in ImuParameters::NAMES.iter().enumerate() {
-            put(name, needed.figures[i].allocated.into());
-        }
+        let mut provenance = known(json!({
+            "program": PROGRAM,
+            "made_by": "require",
+            "label": "what a limit needs: not a calibration",
+            "question": needed.question.in_words(),
+            "turn_on_bias": needed.turn_on_in_words(),
+        }));
+        let figures = needed.figures.iter();
+        provenance.extend(figures.map(|f| (f.figure.to_owned(), f.allocated.into())));
         needed.file.provenance = Some(provenance);
         let stated = self.stated_turn_on();
         needed.file.turn_on = (stated != TurnOn::default()).then_some(stated);

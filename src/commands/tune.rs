@@ -4,7 +4,7 @@ use crate::app::inputs::{self, SettingsArgs, files};
 use crate::app::{Answer, Command, Context, Failure, Input, Out, OutputFile, Result, refused};
 use crate::io::atomic::Written;
 use crate::io::draws_file::{self, Draws};
-use crate::io::model_file::{self, ModelFile, PROGRAM};
+use crate::io::model_file::{self, ModelFile, PROGRAM, known};
 use crate::parse;
 use crate::report::unexpected_line;
 use nav_sim_calibration::derived_interval;
@@ -404,17 +404,13 @@ fn knowing(scenario: &Scenario, imu: &ImuSettings) -> Scenario {
 
 /// The tuned model, and where it came from; `goal`: the aim and what was taken for true.
 fn tuned(file: &ModelFile, factors: &[Factor], goal: &str, inputs: &[Input]) -> ModelFile {
-    let mut provenance = toml::Table::new();
-    let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
-    put("program", PROGRAM.into());
-    put("made_by", "tune".into());
-    put("honest_for", goal.into());
-    let value = "texts and numbers are always TOML";
-    put(
-        "factors",
-        toml::Value::try_from(entries(factors)).expect(value),
-    );
-    put("inputs", toml::Value::try_from(inputs).expect(value));
+    let provenance = known(json!({
+        "program": PROGRAM,
+        "made_by": "tune",
+        "honest_for": goal,
+        "factors": entries(factors),
+        "inputs": inputs,
+    }));
     let (missing, turn_on) = (file.missing.clone(), file.turn_on);
     ModelFile {
         missing,

@@ -3,12 +3,13 @@
 use super::document::{ShownCalibration, turn_on_remark};
 use super::fits::fit_record;
 use crate::app::Input;
-use crate::io::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn};
+use crate::io::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn, known};
 use nav_sim_calibration::{Estimator, Outcome, ParameterSpread, Settings, model_of};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::{Law, LognormalIntervals, Spread, Variation};
 use nav_sim_signal::wavelet::Convention;
-use toml::{Table, Value};
+use serde_json::json;
+use toml::Table;
 
 /// The facts of a calibration for its model files.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -35,8 +36,7 @@ impl CalibrationNote {
             }
         }
         file.spread = spread(outcomes, settings.rate_hz);
-        let mut provenance = self.provenance(outcomes, settings);
-        provenance.insert("curves_blake3".to_owned(), curves.into());
+        let mut provenance = self.provenance(outcomes, settings, curves);
         let mut remarks = Table::new();
         let mut turn_on = TurnOn::default();
         for found in &shown.turn_on {
@@ -63,43 +63,28 @@ impl CalibrationNote {
         file
     }
 
-    fn provenance(&self, outcomes: &[&Outcome], settings: &Settings) -> Table {
-        let mut table = Table::new();
-        let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);
+    fn provenance(&self, outcomes: &[&Outcome], settings: &Settings, curves: &str) -> Table {
         let estimator = outcomes.first().map_or(Estimator::Given, |o| o.estimator);
-        put("program", PROGRAM.into());
-        put("schema", (SCHEMA as i64).into());
-        put("estimator", estimator.name().into());
-        put("model", settings.model.to_string().into());
-        put("weighting", settings.weighting.name().into());
-        if let Some(range) = settings.fit_range {
-            put("fit_range_s", vec![range.from_s, range.to_s].into());
-        }
-        if let Some(seed) = self.seed {
-            // TOML integers are signed; larger seeds go as text.
-            put(
-                "seed",
-                i64::try_from(seed).map_or_else(|_| seed.to_string().into(), Value::from),
-            );
-        }
-        if estimator.is_robust() {
-            put("efficiency", settings.tuning.efficiency().into());
-            put("efficiency_convention", Convention::Exact.name().into());
-        }
-        for (key, value) in &self.reading {
-            put(key, value.clone());
-        }
-        let known = |outcome: &&Outcome| {
-            let mut record = fit_record(outcome, settings);
-            record.retain(|_, value| !value.is_null());
-            record
-        };
-        let fits: Vec<_> = outcomes.iter().map(known).collect();
-        put("fits", Value::try_from(fits).expect("numbers and texts"));
-        put(
-            "inputs",
-            Value::try_from(&self.inputs).expect("plain structs"),
-        );
+        let is_robust = estimator.is_robust();
+        let fit = |outcome: &&Outcome| known(fit_record(outcome, settings).into());
+        // TOML integers are signed; larger seeds go as text.
+        let seed =
+            |seed: u64| i64::try_from(seed).map_or_else(|_| json!(seed.to_string()), Into::into);
+        let mut table = known(json!({
+            "program": PROGRAM,
+            "schema": SCHEMA,
+            "estimator": estimator,
+            "model": settings.model.to_string(),
+            "weighting": settings.weighting.name(),
+            "fit_range_s": settings.fit_range.map(|range| [range.from_s, range.to_s]),
+            "seed": self.seed.map(seed),
+            "efficiency": is_robust.then(|| settings.tuning.efficiency()),
+            "efficiency_convention": is_robust.then(|| Convention::Exact.name()),
+            "fits": outcomes.iter().map(fit).collect::<Vec<_>>(),
+            "inputs": self.inputs,
+            "curves_blake3": curves,
+        }));
+        table.extend(self.reading.clone());
         table
     }
 }

@@ -24,6 +24,7 @@ mod write;
 
 pub(crate) use description::schema;
 pub use provenance::Misfit;
+pub(crate) use provenance::known;
 pub use read::{from_text, read};
 pub use write::to_toml;
 pub use write::write;

@@ -4,7 +4,14 @@ use super::ModelFile;
 use crate::report::readable;
 use nav_sim_calibration::duration;
 use std::fmt;
-use toml::Value;
+use toml::{Table, Value};
+
+/// What is known of a JSON object, as a table: TOML has no null.
+pub(crate) fn known(json: serde_json::Value) -> Table {
+    let mut fields = json.as_object().cloned().unwrap_or_default();
+    fields.retain(|_, value| !value.is_null());
+    Table::try_from(fields).expect("texts and numbers are always TOML")
+}
 
 /// Disagreement of a model with the recordings that it was fitted to, as its provenance has it.
 #[derive(Debug, Clone, Copy, PartialEq)]
