@@ -6,7 +6,7 @@ use crate::io::atomic::Written;
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::{self, ModelFile, PROGRAM, known};
 use crate::parse;
-use crate::report::unexpected_line;
+use crate::report::{in_order, unexpected_line};
 use nav_sim_calibration::derived_interval;
 use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds, short_names};
 use nav_sim_navigation::ekf::{BeliefError, FilterStates};
@@ -199,22 +199,17 @@ impl Tune {
                 stretch: None,
             }
         };
-        let mut doubts = Vec::new();
-        for truth in &truths.errors {
-            for doubt in (Scenario {
-                imu: truth.imu.clone(),
+        let unexpected = |truth: &TrueErrors| {
+            let imu = truth.imu.clone();
+            let scenario = Scenario {
+                imu,
                 ..scenario.clone()
-            })
-            .unexpected()
-            {
-                if !doubts.contains(&doubt) {
-                    doubts.push(doubt);
-                }
-            }
-        }
-        doubts
-            .into_iter()
-            .for_each(|doubt| context.warn(unexpected_line(&doubt)));
+            };
+            scenario.unexpected()
+        };
+        let doubts = truths.errors.iter().flat_map(unexpected);
+        let doubts: Vec<String> = doubts.map(|doubt| unexpected_line(&doubt)).collect();
+        context.warn_each(in_order(doubts.iter().map(String::as_str)));
         Ok(truths)
     }
 

@@ -39,13 +39,15 @@ pub(crate) fn verdict_lines(summary: &Summary) -> Vec<String> {
     lines
 }
 
+/// The outages (start, end) (s).
+pub(crate) fn windows(summary: &Summary) -> Vec<(f64, f64)> {
+    let outages = summary.outages.iter();
+    outages.map(|o| (o.start_s, o.end_s)).collect()
+}
+
 fn words(summary: &Summary) -> String {
     let (verdict, runs, diverged) = (&summary.verdict, summary.runs, summary.diverged);
-    let windows: Vec<(f64, f64)> = summary
-        .outages
-        .iter()
-        .map(|o| (o.start_s, o.end_s))
-        .collect();
+    let windows = windows(summary);
     let nees = format!(
         "NEES {} (9 if right)",
         with_error(verdict.nees, verdict.nees_std_error)

@@ -1072,40 +1072,40 @@ fn find_shard(
     if flag.is_some() {
         return Ok((flag, "--shard".to_owned()));
     }
-    let set = SCHEDULERS
-        .iter()
-        .find_map(|(name, more)| Some((*name, *more, variable(name)?)));
-    let Some((name, more, text)) = set else {
+    let number = |name: &str| -> Result<Option<u64>> {
+        let text = variable(name);
+        let number = text.map(|text| {
+            let refused = |_| Failure::input(format!("{name}={text} is not a number"));
+            text.trim().parse().map_err(refused)
+        });
+        number.transpose()
+    };
+    let task = SCHEDULERS.into_iter().find_map(|(name, more)| {
+        let id = number(name).transpose()?;
+        Some(id.map(|id| (name, more, id)))
+    });
+    let Some((name, more, id)) = task.transpose()? else {
         return match shards {
             None | Some(1) => Ok((None, "no scheduler".to_owned())),
-            Some(n) => {
-                let failure = Failure::input(format!(
-                    "--shards {n}: no scheduler says which of them this is"
-                ));
-                Err(failure.hint("give --shard i/n"))
-            }
+            Some(n) => refused(
+                format!("--shards {n}: no scheduler says which of them this is"),
+                "give --shard i/n",
+            ),
         };
     };
-    let number = |name: &str, text: &str| {
-        text.trim()
-            .parse::<u64>()
-            .map_err(|_| Failure::input(format!("{name}={text} is not a number")))
-    };
-    let number_of = |name: &str| variable(name).map(|text| number(name, &text)).transpose();
     // With --shards, tasks count from 0 whatever part of an array was submitted; without, the array says.
     let [first, step, count] = match more.filter(|_| shards.is_none()) {
-        Some([min, step, count]) => [number_of(min)?, number_of(step)?, number_of(count)?],
+        Some([min, step, count]) => [number(min)?, number(step)?, number(count)?],
         None => [None; 3],
     };
-    let id = number(name, &text)?;
     let index = id
         .checked_sub(first.unwrap_or(0))
         .map(|i| i / step.unwrap_or(1).max(1));
     let Some(count) = shards.or(count) else {
-        let failure = Failure::input(format!(
-            "{name}={id} says which shard this is, but not of how many"
-        ));
-        return Err(failure.hint("add --shards n (indices from 0 to n − 1)"));
+        return refused(
+            format!("{name}={id} says which shard this is, but not of how many"),
+            "add --shards n (indices from 0 to n − 1)",
+        );
     };
     match index.filter(|index| *index < count) {
         Some(index) => Ok((Some((index, count)), format!("{name}={id}"))),

@@ -2,12 +2,10 @@
 
 use super::{Navigation, RunAnswer};
 use crate::report::trajectory::track_map;
-use crate::report::verdict::requirement_line;
-use crate::report::verdict::verdict_lines;
+use crate::report::verdict::{requirement_line, verdict_lines, windows};
 use crate::report::{reduction_doubt, reduction_line, tone, unexpected_line};
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone,
-    readable, window,
+    Axis, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone, window,
 };
 use nav_sim_navigation::ekf::FixUpdate;
 use nav_sim_navigation::metrics::{EpochMetrics, FanEpoch, OutageSummary, Summary, VerdictKind};
@@ -48,7 +46,6 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     lines.extend(verdict);
     let mut page = Document::new(&format!("INS/GNSS {}", summary.method), tone, lines);
     notes(summary, answer, &mut page);
-    page.facts(&assumptions(summary, answer));
     page.chart(
         &track_map("reference", &answer.track, "Reference trajectory", &windows),
         "",
@@ -212,41 +209,10 @@ fn provenance(answer: &RunAnswer, page: &mut Document) {
         "nav-sim {}; the command is in manifest.json.",
         env!("CARGO_PKG_VERSION")
     ));
-    let mut table = Table::new(["input", "file", "BLAKE3"]);
-    for i in &answer.inputs {
-        table.row([i.role.clone(), i.path.clone(), i.blake3.clone()].map(Cell::from));
-    }
-    page.table(&table);
+    let columns = [("input", "role"), ("file", "path"), ("BLAKE3", "blake3")];
+    page.table(&Table::of(&answer.inputs, "/*", &columns));
     let configuration = toml::to_string_pretty(&answer.origin.configuration).unwrap_or_default();
     page.folded("Configuration", |page| page.code(&configuration));
-}
-
-/// What the results rest on, beside the configuration.
-fn assumptions(summary: &Summary, answer: &RunAnswer) -> Vec<(&'static str, String)> {
-    let input = |role: &str| {
-        let found = answer.inputs.iter().find(|i| i.role == role);
-        found.map_or("", |i| i.path.as_str())
-    };
-    let truth = match (input("static"), input("truth")) {
-        ("", "") => format!("{} (the model of the filter)", input("model")),
-        ("", model) => model.to_owned(),
-        (recording, _) => format!("windows of {recording}"),
-    };
-    let mut facts = vec![
-        ("trajectory", input("trajectory").to_owned()),
-        (
-            "model of the filter",
-            format!("{}, {} states", input("model"), summary.filter_states),
-        ),
-        ("what makes the errors", truth),
-    ];
-    let (runs, diverged) = (summary.runs, summary.diverged);
-    if runs > 0 {
-        let worth = readable(summary.independent_runs);
-        let text = format!("{runs} ({diverged} diverged), worth {worth} independent ones");
-        facts.push(("runs", text));
-    }
-    facts
 }
 
 /// The sources of the errors at the ends of the outages that are shown, beside what the filter believes.
@@ -278,15 +244,6 @@ fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
 }
 
 // The figures of a run.
-
-/// The outages (start, end) (s).
-fn windows(summary: &Summary) -> Vec<(f64, f64)> {
-    summary
-        .outages
-        .iter()
-        .map(|o| (o.start_s, o.end_s))
-        .collect()
-}
 
 fn over_time(epochs: &[EpochMetrics], value: impl Fn(&EpochMetrics) -> f64) -> Vec<(f64, f64)> {
     epochs.iter().map(|e| (e.t_s, value(e))).collect()
