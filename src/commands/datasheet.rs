@@ -114,11 +114,17 @@ impl Serialize for DatasheetAnswer {
 
 impl Answer for DatasheetAnswer {
     fn document(&self) -> Document {
-        let lines = match self {
-            Self::Model(_) => Vec::new(),
-            Self::Catalogue(units) => units.iter().map(CataloguedUnit::text).collect(),
-        };
-        Document::new("Data sheet", Tone::Good, lines)
+        Document::new("Data sheet", Tone::Good, [""; 0])
+    }
+
+    fn text(&self) -> Option<String> {
+        match self {
+            Self::Model(_) => None,
+            Self::Catalogue(units) => {
+                let lines: Vec<String> = units.iter().map(CataloguedUnit::text).collect();
+                Some(lines.join("\n"))
+            }
+        }
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {

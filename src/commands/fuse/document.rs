@@ -153,6 +153,19 @@ impl FuseAnswer {
                 "reference/rmse/yaw_deg smoothed/reference/rmse/yaw_deg",
             ),
         ];
+        let of_outage = |k: usize| {
+            ["fix", "reference"].map(|end| {
+                let place = format!("{{outages/{k}/start_s}}–{{outages/{k}/end_s}} s");
+                (
+                    format!("end of outage {place}: error from the {end} (m)"),
+                    format!("outages/{k}/end_from_{end}/horizontal_m -"),
+                )
+            })
+        };
+        let outages = 0..self.summary.outcome.outages.len();
+        let ends: Vec<_> = outages.flat_map(of_outage).collect();
+        let ends = ends.iter().map(|(title, keys)| (&**title, &**keys));
+        let rows: Vec<_> = rows.into_iter().chain(ends).collect();
         let table = Table::of_keys(self, &["", "filter", "smoothed"], &rows);
         document.lead(table.without_unknown());
         let mut table = |title: &str, table: Table| {
