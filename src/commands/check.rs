@@ -95,8 +95,11 @@ impl Command for CheckFiles {
 
 impl Answer for Checked {
     fn document(&self) -> Document {
-        let sound = self.files.iter().filter(|file| file.ok);
-        let lines = sound.map(|CheckedFile { file, found, .. }| format!("{file}: {found}"));
+        let lines = self
+            .files
+            .iter()
+            .filter(|file| file.ok)
+            .map(|CheckedFile { file, found, .. }| format!("{file}: {found}"));
         Document::new("Files", Tone::Good, lines)
     }
 
@@ -121,12 +124,15 @@ fn drive(imu: &ImuFile, context: &Context<'_>) -> String {
 fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<String> {
     Ok(match file_kind::of(path)? {
         FileKind::Scenario => {
-            let scenario = scenario_file::read(path)?;
-            format!("a scenario of {} runs", scenario.run.runs)
+            format!("a scenario of {} runs", scenario_file::read(path)?.run.runs)
         }
         FileKind::Study => {
-            let cells = Study::read(path, &[])?.cells(path.parent().unwrap_or(Path::new("")))?;
-            format!("a study of {} cells", cells.len())
+            format!(
+                "a study of {} cells",
+                Study::read(path, &[])?
+                    .cells(path.parent().unwrap_or(Path::new("")))?
+                    .len()
+            )
         }
         FileKind::Model => {
             let model = inputs::model(path, context)?.model;
@@ -146,9 +152,12 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
         }
         FileKind::Contamination => {
             // the rate only turns seconds into samples
-            let rate_hz = rate_hz.unwrap_or(100.0);
-            let rules = contamination_file::find(&path.to_string_lossy(), rate_hz)?.rules;
-            format!("a contamination of {} operations", rules.len())
+            format!(
+                "a contamination of {} operations",
+                contamination_file::find(&path.to_string_lossy(), rate_hz.unwrap_or(100.0))?
+                    .rules
+                    .len()
+            )
         }
         FileKind::Curve => format!("{} wavelet-variance curves", curve_file::read(path)?.len()),
         FileKind::Record => {
@@ -171,11 +180,15 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
                 true => ", without standard deviations (fuse --gnss-sigma)",
                 false => "",
             };
-            let read = read.or_else(|e| read_gnss(path, Some(&given), None, None).map_err(|_| e));
-            let (fixes, notes) = read?;
+            let (fixes, notes) =
+                read.or_else(|e| read_gnss(path, Some(&given), None, None).map_err(|_| e))?;
             tell(&notes, context);
-            let span = fixes.first().zip(fixes.last());
-            let span = seconds(span.map_or(0.0, |(a, b)| b.t_s - a.t_s));
+            let span = seconds(
+                fixes
+                    .first()
+                    .zip(fixes.last())
+                    .map_or(0.0, |(a, b)| b.t_s - a.t_s),
+            );
             format!("{} GNSS fixes over {span} s{unsaid}", fixes.len())
         }
         FileKind::Imu => drive(&read_imu(path, None, None)?, context),
@@ -185,8 +198,10 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
                 // what is no static recording may be one of a drive or a flight
                 Err(refusal) => {
                     let imu = read_imu(path, None, None).ok();
-                    let imu = imu.filter(|imu| moves(&imu.samples)).ok_or(refusal)?;
-                    return Ok(drive(&imu, context));
+                    return Ok(drive(
+                        &imu.filter(|imu| moves(&imu.samples)).ok_or(refusal)?,
+                        context,
+                    ));
                 }
             };
             let mut described: Vec<String> = recordings

@@ -83,9 +83,11 @@ impl Command for Compare {
     }
 
     fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        let files = |run: &PathBuf| RUN_FILES.map(|name| run.join(name));
-        let all = self.runs.iter().chain([&self.reference]).flat_map(files);
-        Ok(all
+        Ok(self
+            .runs
+            .iter()
+            .chain([&self.reference])
+            .flat_map(|run: &PathBuf| RUN_FILES.map(|name| run.join(name)))
             .filter(|path| path.exists())
             .map(|path| ("run", path))
             .collect())
@@ -107,18 +109,19 @@ fn compare(runs: &[PathBuf], reference: &Path, states: Vec<usize>) -> Result<Com
     let name = reference.display().to_string();
     let directory = run_directory::read(reference)?;
     let read = |path: &PathBuf| {
-        let of_itself = is_same_place(path, reference);
         Ok((
             path.display().to_string(),
             run_directory::read(path)?,
-            of_itself,
+            is_same_place(path, reference),
         ))
     };
     let read = runs.iter().map(read).collect::<Result<Vec<_>>>()?;
-    let runs = read
-        .iter()
-        .map(|(run, found, of_itself)| (run.as_str(), found, *of_itself));
-    between(runs, (&name, &directory), states)
+    between(
+        read.iter()
+            .map(|(run, found, of_itself)| (run.as_str(), found, *of_itself)),
+        (&name, &directory),
+        states,
+    )
 }
 
 /// Compares runs by name, each with whether it is the reference itself.
@@ -154,14 +157,13 @@ pub(crate) fn between<'a>(
         }
         let is_paired = differences.is_empty();
         found.paired &= is_paired;
-        let compared = compared(
+        found.candidates.push(compared(
             run.to_owned(),
             candidate,
             directory,
             is_paired,
             is_reference,
-        )?;
-        found.candidates.push(compared);
+        )?);
     }
     separate(&mut found.candidates);
     for candidate in &found.candidates {
@@ -229,19 +231,23 @@ fn compared(
         .refuse_within(&run)?;
     // the reference is itself, whatever its calibration leaves open
     if !is_reference {
-        let open = candidate
-            .asee_mean_ci95
-            .iter()
-            .zip(&reference.asee_mean_ci95);
-        for (outage, ends) in outages.iter_mut().zip(open) {
+        for (outage, ends) in outages.iter_mut().zip(
+            candidate
+                .asee_mean_ci95
+                .iter()
+                .zip(&reference.asee_mean_ci95),
+        ) {
             if let (Some(interval), Some(of_reference)) = ends {
                 outage.widen(interval, of_reference);
             }
         }
     }
     let label = Label::of(&run, candidate.origin.model.estimator.as_deref());
-    let epochs = candidate.experiment.epochs.iter();
-    let both = epochs.zip(&reference.experiment.epochs);
+    let both = candidate
+        .experiment
+        .epochs
+        .iter()
+        .zip(&reference.experiment.epochs);
     let pct = |a: f64, b: f64| 100.0 * (a / b - 1.0);
     let curve = both.map(|(c, r)| (c.t_s, std::array::from_fn(|i| pct(c.asee[i], r.asee[i]))));
     Ok(CandidateResult {
@@ -285,8 +291,8 @@ fn differences(candidate: &RunDirectory, reference: &RunDirectory) -> Vec<&'stat
 
 /// What made the INS errors: a recording, a model, or the filter's own.
 fn truth(manifest: &Manifest) -> Vec<&str> {
-    let given = ["static", "truth", "model"].map(|role| manifest.hashes(role));
-    given
+    ["static", "truth", "model"]
+        .map(|role| manifest.hashes(role))
         .into_iter()
         .find(|hashes| !hashes.is_empty())
         .unwrap_or_default()
@@ -405,11 +411,10 @@ impl Comparison {
 
     /// The ratios of the states that are shown, for other programs.
     fn rows_csv(&self) -> String {
-        let is_shown = |row: &&Row| self.states.iter().any(|k| REPORTED_NAMES[*k] == row.state);
         csv(&self
             .rows
             .iter()
-            .filter(is_shown)
+            .filter(|row: &&Row| self.states.iter().any(|k| REPORTED_NAMES[*k] == row.state))
             .map(flat)
             .collect::<Vec<_>>())
     }
@@ -455,29 +460,37 @@ impl Comparison {
         let others = self.others();
         let panel = |state: &usize| {
             let line = |(hue, (name, c)): (usize, &(String, &CandidateResult))| {
-                let points = c.curve.iter().map(|(t, pct)| (*t, pct[*state]));
-                Series::line(name, Colour::Hue(hue), points.collect())
+                Series::line(
+                    name,
+                    Colour::Hue(hue),
+                    c.curve.iter().map(|(t, pct)| (*t, pct[*state])).collect(),
+                )
             };
             let zero = Series::new("", Colour::Ink, Mark::Level(0.0));
             let axis = Axis::linear(&format!("{}: (ratio − 1)·100 (%)", SPOKEN[*state]))
                 .including(-1.0, 1.0);
-            let lines = others.iter().enumerate().map(line);
-            let series = std::iter::once(zero).chain(lines).collect();
+            let series = std::iter::once(zero)
+                .chain(others.iter().enumerate().map(line))
+                .collect();
             Panel {
                 height: 0.8,
                 ..Panel::new(axis, series)
             }
         };
-        let title = format!("ASEE against {}", self.name_of_reference());
-        let panels = self.states.iter().map(panel).collect();
-        Chart::over_time(&title, panels, &self.outages)
+        Chart::over_time(
+            &format!("ASEE against {}", self.name_of_reference()),
+            self.states.iter().map(panel).collect(),
+            &self.outages,
+        )
     }
 
     /// A row a run and outage, as they stand in comparison.json.
     fn consistency_table(&self) -> Table {
         let states = self.states.iter().map(|s| {
-            let key = format!("rmse_end_ratio_error_pct/{}", REPORTED_NAMES[*s]);
-            (format!("RMSE {} (%)", axis_of(*s)), key)
+            (
+                format!("RMSE {} (%)", axis_of(*s)),
+                format!("rmse_end_ratio_error_pct/{}", REPORTED_NAMES[*s]),
+            )
         });
         let states: Vec<(String, String)> = states.collect();
         let mut columns = vec![
@@ -638,9 +651,8 @@ fn ratio_table(candidates: &[CandidateResult], states: &[usize], outages: &[(f64
             .iter()
             .flat_map(|s| estimators.iter().map(move |e| (*s, *e)))
     };
-    let name = |(s, e)| format!("{} {e}", axis_of(s)).trim_end().to_owned() + " (%)";
     let mut table = Table::new(["scenario", "outage"])
-        .and(columns().map(name))
+        .and(columns().map(|(s, e)| format!("{} {e}", axis_of(s)).trim_end().to_owned() + " (%)"))
         .with_keys(2);
     for scenario in scenarios {
         for (outage, (start_s, end_s)) in outages.iter().enumerate() {

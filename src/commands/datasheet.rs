@@ -67,10 +67,12 @@ impl Command for DatasheetArgs {
 
     fn run(&self, context: &Context<'_>) -> Result<DatasheetAnswer> {
         if self.list {
-            let units = CATALOGUE
-                .iter()
-                .map(|(name, _)| CataloguedUnit::named(name));
-            return Ok(DatasheetAnswer::Catalogue(units.collect::<Result<_>>()?));
+            return Ok(DatasheetAnswer::Catalogue(
+                CATALOGUE
+                    .iter()
+                    .map(|(name, _)| CataloguedUnit::named(name))
+                    .collect::<Result<_>>()?,
+            ));
         }
         let mut sheet = match (&self.entry, &self.unit) {
             (Some(path), _) => read(path)?,
@@ -80,20 +82,20 @@ impl Command for DatasheetArgs {
         self.figures.over(&mut sheet);
         let made = sheet.model_file(self.rate_hz).map_err(Failure::input)?;
         if made.file.missing.len() == made.file.model.axes.len() {
-            let failure = Failure::input("no figure is given that makes a noise model");
-            let hint = "give --vrw and --arw, or --unit NAME (nav-sim datasheet --list)";
-            return Err(failure.hint(hint));
+            return Err(
+                Failure::input("no figure is given that makes a noise model")
+                    .hint("give --vrw and --arw, or --unit NAME (nav-sim datasheet --list)"),
+            );
         }
-        let lacking = Sensor::ALL
+        Sensor::ALL
             .into_iter()
-            .flat_map(|sensor| lacking(&sheet, sensor));
-        lacking
+            .flat_map(|sensor| lacking(&sheet, sensor))
             .chain(made.doubts)
             .for_each(|doubt| context.warn(doubt));
-        let left_out = Sensor::ALL
+        Sensor::ALL
             .into_iter()
-            .flat_map(|sensor| left_out(&sheet, sensor));
-        left_out.for_each(|note| context.remark(note));
+            .flat_map(|sensor| left_out(&sheet, sensor))
+            .for_each(|note| context.remark(note));
         context.remark("an assumption, not a calibration");
         Ok(DatasheetAnswer::Model(Box::new(made.file)))
     }
@@ -198,13 +200,14 @@ fn named(name: &str) -> Result<Datasheet> {
     if let Some(sheet) = catalogued(name) {
         return sheet;
     }
-    let failure = Failure::input(format!("--unit {name}: the catalogue has no such unit"));
-    Err(failure.hint(
-        match nearest(name, CATALOGUE.iter().map(|(known, _)| *known)) {
-            Some(meant) => format!("did you mean {meant}?"),
-            None => "nav-sim datasheet --list shows what there is".to_owned(),
-        },
-    ))
+    Err(
+        Failure::input(format!("--unit {name}: the catalogue has no such unit")).hint(
+            match nearest(name, CATALOGUE.iter().map(|(known, _)| *known)) {
+                Some(meant) => format!("did you mean {meant}?"),
+                None => "nav-sim datasheet --list shows what there is".to_owned(),
+            },
+        ),
+    )
 }
 
 fn lacking(sheet: &Datasheet, sensor: Sensor) -> impl Iterator<Item = String> {
@@ -217,10 +220,10 @@ fn lacking(sheet: &Datasheet, sensor: Sensor) -> impl Iterator<Item = String> {
         (Figure::Bias, "bias instability", format!("{sensor}-bias")),
         (Figure::TurnOn, "turn-on bias", format!("{sensor}-turn-on")),
     ];
-    let lacking = figures
+    figures
         .into_iter()
-        .filter(move |f| sheet.value(sensor, f.0).is_none());
-    lacking.map(move |(_, name, flag)| format!("{sensor}: no {name} is given (--{flag})"))
+        .filter(move |f| sheet.value(sensor, f.0).is_none())
+        .map(move |(_, name, flag)| format!("{sensor}: no {name} is given (--{flag})"))
 }
 
 fn left_out(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
@@ -273,8 +276,12 @@ impl CataloguedUnit {
         let [class, name] =
             [&self.class, &self.name].map(|text| text.as_deref().unwrap_or_default());
         let figures = |sensor: Sensor| {
-            let own = self.figures.iter().filter(|f| f.sensor == sensor);
-            let shown: Vec<_> = own.map(|f| format!("{} {}", f.figure, f.given)).collect();
+            let shown: Vec<_> = self
+                .figures
+                .iter()
+                .filter(|f| f.sensor == sensor)
+                .map(|f| format!("{} {}", f.figure, f.given))
+                .collect();
             format!("\n  {sensor:<5} {}", shown.join(", "))
         };
         let figures = Sensor::ALL.map(figures).concat();

@@ -73,8 +73,9 @@ impl Command for Design {
     const NAME: &'static str = "design";
 
     fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        let model = files("model", [&self.model]);
-        Ok(model.chain(files("trajectory", &self.trajectory)).collect())
+        Ok(files("model", [&self.model])
+            .chain(files("trajectory", &self.trajectory))
+            .collect())
     }
 
     fn run(&self, context: &Context<'_>) -> Result<Designs> {
@@ -86,12 +87,16 @@ impl Command for Design {
         let mut destination = None;
         if let Some(path) = &self.trajectory {
             let trajectory = inputs::trajectory(path, context)?;
-            let span = (trajectory.start_s(), trajectory.end_s());
-            let outages = scenario.outages_on(span, 0)?.windows;
+            let outages = scenario
+                .outages_on((trajectory.start_s(), trajectory.end_s()), 0)?
+                .windows;
             scenario.imu.rate_hz = file.model.rate_hz;
             scenario.validate().map_err(Failure::input)?;
-            let inputs = NavigateInputs::new(trajectory, file.model.clone(), TrueImu::AsBelieved);
-            destination = Some((inputs, scenario, outages));
+            destination = Some((
+                NavigateInputs::new(trajectory, file.model.clone(), TrueImu::AsBelieved),
+                scenario,
+                outages,
+            ));
         }
         let bootstrap = Bootstrap {
             draws: self.draws as usize,
@@ -102,9 +107,9 @@ impl Command for Design {
         let mut designs = Vec::new();
         for k in recordings {
             for h in &hours {
-                let design = self.design(&file, &mut destination, bootstrap, k, *h);
                 designs.push(
-                    design.map_err(|e| Failure::input(e).hint("more, or longer recordings"))?,
+                    self.design(&file, &mut destination, bootstrap, k, *h)
+                        .map_err(|e| Failure::input(e).hint("more, or longer recordings"))?,
                 );
             }
         }
@@ -325,21 +330,22 @@ const NEARLY_ALL: f64 = 0.8;
 
 /// The parameter that would be known least: its name, and how well.
 fn least_known(parameters: &[DesignedParameter]) -> String {
-    let known = parameters
+    parameters
         .iter()
-        .filter_map(|p| Some((p, p.half_width_pct?)));
-    let widest = known.max_by(|a, b| a.1.total_cmp(&b.1));
-    widest.map_or("–".to_owned(), |(p, half)| {
-        format!("{} ± {} %", p.name(), readable(half))
-    })
+        .filter_map(|p| Some((p, p.half_width_pct?)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map_or("–".to_owned(), |(p, half)| {
+            format!("{} ± {} %", p.name(), readable(half))
+        })
 }
 
 impl DesignOutcome {
     /// Parameters whose intervals are nearly all due to what recordings differ by: longer ones tell no more.
     fn lengths_do_not_help(&self) -> usize {
         let is_floor = |p: &&DesignedParameter| {
-            let widths = p.endless_half_width_pct.zip(p.half_width_pct);
-            widths.is_some_and(|(floor, all)| floor >= NEARLY_ALL * all)
+            p.endless_half_width_pct
+                .zip(p.half_width_pct)
+                .is_some_and(|(floor, all)| floor >= NEARLY_ALL * all)
         };
         self.parameters.iter().filter(is_floor).count()
     }
@@ -365,14 +371,13 @@ impl Designs {
                 readable(q.p95_m)
             )
         });
-        let lines = std::iter::once(first).chain(p95).collect();
         (
             if open == 0 {
                 Tone::Good
             } else {
                 Tone::Doubtful
             },
-            lines,
+            std::iter::once(first).chain(p95).collect(),
         )
     }
 
@@ -436,9 +441,8 @@ impl Answer for Designs {
         if designs.len() > 1 {
             document.section("All parameters");
             let plan = |(i, d): (usize, &DesignOutcome)| {
-                let title = format!("{} × {} h (± %)", d.recordings, d.hours);
                 (
-                    title,
+                    format!("{} × {} h (± %)", d.recordings, d.hours),
                     format!("../../../{i}/parameters/@/half_width_pct|not determined"),
                 )
             };

@@ -153,8 +153,7 @@ impl Command for Require {
         let asked = self.requirements(context)?;
         Ok(match (&self.model, &self.catalogue) {
             (Some(path), _) => {
-                let given = asked.given(path, self.vehicle.is_some(), context)?;
-                RequireAnswer::Given(Box::new(given))
+                RequireAnswer::Given(Box::new(asked.given(path, self.vehicle.is_some(), context)?))
             }
             (None, Some(directory)) => {
                 let units = match directory.as_os_str() == BUILT_IN {
@@ -197,8 +196,8 @@ impl Answer for RequireAnswer {
         match self {
             Self::Needed(_) => None,
             Self::Given(given) => {
-                let missed = given.judgement.margins.as_ref().filter(|m| !m.met)?;
-                let Worst { limit, value, .. } = missed.worst;
+                let Worst { limit, value, .. } =
+                    given.judgement.margins.as_ref().filter(|m| !m.met)?.worst;
                 let [value, most] = [value, limit.most].map(|x| limit.quantity.shown(x));
                 Some(Failure::bound(format!(
                     "{} is {value}, the limit is {most}",
@@ -217,8 +216,10 @@ impl Require {
     /// What is asked, with the files read.
     fn requirements(&self, context: &Context<'_>) -> Result<Requirements> {
         if self.limits.is_empty() {
-            let hint = "give one, such as --require 'p95_m<=5' or --require 'yaw_deg<=1'";
-            return refused("no limit is given", hint);
+            return refused(
+                "no limit is given",
+                "give one, such as --require 'p95_m<=5' or --require 'yaw_deg<=1'",
+            );
         }
         let mut scenario = self.settings.read()?;
         if let Some(path) = &self.gnss {
@@ -234,9 +235,13 @@ impl Require {
             scenario.aiding = AidingSettings::car();
         }
         scenario.validate().map_err(Failure::input)?;
-        let trajectory = inputs::trajectory(&self.trajectory, context)?;
-        let limits = self.limits.clone();
-        Requirements::new(scenario, trajectory, limits, self.outage, self.start)
+        Requirements::new(
+            scenario,
+            inputs::trajectory(&self.trajectory, context)?,
+            self.limits.clone(),
+            self.outage,
+            self.start,
+        )
     }
 }
 
@@ -250,11 +255,10 @@ impl Requirements {
         inputs::make_turn_on(&mut scenario.imu, &file, path, context);
         let missing = missing(&file.not_stated());
         if !missing.is_empty() {
-            let text = format!(
+            context.warn(format!(
                 "{}: what is not stated counts as none: {missing}",
                 path.display()
-            );
-            context.warn(text);
+            ));
         }
         let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
         let aidings = match has_vehicle {
@@ -276,8 +280,10 @@ impl Requirements {
     /// The units that are known by name.
     fn catalogue(&self) -> Result<Vec<CatalogueUnit>> {
         let unit = |(name, _): &(&str, &str)| {
-            let sheet = datasheet::catalogued(name).expect("a name of the catalogue")?;
-            self.of_sheet((*name).to_owned(), &sheet)
+            self.of_sheet(
+                (*name).to_owned(),
+                &datasheet::catalogued(name).expect("a name of the catalogue")?,
+            )
         };
         CATALOGUE.iter().map(unit).collect()
     }
@@ -302,21 +308,29 @@ impl Requirements {
             );
         }
         let unit = |path: &PathBuf| {
-            let stem = path.file_stem().unwrap_or_default();
-            let name = stem.to_string_lossy().into_owned();
+            let name = path
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
             if file_kind::of(path)? == FileKind::CatalogueEntry {
                 return self.of_sheet(name, &datasheet::read(path)?);
             }
             let file = inputs::model(path, context)?;
-            let model = inputs::at_rate(path, &file.model, self.scenario.imu.rate_hz, context)?;
-            Ok(self.unit(name, &file, model))
+            Ok(self.unit(
+                name,
+                &file,
+                inputs::at_rate(path, &file.model, self.scenario.imu.rate_hz, context)?,
+            ))
         };
         paths.iter().map(unit).collect()
     }
 
     fn of_sheet(&self, name: String, sheet: &Datasheet) -> Result<CatalogueUnit> {
-        let made = sheet.model_file(self.scenario.imu.rate_hz);
-        let file = made.refuse_within(&name)?.file;
+        let file = sheet
+            .model_file(self.scenario.imu.rate_hz)
+            .refuse_within(&name)?
+            .file;
         Ok(self.unit(name, &file, file.model.clone()))
     }
 }
@@ -342,8 +356,10 @@ struct DriftPoint {
 fn note_beyond(beyond: Option<Outage>, document: &mut Document) {
     if let Some(Outage { start_s, end_s }) = beyond {
         let place = window(start_s, end_s);
-        let text = format!("beyond linear theory in outage {place}: {CONFIRM}");
-        document.note(Importance::Warning, text);
+        document.note(
+            Importance::Warning,
+            format!("beyond linear theory in outage {place}: {CONFIRM}"),
+        );
     }
 }
 
@@ -390,8 +406,11 @@ impl Question {
     }
 
     fn limits_in_words(&self) -> String {
-        let limit = |l: &Limit| format!("{} ≤ {}", l.quantity, readable(l.most));
-        self.limits.iter().map(limit).collect::<Vec<_>>().join(", ")
+        self.limits
+            .iter()
+            .map(|l: &Limit| format!("{} ≤ {}", l.quantity, readable(l.most)))
+            .collect::<Vec<_>>()
+            .join(", ")
     }
 
     /// `p95_m 4.87 at the end of outage 300–360 s`
@@ -614,8 +633,8 @@ impl Requirements {
         };
         let imu = need.allocated()?;
         let model = imu.model(self.scenario.imu.rate_hz);
-        let ends = course.drifts(scenario, &model)?;
-        let worst = Worst::of(&self.limits, &ends).expect("at least one limit and one place");
+        let worst = Worst::of(&self.limits, &course.drifts(scenario, &model)?)
+            .expect("at least one limit and one place");
         let figure = |i: usize| {
             Ok::<_, RequireError>(NeededFigure {
                 figure: ImuParameters::NAMES[i],
@@ -646,8 +665,12 @@ impl Requirements {
             "question": needed.question.in_words(),
             "turn_on_bias": needed.turn_on_in_words(),
         }));
-        let figures = needed.figures.iter();
-        provenance.extend(figures.map(|f| (f.figure.to_owned(), f.allocated.into())));
+        provenance.extend(
+            needed
+                .figures
+                .iter()
+                .map(|f| (f.figure.to_owned(), f.allocated.into())),
+        );
         needed.file.provenance = Some(provenance);
         let stated = self.stated_turn_on();
         needed.file.turn_on = (stated != TurnOn::default()).then_some(stated);
@@ -756,12 +779,15 @@ impl Requirements {
     ) -> Result<Option<Outage>, RequireError> {
         let (scenario, outages) = (scenario.with_full_noise(), [outage]);
         let track = scenario.track(&self.trajectory, model, &outages)?;
-        let belief = scenario.belief(model, &outages, &track)?;
-        let experiment =
-            scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0);
-        let expected = Expected::along(&track, &experiment, &belief, model);
-        let is_beyond = expected.is_some_and(|expected| expected.summary.outages[0].beyond_linear);
-        Ok(is_beyond.then_some(outage))
+        let expected = Expected::along(
+            &track,
+            &scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0),
+            &scenario.belief(model, &outages, &track)?,
+            model,
+        );
+        Ok(expected
+            .is_some_and(|expected| expected.summary.outages[0].beyond_linear)
+            .then_some(outage))
     }
 
     /// Units whose figures are all stated, the best first, then the others by name.
@@ -823,8 +849,10 @@ impl Requirements {
                 .iter()
                 .any(|drift| self.limits.iter().any(|l| drift.exceeds(l)))
         };
-        let missed = lengths.iter().position(is_missed);
-        let longest_s = missed.map(|first| first.checked_sub(1).map_or(0.0, |last| lengths[last]));
+        let longest_s = lengths
+            .iter()
+            .position(is_missed)
+            .map(|first| first.checked_sub(1).map_or(0.0, |last| lengths[last]));
         let at_least_s = lengths.last().copied().unwrap_or(0.0);
         let at_least = || {
             let rest = match at_least_s < LONGEST_S {
@@ -929,9 +957,8 @@ fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
     // Times come from samples: within a millisecond they are the same.
     const SAME_S: f64 = 1e-3;
     let drift_of_curve = |curve: &Vec<Drift>| {
-        let first = curve.partition_point(|d| d.after_s < length_s - SAME_S);
         curve
-            .get(first)
+            .get(curve.partition_point(|d| d.after_s < length_s - SAME_S))
             .filter(|d| d.after_s < length_s + SAME_S)
             .copied()
     };
@@ -1065,8 +1092,11 @@ impl GivenImu {
             document.lead(Table::of(self, "/aidings/*", &columns));
         }
         document.section("Error against the length of an outage");
-        let columns = [("limit on", "quantity"), AFTER];
-        document.table(&Table::of(self, "/curves/*", &columns));
+        document.table(&Table::of(
+            self,
+            "/curves/*",
+            &[("limit on", "quantity"), AFTER],
+        ));
         document.checked(CHECKED);
         document
     }
@@ -1126,14 +1156,22 @@ impl Ranking {
                 "{open} units are not ranked: their data sheets leave figures out (--verbose lists them)"
             ));
         }
-        let tone = Tone::from(self.best().is_some());
-        let mut document = Document::new("IMUs against a limit", tone, lines);
-        let beyond = self.units.iter();
-        let beyond = beyond.filter(|u| u.judgement.beyond_linear.is_some());
-        let names: Vec<&str> = beyond.map(|u| u.unit.as_str()).collect();
+        let mut document = Document::new(
+            "IMUs against a limit",
+            Tone::from(self.best().is_some()),
+            lines,
+        );
+        let names: Vec<&str> = self
+            .units
+            .iter()
+            .filter(|u| u.judgement.beyond_linear.is_some())
+            .map(|u| u.unit.as_str())
+            .collect();
         if !names.is_empty() {
-            let text = format!("beyond linear theory: {}: {CONFIRM}", names.join(", "));
-            document.note(Importance::Warning, text);
+            document.note(
+                Importance::Warning,
+                format!("beyond linear theory: {}: {CONFIRM}", names.join(", ")),
+            );
         }
         let quantity = quantity_in_words(self.question.limits[0].quantity);
         let columns = format!(
@@ -1149,8 +1187,11 @@ impl Ranking {
         ];
         document.lead(Table::of(self, "/units/*", &columns));
         document.section("Figures that are missing");
-        let columns = [("unit", "unit"), ("not stated", "missing")];
-        document.table(&Table::of(self, "/units/*", &columns));
+        document.table(&Table::of(
+            self,
+            "/units/*",
+            &[("unit", "unit"), ("not stated", "missing")],
+        ));
         document.text(RULE);
         document.checked(CHECKED);
         document

@@ -102,10 +102,14 @@ impl Command for Synthesize {
     const PAGE: bool = false;
 
     fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        let contamination = self.contaminate.iter().map(PathBuf::from);
-        let contamination = contamination.filter(|path| path.exists());
-        let files = contamination.map(|path| ("contamination", path));
-        Ok(files.chain([("model", self.model.clone())]).collect())
+        Ok(self
+            .contaminate
+            .iter()
+            .map(PathBuf::from)
+            .filter(|path| path.exists())
+            .map(|path| ("contamination", path))
+            .chain([("model", self.model.clone())])
+            .collect())
     }
 
     fn output_names(&self) -> Vec<Cow<'static, str>> {
@@ -116,10 +120,9 @@ impl Command for Synthesize {
         let file = model_file::read(&self.model)?;
         let (shown, rate_hz) = (self.model.display(), file.model.rate_hz);
         if self.spread && file.spread.is_none() {
-            let hint = "see the head of calib_data/consumer_mems.toml, or leave --spread out";
             return refused(
                 format!("{shown}: no [spread] to draw parameters from"),
-                hint,
+                "see the head of calib_data/consumer_mems.toml, or leave --spread out",
             );
         }
         if file.turn_on.is_some() {
@@ -127,8 +130,11 @@ impl Command for Synthesize {
                 "{shown}: its turn-on biases are not drawn: recordings are of noise about their mean"
             ));
         }
-        let contamination = self.contaminate.as_deref();
-        let contamination = contamination.map(|name| find(name, rate_hz)).transpose()?;
+        let contamination = self
+            .contaminate
+            .as_deref()
+            .map(|name| find(name, rate_hz))
+            .transpose()?;
         let channels = self.wanted(&file, context)?;
         reaches(contamination.as_ref(), self.replicates, &channels, context)?;
         let samples = match self.duration {
@@ -136,15 +142,17 @@ impl Command for Synthesize {
             None => self.samples.unwrap_or(524_284) as f64,
         };
         if samples < 2.0 {
-            let message = format!("a recording needs at least 2 samples; these are {samples}");
-            return Err(Failure::input(message));
+            return Err(Failure::input(format!(
+                "a recording needs at least 2 samples; these are {samples}"
+            )));
         }
         let bytes = samples * channels.len() as f64 * 8.0;
         if bytes >= isize::MAX as f64 || Vec::<u8>::new().try_reserve_exact(bytes as usize).is_err()
         {
             let gigabytes = bytes / 1e9;
-            let message = format!("{samples} samples need {gigabytes:.0} GB of memory");
-            return Err(Failure::could_not(message));
+            return Err(Failure::could_not(format!(
+                "{samples} samples need {gigabytes:.0} GB of memory"
+            )));
         }
         let mut synthesis = Synthesis {
             schema_version: 1,
@@ -164,8 +172,10 @@ impl Command for Synthesize {
         };
         for k in 1..=self.replicates {
             let model = synthesis.model(k)?;
-            let axes = synthesis.channels.iter();
-            let axes = axes.map(|c| (c.to_string(), model.axis(*c).processes.clone()));
+            let axes = synthesis
+                .channels
+                .iter()
+                .map(|c| (c.to_string(), model.axis(*c).processes.clone()));
             let replicate = Replicate {
                 file: name(k),
                 contaminated: synthesis.is_contaminated(k),
@@ -181,15 +191,15 @@ impl Command for Synthesize {
 impl Synthesize {
     /// The channels to make: those asked for that the model has.
     fn wanted(&self, file: &ModelFile, context: &Context<'_>) -> Result<Vec<Channel>> {
-        let asked = |c: &Channel| self.axes.iter().any(|set| set.channels.contains(c));
         let (missing, present): (Vec<Channel>, Vec<Channel>) = Channel::ALL
             .into_iter()
-            .filter(asked)
+            .filter(|c: &Channel| self.axes.iter().any(|set| set.channels.contains(c)))
             .partition(|c| file.missing.contains(c));
         let shown = self.model.display();
         if present.is_empty() {
-            let message = format!("{shown} has no noise model for the axes asked for");
-            return Err(Failure::input(message));
+            return Err(Failure::input(format!(
+                "{shown} has no noise model for the axes asked for"
+            )));
         }
         for channel in missing {
             context.warn(format!(
@@ -215,8 +225,9 @@ impl Synthesis {
     }
 
     fn is_contaminated(&self, replicate: u64) -> bool {
-        let contamination = self.contamination.as_ref();
-        contamination.is_some_and(|c| c.touches(replicate))
+        self.contamination
+            .as_ref()
+            .is_some_and(|c| c.touches(replicate))
     }
 
     /// The model of a replicate, whose contamination is tried on silence.
@@ -236,10 +247,12 @@ impl Synthesis {
 
     fn text(&self, replicate: u64, model: &Model) -> String {
         let signal = |channel: &Channel| {
-            let signal = self
-                .imu()
-                .signal(model, replicate, *channel, self.drawn.samples);
-            (*channel, signal.expect("its contamination was tried"))
+            (
+                *channel,
+                self.imu()
+                    .signal(model, replicate, *channel, self.drawn.samples)
+                    .expect("its contamination was tried"),
+            )
         };
         let signals: Vec<_> = self.channels.par_iter().map(signal).collect();
         recordings::csv(model.rate_hz, &signals)

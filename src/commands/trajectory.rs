@@ -74,8 +74,9 @@ struct Source {
 struct Origin([f64; 3]);
 
 fn origin(text: &str) -> Result<Origin, String> {
-    let expected = || "not LAT_DEG,LON_DEG,H_M with a latitude within ±89.9".to_owned();
-    parse_origin(text).map(Origin).ok_or_else(expected)
+    parse_origin(text)
+        .map(Origin)
+        .ok_or_else(|| "not LAT_DEG,LON_DEG,H_M with a latitude within ±89.9".to_owned())
 }
 
 impl Source {
@@ -395,17 +396,19 @@ impl Command for Record {
     const PAGE: bool = false;
 
     fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        let scenario = inputs::files("scenario", &self.scenario);
-        let model = ("model", self.model.clone());
-        Ok([self.source.input(), model]
+        Ok([self.source.input(), ("model", self.model.clone())]
             .into_iter()
-            .chain(scenario)
+            .chain(inputs::files("scenario", &self.scenario))
             .collect())
     }
 
     fn run(&self, context: &Context<'_>) -> Result<RecordedDrive> {
-        let scenario = self.scenario.as_deref().map(scenario_file::read);
-        let mut scenario = scenario.transpose()?.unwrap_or_default();
+        let mut scenario = self
+            .scenario
+            .as_deref()
+            .map(scenario_file::read)
+            .transpose()?
+            .unwrap_or_default();
         let (trajectory, _) = self.source.read(context)?;
         let file = inputs::model(&self.model, context)?;
         let model = continuous::at_rate(&file.model, scenario.imu.rate_hz)
@@ -440,8 +443,9 @@ impl Answer for RecordedDrive {
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {
-        let files = self.files.into_iter().zip(self.texts.clone());
-        files
+        self.files
+            .into_iter()
+            .zip(self.texts.clone())
             .map(|(name, text)| OutputFile::whole(name, text))
             .collect()
     }

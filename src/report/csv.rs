@@ -28,8 +28,10 @@ fn put(key: String, value: Value, into: &mut Map<String, Value>) {
         }),
         ends if key.contains("ci95_") => {
             for (k, end) in ["ci95_low_", "ci95_high_"].into_iter().enumerate() {
-                let value = ends.get(k).cloned().unwrap_or_default();
-                into.insert(key.replace("ci95_", end), value);
+                into.insert(
+                    key.replace("ci95_", end),
+                    ends.get(k).cloned().unwrap_or_default(),
+                );
             }
         }
         value => _ = into.insert(key, value),

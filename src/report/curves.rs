@@ -27,8 +27,11 @@ pub struct Band {
 
 impl Band {
     fn new(wv: Vec<f64>, edof: &[f64], status: Vec<String>) -> Self {
-        let ends = |(nu, edof): (&f64, &f64)| interval::interval(*nu, *edof, CONFIDENCE);
-        let (ci_low, ci_high) = wv.iter().zip(edof).map(ends).unzip();
+        let (ci_low, ci_high) = wv
+            .iter()
+            .zip(edof)
+            .map(|(nu, edof): (&f64, &f64)| interval::interval(*nu, *edof, CONFIDENCE))
+            .unzip();
         Self {
             wv,
             ci_low,
@@ -223,8 +226,10 @@ impl CurvesFile {
                 .find(|g| g.scope == o.scope)
                 .map_or(&[][..], |g| &g.replicates)
         };
-        let curve = |o: &&Outcome| fitted(o, replicates(o), settings);
-        let curves = outcomes.iter().map(curve).collect();
+        let curves = outcomes
+            .iter()
+            .map(|o: &&Outcome| fitted(o, replicates(o), settings))
+            .collect();
         Self {
             schema_version: 1,
             rate_hz: settings.rate_hz,

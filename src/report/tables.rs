@@ -26,8 +26,12 @@ pub(crate) fn epochs_csv(epochs: &[EpochMetrics]) -> String {
             "nees": e.nees.value,
             "coverage": e.coverage,
         }));
-        let biases = BIAS_NAMES.iter().zip(e.bias_asee);
-        row.extend(biases.map(|(name, asee)| (format!("asee_{name}"), asee.into())));
+        row.extend(
+            BIAS_NAMES
+                .iter()
+                .zip(e.bias_asee)
+                .map(|(name, asee)| (format!("asee_{name}"), asee.into())),
+        );
         row
     };
     csv(&epochs.iter().map(row).collect::<Vec<_>>())
@@ -42,8 +46,10 @@ pub(crate) fn fan_csv(fan: &[FanEpoch]) -> String {
             let named = FAN_LEVELS.iter().zip(quantiles.into_iter().flatten());
             // errors are kept in single precision: more digits would say what nobody knows
             let cell = |(p, q): (&f64, f64)| {
-                let name = format!("{prefix}p{:02.0}_m", 100.0 * p);
-                (name, (q as f32).to_string().into())
+                (
+                    format!("{prefix}p{:02.0}_m", 100.0 * p),
+                    (q as f32).to_string().into(),
+                )
             };
             row.extend(named.map(cell));
         }
@@ -150,14 +156,15 @@ pub(crate) fn initial_toml(t_s: f64, state: &NavState, sigma: &InitialSettings) 
     let v = state.v_n;
     let list = |x: [f64; 3]| format!("[{:?}, {:?}, {:?}]", x[0], x[1], x[2]);
     let beside = |sensor: Sensor| {
-        let bias = (InitialSettings::bias_key(sensor), sigma.bias_sigma(sensor));
-        let scale = (
-            InitialSettings::scale_key(sensor),
-            sigma.scale_sigma_ppm(sensor),
-        );
-        let said = [bias, scale]
-            .into_iter()
-            .filter_map(|(key, sigma)| Some((key, sigma?)));
+        let said = [
+            (InitialSettings::bias_key(sensor), sigma.bias_sigma(sensor)),
+            (
+                InitialSettings::scale_key(sensor),
+                sigma.scale_sigma_ppm(sensor),
+            ),
+        ]
+        .into_iter()
+        .filter_map(|(key, sigma)| Some((key, sigma?)));
         said.map(|(key, sigma)| format!("{key} = {sigma:?}\n"))
             .collect::<String>()
     };

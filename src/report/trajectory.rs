@@ -28,20 +28,32 @@ pub(crate) fn track_map(
     outages: &[(f64, f64)],
 ) -> Chart {
     let way = |from_s: f64, to_s: f64| {
-        let within = track.iter().filter(|(t, _)| (from_s..to_s).contains(t));
-        within.map(|(_, place)| (*place).into()).collect()
+        track
+            .iter()
+            .filter(|(t, _)| (from_s..to_s).contains(t))
+            .map(|(_, place)| (*place).into())
+            .collect()
     };
-    let all = way(f64::NEG_INFINITY, f64::INFINITY);
-    let mut series = vec![Series::line(name, Colour::BELIEVED, all)];
+    let mut series = vec![Series::line(
+        name,
+        Colour::BELIEVED,
+        way(f64::NEG_INFINITY, f64::INFINITY),
+    )];
     series.extend(outages.iter().map(|(start_s, end_s)| {
-        let line = Mark::Line(way(*start_s, *end_s), nav_sim_document::Stroke::Bold);
-        Series::new("outage", Colour::REAL, line)
+        Series::new(
+            "outage",
+            Colour::REAL,
+            Mark::Line(way(*start_s, *end_s), nav_sim_document::Stroke::Bold),
+        )
     }));
-    let ends = [("start", track.first()), ("end", track.last())];
-    series.extend(ends.into_iter().filter_map(|(name, end)| {
-        let (_, [east, north]) = *end?;
-        Some(Series::new(name, Colour::RIGHT, Mark::Place(east, north)))
-    }));
+    series.extend(
+        [("start", track.first()), ("end", track.last())]
+            .into_iter()
+            .filter_map(|(name, end)| {
+                let (_, [east, north]) = *end?;
+                Some(Series::new(name, Colour::RIGHT, Mark::Place(east, north)))
+            }),
+    );
     Chart::map(title, series)
 }
 

@@ -97,8 +97,9 @@ impl BatchRequest {
     /// Directory of the study.
     #[must_use]
     pub fn directory(&self) -> PathBuf {
-        let stem = || Path::new("out").join(self.study.file_stem().unwrap_or_default());
-        self.out.clone().unwrap_or_else(stem)
+        self.out
+            .clone()
+            .unwrap_or_else(|| Path::new("out").join(self.study.file_stem().unwrap_or_default()))
     }
 
     /// Computes the cells that are missing, and merges when none is.
@@ -111,12 +112,11 @@ impl BatchRequest {
         variable: &dyn Fn(&str) -> Option<String>,
         context: &Context<'_>,
     ) -> Result<Outcome> {
-        let study = Study::read(&self.study, &self.set)?;
-        let outcome = self.run_study(&study, variable, context);
-        outcome.map_err(|e| match e.code() {
-            2 if e.file().is_none() => e.within(&self.study.display().to_string()),
-            _ => e,
-        })
+        self.run_study(&Study::read(&self.study, &self.set)?, variable, context)
+            .map_err(|e| match e.code() {
+                2 if e.file().is_none() => e.within(&self.study.display().to_string()),
+                _ => e,
+            })
     }
 
     fn run_study(
@@ -150,8 +150,7 @@ impl BatchRequest {
         }
         let units = units(&cells, context)?;
         if self.dry_run {
-            let changed = changed.len();
-            return estimate(&cells, &units, &place, changed, context).map(Outcome::Estimate);
+            return estimate(&cells, &units, &place, changed.len(), context).map(Outcome::Estimate);
         }
         if cells.iter().any(|cell| !place.is_done(cell)) {
             withdraw(&place);
@@ -165,9 +164,11 @@ impl BatchRequest {
         };
         let worked = work(&place, &own, context)?;
         for cell in &cells {
-            let has_cell = |unit: &&Unit<'_>| unit.cells.iter().any(|own| own.name == cell.name);
-            let of_cell = units.iter().filter(has_cell);
-            let firsts: Vec<u64> = of_cell.map(|unit| unit.first).collect();
+            let firsts: Vec<u64> = units
+                .iter()
+                .filter(|unit: &&Unit<'_>| unit.cells.iter().any(|own| own.name == cell.name))
+                .map(|unit| unit.first)
+                .collect();
             if firsts.len() > 1 {
                 assemble(&place, cell, &firsts, context)?;
             }
@@ -178,9 +179,8 @@ impl BatchRequest {
                 0 => String::new(),
                 n => format!(" (and {n} more cells)"),
             };
-            let hint = failure.advice();
-            let failed = Failure::could_not(format!("cell {name}: {failure}{more}"));
-            return Err(failed.or_hint_if(hint));
+            return Err(Failure::could_not(format!("cell {name}: {failure}{more}"))
+                .or_hint_if(failure.advice()));
         }
         let left = own.iter().filter(|unit| !place.has_unit(unit)).count();
         if left > 0 && !context.go_on() {
@@ -210,10 +210,11 @@ fn adopt(
     is_dry: bool,
     context: &Context<'_>,
 ) -> Vec<(String, String)> {
-    let entries = fs::read_dir(place.0.join("cells")).into_iter();
-    let names = entries.flatten().flatten();
-    let names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
-    let keyed = names
+    let keyed = fs::read_dir(place.0.join("cells"))
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
         .filter(|name| !name.ends_with(".damaged"))
         .filter_map(|name| Some((place.manifest(&name)?.key, name)));
     let there: HashMap<String, String> = keyed.collect();
@@ -226,8 +227,9 @@ fn adopt(
             drop(fs::rename(place.cell(name), place.cell(&cell.name)));
         }
     }
-    let others = there.values();
-    let others = others.filter(|name| place.cell(name).exists() && named(name).is_none());
+    let others = there
+        .values()
+        .filter(|name| place.cell(name).exists() && named(name).is_none());
     let mut others: Vec<&String> = others.collect();
     others.sort();
     if !others.is_empty() {
@@ -321,10 +323,12 @@ impl Outcome {
                     .hint("the same command goes on where this one stopped"),
             ),
             // the same command would end the same way: no code for "to be resumed"
-            Self::Stopped { left, .. } => {
-                let message = format!("stopped before a single unit was done; {left} units left");
-                Some(Failure::could_not(message).hint("a longer --time-limit"))
-            }
+            Self::Stopped { left, .. } => Some(
+                Failure::could_not(format!(
+                    "stopped before a single unit was done; {left} units left"
+                ))
+                .hint("a longer --time-limit"),
+            ),
         }
     }
 }
@@ -375,8 +379,7 @@ impl Study {
     /// Reads a study; `set` are keys of `[run]` over its own, as `KEY=VALUE`.
     pub(crate) fn read(path: &Path, set: &[String]) -> Result<Self> {
         let text = source::text(path).map_err(|e| crate::io::Failure::io(path, e))?;
-        let is_json = path.extension().is_some_and(|ending| ending == "json");
-        let mut study: Self = match is_json {
+        let mut study: Self = match path.extension().is_some_and(|ending| ending == "json") {
             true => serde_json::from_str(&text).refuse_within(path.display())?,
             false => toml::from_str(&text).refuse_within(path.display())?,
         };
@@ -385,8 +388,10 @@ impl Study {
             // a word without quotes is a text
             let parsed = format!("{key} = {value}").parse::<Table>();
             let quoted = || format!("{key} = {}", Value::from(value)).parse::<Table>();
-            let over = parsed.or_else(|_| quoted()).refuse_within("--set")?;
-            merge(&mut study.run, over);
+            merge(
+                &mut study.run,
+                parsed.or_else(|_| quoted()).refuse_within("--set")?,
+            );
         }
         Ok(study)
     }
@@ -435,8 +440,11 @@ impl Study {
         let given = self.reference.iter();
         if self.reference.is_empty() {
             let mut labels = cells.iter().flat_map(|cell| &cell.labels);
-            let model = labels.find(|(axis, _)| axis == "model");
-            return model.cloned().into_iter().collect();
+            return labels
+                .find(|(axis, _)| axis == "model")
+                .cloned()
+                .into_iter()
+                .collect();
         }
         given
             .map(|(axis, label)| (axis.clone(), text(label)))
@@ -446,9 +454,12 @@ impl Study {
     fn check_reference(&self, all: &[(Labels, Table)]) -> Result<()> {
         for (axis, label) in &self.reference {
             let label = text(label);
-            let labels = all.iter().flat_map(|(labels, _)| labels);
-            let on_axis = labels.filter(|(other, _)| other == axis);
-            let known = in_order(on_axis.map(|(_, label)| label.as_str()));
+            let known = in_order(
+                all.iter()
+                    .flat_map(|(labels, _)| labels)
+                    .filter(|(other, _)| other == axis)
+                    .map(|(_, label)| label.as_str()),
+            );
             if !known.contains(&label.as_str()) {
                 return refused(
                     format!("\"reference.{axis}\" = \"{label}\" is no label of an axis"),
@@ -597,9 +608,11 @@ impl Door {
         let mut inputs = Vec::new();
         for (role, path) in asked.request.inputs()? {
             if !self.inputs.contains_key(&path) {
-                let read = input::input(role, &path)
-                    .map_err(|e| e.hint("paths are relative to the study's file"))?;
-                self.inputs.insert(path.clone(), read);
+                self.inputs.insert(
+                    path.clone(),
+                    input::input(role, &path)
+                        .map_err(|e| e.hint("paths are relative to the study's file"))?,
+                );
             }
             inputs.push(Input {
                 role: role.to_owned(),
@@ -645,10 +658,12 @@ fn named(axis: &str, values: &Value) -> Result<Vec<(String, Table)>> {
             .collect(),
         Value::Table(labels) => {
             let keys = |(label, keys): (&String, &Value)| {
-                let keys = keys
-                    .as_table()
-                    .ok_or_else(|| refused("has a label without keys"))?;
-                Ok((label.clone(), keys.clone()))
+                Ok((
+                    label.clone(),
+                    keys.as_table()
+                        .ok_or_else(|| refused("has a label without keys"))?
+                        .clone(),
+                ))
             };
             labels.iter().map(keys).collect::<Result<_>>()?
         }
@@ -708,8 +723,11 @@ fn named_request(run: &Table) -> Result<Map<String, serde_json::Value>> {
 }
 
 fn plus(labels: &Labels, axis: &str, label: &str) -> Labels {
-    let own = [(axis.to_owned(), label.to_owned())];
-    labels.iter().cloned().chain(own).collect()
+    labels
+        .iter()
+        .cloned()
+        .chain([(axis.to_owned(), label.to_owned())])
+        .collect()
 }
 
 /// A label as text.
@@ -770,8 +788,7 @@ impl Place<'_> {
 
     /// The manifest of a cell that is there.
     fn manifest(&self, name: &str) -> Option<Manifest> {
-        let text = fs::read_to_string(self.cell(name).join("manifest.json")).ok()?;
-        serde_json::from_str(&text).ok()
+        serde_json::from_str(&fs::read_to_string(self.cell(name).join("manifest.json")).ok()?).ok()
     }
 
     fn is_done(&self, cell: &Cell) -> bool {
@@ -800,8 +817,9 @@ impl Place<'_> {
     fn lock(&self, unit: &Unit<'_>) -> Result<Option<File>> {
         let locks = self.0.join("locks");
         let path = locks.join(format!("{}-{}", &unit.cells[0].noise[..32], unit.first));
-        let made = fs::create_dir_all(&locks).and_then(|()| File::create(&path));
-        let file = made.map_err(|e| Failure::io(&path, e))?;
+        let file = fs::create_dir_all(&locks)
+            .and_then(|()| File::create(&path))
+            .map_err(|e| Failure::io(&path, e))?;
         Ok(match file.try_lock() {
             Err(fs::TryLockError::WouldBlock) => None,
             _ => Some(file),
@@ -841,8 +859,7 @@ fn shard<'a, 'b>(units: &'b [Unit<'a>], (index, count): (u64, u64)) -> Vec<&'b U
     let mut before = 0;
     let mut own = Vec::new();
     for unit in units {
-        let middle = 2 * before + unit.cost();
-        if u128::from(middle) * u128::from(count) / u128::from(2 * total.max(1))
+        if u128::from(2 * before + unit.cost()) * u128::from(count) / u128::from(2 * total.max(1))
             == u128::from(index)
         {
             own.push(unit);
@@ -1014,8 +1031,7 @@ fn assemble(place: &Place<'_>, cell: &Cell, firsts: &[u64], context: &Context<'_
 /// The runs of a part: postcard of the result, BLAKE3 of that.
 fn write_part(path: &Path, result: &RunResult) -> Result<()> {
     let mut bytes = postcard::to_allocvec(result).map_err(Failure::could_not)?;
-    let hash = blake3::hash(&bytes);
-    bytes.extend(hash.as_bytes());
+    bytes.extend(blake3::hash(&bytes).as_bytes());
     match atomic::write(path, bytes) {
         Err(_) if read_part(path).is_some() => Ok(()),
         written => Ok(written?),
@@ -1040,11 +1056,10 @@ pub(crate) fn part_of(bytes: &[u8]) -> Option<RunResult> {
 
 /// `i/n`, i from 0.
 fn parse_shard(text: &str) -> Result<(u64, u64), String> {
-    let numbers = text
-        .split_once('/')
-        .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
-    let shard = numbers.filter(|(index, count): &(u64, u64)| index < count);
-    shard.ok_or_else(|| "expected i/n with i from 0 to n − 1, such as 0/4".to_owned())
+    text.split_once('/')
+        .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)))
+        .filter(|(index, count): &(u64, u64)| index < count)
+        .ok_or_else(|| "expected i/n with i from 0 to n − 1, such as 0/4".to_owned())
 }
 
 /// Variables that give an index, and those that give the first one, the step and how many there are.
@@ -1074,17 +1089,21 @@ fn find_shard(
     }
     let number = |name: &str| -> Result<Option<u64>> {
         let text = variable(name);
-        let number = text.map(|text| {
-            let refused = |_| Failure::input(format!("{name}={text} is not a number"));
-            text.trim().parse().map_err(refused)
-        });
-        number.transpose()
+        text.map(|text| {
+            text.trim()
+                .parse()
+                .map_err(|_| Failure::input(format!("{name}={text} is not a number")))
+        })
+        .transpose()
     };
-    let task = SCHEDULERS.into_iter().find_map(|(name, more)| {
-        let id = number(name).transpose()?;
-        Some(id.map(|id| (name, more, id)))
-    });
-    let Some((name, more, id)) = task.transpose()? else {
+    let Some((name, more, id)) = SCHEDULERS
+        .into_iter()
+        .find_map(|(name, more)| {
+            let id = number(name).transpose()?;
+            Some(id.map(|id| (name, more, id)))
+        })
+        .transpose()?
+    else {
         return match shards {
             None | Some(1) => Ok((None, "no scheduler".to_owned())),
             Some(n) => refused(
@@ -1109,13 +1128,12 @@ fn find_shard(
     };
     match index.filter(|index| *index < count) {
         Some(index) => Ok((Some((index, count)), format!("{name}={id}"))),
-        None => {
-            let failure = Failure::input(format!("{name}={id} is not one of {count} shards"));
-            Err(failure.hint(format!(
+        None => Err(
+            Failure::input(format!("{name}={id} is not one of {count} shards")).hint(format!(
                 "number the tasks from 0 to {}",
                 count.saturating_sub(1)
-            )))
-        }
+            )),
+        ),
     }
 }
 

@@ -63,8 +63,10 @@ pub(super) fn merge(
             (axis.clone(), fixed.get(axis).unwrap_or(label).clone())
         };
         let labels: Labels = cell.labels.iter().map(label).collect();
-        let found = by_labels.get(&labels).copied();
-        found.filter(|cell| !fixed.is_empty() && place.is_done(cell))
+        by_labels
+            .get(&labels)
+            .copied()
+            .filter(|cell| !fixed.is_empty() && place.is_done(cell))
     };
     let axes = cells.iter().take(1).flat_map(|cell| &cell.labels);
     let mut answer = StudyAnswer {
@@ -75,8 +77,10 @@ pub(super) fn merge(
     // of each reference its cells: one setting of the other axes
     let mut settings: IndexMap<&str, Vec<&Cell>> = IndexMap::new();
     for cell in cells {
-        let reference = reference_of(cell).unwrap_or(cell);
-        settings.entry(&reference.name).or_default().push(cell);
+        settings
+            .entry(&reference_of(cell).unwrap_or(cell).name)
+            .or_default()
+            .push(cell);
     }
     for (reference, members) in settings {
         let mut read = Vec::new();
@@ -96,8 +100,11 @@ pub(super) fn merge(
             }
             answer.missing.push(name.clone());
         }
-        let of = read.iter().position(|(cell, _)| cell.name == reference);
-        answer.add(&read, of, states)?;
+        answer.add(
+            &read,
+            read.iter().position(|(cell, _)| cell.name == reference),
+            states,
+        )?;
     }
     answer.complete = answer.missing.is_empty();
     Ok(answer)
@@ -116,8 +123,10 @@ impl StudyAnswer {
             let mut alone = read.iter().map(std::slice::from_ref);
             return alone.try_for_each(|one| self.add(one, Some(0), states));
         };
-        let runs = read.iter().enumerate();
-        let runs = runs.map(|(k, (cell, found))| (cell.name.as_str(), found, k == i));
+        let runs = read
+            .iter()
+            .enumerate()
+            .map(|(k, (cell, found))| (cell.name.as_str(), found, k == i));
         let (cell, found) = &read[i];
         let comparison = between(runs, (&cell.name, found), states.to_vec())?;
         let is_compared = read.len() > 1;
@@ -165,10 +174,18 @@ impl StudyAnswer {
                         "verdict": outage["verdict"]["kind"],
                     });
                     let mut row = flat(&json!({ "cell": cell.name }));
-                    let labels = cell.labels.iter().cloned();
-                    row.extend(labels.map(|(axis, label)| (axis, label.into())));
-                    let ratio = (!candidate.is_reference).then(|| flat(ratio));
-                    for (key, value) in flat(&own).into_iter().chain(ratio.into_iter().flatten()) {
+                    row.extend(
+                        cell.labels
+                            .iter()
+                            .cloned()
+                            .map(|(axis, label)| (axis, label.into())),
+                    );
+                    for (key, value) in flat(&own).into_iter().chain(
+                        (!candidate.is_reference)
+                            .then(|| flat(ratio))
+                            .into_iter()
+                            .flatten(),
+                    ) {
                         row.entry(key).or_insert(value);
                     }
                     self.rows.push(row);
@@ -180,8 +197,10 @@ impl StudyAnswer {
                 .into_iter()
                 .any(|required| required["met"] == false)
             {
-                let message = format!("{}: a required limit is not kept", cell.name);
-                self.unmet.get_or_insert(Failure::bound(message));
+                self.unmet.get_or_insert(Failure::bound(format!(
+                    "{}: a required limit is not kept",
+                    cell.name
+                )));
             }
             self.cells.push(CellSummary {
                 name: cell.name.clone(),
@@ -240,14 +259,20 @@ impl Answer for StudyAnswer {
             false => Tone::Undecided,
         };
         let mut document = Document::new("Study", tone, lines);
-        let diverged = self.cells.iter().filter(|c| c.diverged > 0);
-        let names: Vec<String> = diverged.map(|c| c.name.clone()).collect();
+        let names: Vec<String> = self
+            .cells
+            .iter()
+            .filter(|c| c.diverged > 0)
+            .map(|c| c.name.clone())
+            .collect();
         if !names.is_empty() {
-            let text = format!(
-                "runs diverged in {}; they are in no number",
-                first_of(&names)
+            document.note(
+                Importance::Warning,
+                format!(
+                    "runs diverged in {}; they are in no number",
+                    first_of(&names)
+                ),
             );
-            document.note(Importance::Warning, text);
         }
         let columns = [
             ("cell", "../../name"),
@@ -291,24 +316,35 @@ impl StudyAnswer {
             let mut lines: BTreeMap<Vec<&str>, Vec<(f64, f64)>> = BTreeMap::new();
             for cell in &self.cells {
                 let x: f64 = cell.labels[axis].parse().ok()?;
-                let others = cell.labels.iter().filter(|(other, _)| *other != axis);
-                let name = others.map(|(_, label)| label.as_str()).collect();
-                let p95 = cell.outages.first()?["p95_m"].as_f64();
-                lines.entry(name).or_default().extend(p95.map(|y| (x, y)));
+                let name = cell
+                    .labels
+                    .iter()
+                    .filter(|(other, _)| *other != axis)
+                    .map(|(_, label)| label.as_str())
+                    .collect();
+                lines
+                    .entry(name)
+                    .or_default()
+                    .extend(cell.outages.first()?["p95_m"].as_f64().map(|y| (x, y)));
             }
             let line = |(hue, (name, mut points)): (usize, (Vec<&str>, Vec<(f64, f64)>))| {
                 points.sort_by(|a, b| a.0.total_cmp(&b.0));
                 Series::line(&name.join(" "), Colour::Hue(hue), points)
             };
-            let series = lines
-                .into_iter()
-                .take(LINES)
-                .enumerate()
-                .map(line)
-                .collect();
-            let panel = Panel::new(Axis::log("horizontal error, p95 (m)"), series);
-            let title = format!("Error against {axis}");
-            Some(Chart::new(&title, Axis::linear(axis), vec![panel]))
+            let panel = Panel::new(
+                Axis::log("horizontal error, p95 (m)"),
+                lines
+                    .into_iter()
+                    .take(LINES)
+                    .enumerate()
+                    .map(line)
+                    .collect(),
+            );
+            Some(Chart::new(
+                &format!("Error against {axis}"),
+                Axis::linear(axis),
+                vec![panel],
+            ))
         };
         self.axes.iter().filter_map(chart).collect()
     }

@@ -34,8 +34,10 @@ pub(crate) struct ShownCalibration<'a> {
 impl ShownCalibration<'_> {
     pub(crate) fn document(&self) -> Document {
         let json = &self.json;
-        let estimators = in_order(self.outcomes.iter().map(|o| o.estimator.name()));
-        let title = format!("Stochastic calibration, {}", estimators.join(", "));
+        let title = format!(
+            "Stochastic calibration, {}",
+            in_order(self.outcomes.iter().map(|o| o.estimator.name())).join(", ")
+        );
         let mut document = Document::new(&title, self.tone(), self.verdict());
         let of_one = self.outcomes.iter().all(|o| o.recordings == 1);
         let interval = if of_one {
@@ -74,8 +76,10 @@ impl ShownCalibration<'_> {
         for (index, (outcome, fitted)) in self.outcomes.iter().zip(&self.curves.curves).enumerate()
         {
             document.section(&format!("{} · {}", group_name(fitted), outcome.spec));
-            let chart = chart(fitted, outcome, self.diagnoses, self.settings.rate_hz);
-            document.chart(&chart, CAPTION);
+            document.chart(
+                &chart(fitted, outcome, self.diagnoses, self.settings.rate_hz),
+                CAPTION,
+            );
             document.table(&parameters(outcome));
             if outcome.ranking.is_some() {
                 document.heading("Candidate models");
@@ -130,12 +134,19 @@ impl ShownCalibration<'_> {
     }
 
     fn tone(&self) -> Tone {
-        let is_rejected = |o: &&Outcome| o.goodness().is_some_and(|g| g.is_rejected());
-        if self.outcomes.iter().any(is_rejected) {
+        if self
+            .outcomes
+            .iter()
+            .any(|o: &&Outcome| o.goodness().is_some_and(|g| g.is_rejected()))
+        {
             return Tone::Bad;
         }
-        let is_misfit = |o: &&Outcome| o.departure().misfit.is_some();
-        match self.outcomes.iter().any(is_misfit) || self.diagnoses.iter().any(is_abnormal) {
+        match self
+            .outcomes
+            .iter()
+            .any(|o: &&Outcome| o.departure().misfit.is_some())
+            || self.diagnoses.iter().any(is_abnormal)
+        {
             true => Tone::Doubtful,
             false => Tone::Good,
         }
@@ -143,9 +154,10 @@ impl ShownCalibration<'_> {
 
     /// A line for each model, and one for the recordings.
     fn verdict(&self) -> Vec<String> {
-        let fits = self.outcomes.iter();
-        let fits = fits.map(|o| fit_line(o, &fit_name(o, &self.outcomes), self.settings.rate_hz));
-        fits.chain(recordings_line(&self.outcomes, self.diagnoses))
+        self.outcomes
+            .iter()
+            .map(|o| fit_line(o, &fit_name(o, &self.outcomes), self.settings.rate_hz))
+            .chain(recordings_line(&self.outcomes, self.diagnoses))
             .collect()
     }
 
@@ -206,8 +218,8 @@ fn is_abnormal(diagnosis: &Diagnosis) -> bool {
 /// radians.
 fn too_loud(outcome: &Outcome, rate_hz: f64) -> Option<f64> {
     const MOST_DEG_SQRT_H: f64 = 5.0;
-    let practical = outcome.practical(rate_hz)?;
-    let n = practical.parameters.walk.density * Quantity::Density.sheet(Sensor::Gyro).1;
+    let n = outcome.practical(rate_hz)?.parameters.walk.density
+        * Quantity::Density.sheet(Sensor::Gyro).1;
     (outcome.scope.sensor == Sensor::Gyro && n > MOST_DEG_SQRT_H).then_some(n)
 }
 
@@ -241,8 +253,10 @@ fn parameters(outcome: &Outcome) -> Table {
             None => [i.low, i.high].map(digits).join(" … "),
             Some(_) => "not determined".to_owned(),
         });
-        let figures = [digits(value), interval.unwrap_or_default()].map(Cell::figures);
-        table.row(std::iter::once(model.name_of(of).into()).chain(figures));
+        table.row(
+            std::iter::once(model.name_of(of).into())
+                .chain([digits(value), interval.unwrap_or_default()].map(Cell::figures)),
+        );
     }
     table
 }
@@ -276,8 +290,10 @@ fn chart(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_
     let averages_s: Vec<f64> = tau_s.iter().map(|tau_s| 0.5 * tau_s).collect();
     let allan = |wv: &[f64]| wv.iter().map(|nu| (2.0 * nu).sqrt()).collect::<Vec<f64>>();
     let ratio = |wv: &[f64]| -> Vec<f64> {
-        let both = wv.iter().zip(implied);
-        both.map(|(nu, model)| nu / model).collect()
+        wv.iter()
+            .zip(implied)
+            .map(|(nu, model)| nu / model)
+            .collect()
     };
     let data = |[mid, low, high]: [Vec<f64>; 3]| {
         [
@@ -287,42 +303,56 @@ fn chart(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_
     };
     let line = |wv: &[f64]| curve(&averages_s, &allan(wv));
     let mut upper = recordings(fitted, diagnoses, line);
-    let parts = fitted.processes.iter();
-    let parts = parts.filter(|(_, wv)| wv.iter().any(|nu| *nu > 0.0));
-    let hues = PROCESSES.into_iter().cycle();
     upper.extend(
-        parts
-            .zip(hues)
+        fitted
+            .processes
+            .iter()
+            .filter(|(_, wv)| wv.iter().any(|nu| *nu > 0.0))
+            .zip(PROCESSES.into_iter().cycle())
             .map(|((name, wv), hue)| Series::dashed(name, Colour::Hue(hue), line(wv))),
     );
     upper.extend(data([wv, ci_low, ci_high].map(|wv| allan(wv))));
     upper.push(Series::line("model", Colour::REAL, line(implied)));
     if let Some(practical) = outcome.practical(rate_hz) {
         let (pair, minimum) = (practical.parameters.walk, practical.parameters.minimum);
-        let k = practical.walk_is_observed();
         let read = [
             (pair.density > 0.0).then_some(("N", 1.0, pair.density)),
-            k.then_some(("K", 3.0, pair.walk)),
+            practical
+                .walk_is_observed()
+                .then_some(("K", 3.0, pair.walk)),
             minimum.map(|m| ("0.664 B", m.tau_s, m.deviation)),
         ];
-        let reading = |(name, x, y)| Series::new(name, Colour::RIGHT, Mark::Reading(x, y));
-        upper.extend(read.into_iter().flatten().map(reading));
+        upper.extend(
+            read.into_iter()
+                .flatten()
+                .map(|(name, x, y)| Series::new(name, Colour::RIGHT, Mark::Reading(x, y))),
+        );
     }
     let mut lower = data([wv, ci_low, ci_high].map(|wv| ratio(wv))).to_vec();
     lower.push(Series::new("model", Colour::REAL, Mark::Level(1.0)));
-    let deviation = format!("Allan deviation ({})", fitted.sensor.unit());
-    let ratios = ChartAxis::log("data / model").including(0.8, 1.25);
     let panels = [
-        (1.4, ChartAxis::log(&deviation), upper),
-        (0.5, ratios, lower),
+        (
+            1.4,
+            ChartAxis::log(&format!("Allan deviation ({})", fitted.sensor.unit())),
+            upper,
+        ),
+        (
+            0.5,
+            ChartAxis::log("data / model").including(0.8, 1.25),
+            lower,
+        ),
     ];
     let panels = panels.map(|(height, axis, series)| Panel {
         height,
         ..Panel::new(axis, series)
     });
     let (group, estimator) = (group_name(fitted), fitted.estimator.to_uppercase());
-    let title = format!("Allan deviation: {group}, {estimator}");
-    Chart::new(&title, ChartAxis::log("averaging time (s)"), panels.into()).in_group("scales")
+    Chart::new(
+        &format!("Allan deviation: {group}, {estimator}"),
+        ChartAxis::log("averaging time (s)"),
+        panels.into(),
+    )
+    .in_group("scales")
 }
 
 /// Hues of processes: those that neither model nor recordings have.
@@ -339,24 +369,27 @@ fn recordings(
     if fitted.replicates.len() < 2 {
         return Vec::new();
     }
-    let own = diagnoses.iter().filter(|d| d.sensor == fitted.sensor);
-    let abnormal: Vec<&str> = own
+    let abnormal: Vec<&str> = diagnoses
+        .iter()
+        .filter(|d| d.sensor == fitted.sensor)
         .filter(|d| is_abnormal(d))
         .map(|d| d.name.as_str())
         .collect();
-    let names = recording_names(fitted.replicates.iter().map(|r| r.file.as_str()));
     let series = fitted
         .replicates
         .iter()
-        .zip(names)
+        .zip(recording_names(
+            fitted.replicates.iter().map(|r| r.file.as_str()),
+        ))
         .map(|(replicate, name)| {
             let points = line(&replicate.wv);
             match abnormal.iter().position(|file| *file == replicate.file) {
                 None => Series::thin("recordings", Colour::Soft, points),
-                Some(k) => {
-                    let hue = Colour::Hue(ABNORMAL[k % ABNORMAL.len()]);
-                    Series::line(&format!("{name} (abnormal)"), hue, points)
-                }
+                Some(k) => Series::line(
+                    &format!("{name} (abnormal)"),
+                    Colour::Hue(ABNORMAL[k % ABNORMAL.len()]),
+                    points,
+                ),
             }
         });
     series.collect()
@@ -392,8 +425,8 @@ fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
         let off = percent((m.ratio - 1.0).abs());
         let known = departure
             .known_to
-            .map(|level| format!(" (up to {})", at(level)));
-        let known = known.unwrap_or_default();
+            .map(|level| format!(" (up to {})", at(level)))
+            .unwrap_or_default();
         format!(", within {off} at all scales known to 10 %{known}")
     });
     format!("{name}: {spec} fits{p}{off}")
@@ -422,19 +455,22 @@ fn recordings_line(outcomes: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<Str
     };
     let mut abnormal = Vec::new();
     for (name, shown) in names.iter().zip(recording_names(names.iter().copied())) {
-        let own = diagnoses
+        let findings: Vec<String> = diagnoses
             .iter()
-            .filter(|d| d.name == *name && is_abnormal(d));
-        let findings: Vec<String> = own.map(finding).collect();
+            .filter(|d| d.name == *name && is_abnormal(d))
+            .map(finding)
+            .collect();
         if !findings.is_empty() {
             abnormal.push(format!("{shown} ({})", findings.join(", ")));
         }
     }
     if abnormal.is_empty() {
-        let differ = outcomes.iter().find_map(|o| o.differing());
-        let differ = differ.map_or(String::new(), |(p, _)| {
-            format!(", but they differ beyond their noise (p = {p:.3})")
-        });
+        let differ = outcomes
+            .iter()
+            .find_map(|o| o.differing())
+            .map_or(String::new(), |(p, _)| {
+                format!(", but they differ beyond their noise (p = {p:.3})")
+            });
         return Some(format!("{count} recordings, none abnormal{differ}"));
     }
     let named = some(&abnormal);
@@ -493,26 +529,28 @@ pub(super) fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
     }));
     // A range that was asked for is no news.
     if let ([first, ..], None) = (&curve.ignored[..], settings.fit_range) {
-        let last = curve.ignored.last().unwrap_or(first);
-        let scales = [first, last]
+        let scales = [first, curve.ignored.last().unwrap_or(first)]
             .map(|level| duration(seconds(level)))
             .join(" to ");
         notes.push(format!("scales {scales} are not fitted: too many outliers"));
     }
-    let indistinct = outcome
-        .inference
+    notes.extend(
+        outcome
+            .inference
+            .iter()
+            .filter_map(|i| i.indistinct.as_ref())
+            .map(|i| {
+                format!(
+                    "{} describes the curve as well (p = {:.2})",
+                    i.spec, i.p_value
+                )
+            }),
+    );
+    for i in intervals(outcome)
         .iter()
-        .filter_map(|i| i.indistinct.as_ref());
-    notes.extend(indistinct.map(|i| {
-        format!(
-            "{} describes the curve as well (p = {:.2})",
-            i.spec, i.p_value
-        )
-    }));
-    let amplitudes = intervals(outcome)
-        .iter()
-        .filter(|i| !i.of.parameter.is_shape() && i.absent.is_none());
-    for i in amplitudes.filter(|i| i.high > FACTOR * FACTOR * i.low) {
+        .filter(|i| !i.of.parameter.is_shape() && i.absent.is_none())
+        .filter(|i| i.high > FACTOR * FACTOR * i.low)
+    {
         let name = model.name_of(i.of);
         let factor = readable((i.high / i.low).sqrt());
         notes.push(match i.low > 0.0 {
@@ -520,8 +558,12 @@ pub(super) fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
             false => format!("{name} may be zero"),
         });
     }
-    let zero = fit.zero.iter().map(|i| &labels[*i]);
-    notes.extend(zero.map(|label| format!("{label} is zero: not seen in these data")));
+    notes.extend(
+        fit.zero
+            .iter()
+            .map(|i| &labels[*i])
+            .map(|label| format!("{label} is zero: not seen in these data")),
+    );
     let longest_s = outcome.counted_levels().last().map_or(0.0, seconds);
     for (i, label) in labels
         .iter()
@@ -550,9 +592,10 @@ pub(super) fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
 /// Why parameters have no interval.
 pub(super) fn without_interval(outcome: &Outcome) -> impl Iterator<Item = String> {
     let labels = outcome.fit.composite.labels();
-    let absent = intervals(outcome).iter();
-    let absent = absent.filter_map(|i| Some((i, i.absent.as_ref()?)));
-    absent.map(move |(interval, why)| undetermined(interval, why, &labels))
+    intervals(outcome)
+        .iter()
+        .filter_map(|i| Some((i, i.absent.as_ref()?)))
+        .map(move |(interval, why)| undetermined(interval, why, &labels))
 }
 
 fn undetermined(interval: &ParameterInterval, why: &Undetermined, labels: &[String]) -> String {
@@ -593,8 +636,7 @@ fn recording_notes(
         notes.extend(trim_note(sensor, abnormal, outcomes, settings));
     }
     for found in own.first().iter().flat_map(|d| &d.common) {
-        let ends = [found.tau_s.first(), found.tau_s.last()];
-        let from_to = ends
+        let from_to = [found.tau_s.first(), found.tau_s.last()]
             .map(|end| end.map_or_else(String::new, |s| duration(*s)))
             .join(" to ");
         let size = percent(found.size);
@@ -627,20 +669,21 @@ fn trim_note(
     settings: &Settings,
 ) -> Option<String> {
     if !settings.estimators.contains(&Estimator::DrAwv) {
-        let advice =
-            "the model includes the abnormal recordings: --estimator dr-awv leaves them out";
-        return Some(advice.to_owned());
+        return Some(
+            "the model includes the abnormal recordings: --estimator dr-awv leaves them out"
+                .to_owned(),
+        );
     }
-    let own = outcomes
+    let fit = outcomes
         .iter()
-        .filter(|o| o.scope.sensor == sensor && o.recordings > 0);
-    let fit = own.min_by_key(|o| o.replicates)?;
+        .filter(|o| o.scope.sensor == sensor && o.recordings > 0)
+        .min_by_key(|o| o.replicates)?;
     // Pooled, a recording has a signal for each axis.
     let needed = abnormal * fit.replicates.div_ceil(fit.recordings);
     let trim = settings.trim.count(fit.replicates);
-    let advice =
-        format!("a trim of {trim} does not leave out the abnormal recordings: --trim {needed}");
-    (trim < needed).then_some(advice)
+    (trim < needed).then_some(format!(
+        "a trim of {trim} does not leave out the abnormal recordings: --trim {needed}"
+    ))
 }
 
 /// The finding about the means of one sensor, without its name.
@@ -680,7 +723,11 @@ pub(super) fn reasons(ranking: &Ranking) -> Vec<String> {
     if taken.is_rejected() {
         lines.push("the J-test rejects every candidate".to_owned());
     }
-    let simpler = ranking.too_simple.iter();
-    lines.extend(simpler.map(|(spec, p)| format!("{spec} is too simple (p ≤ {p:.3})")));
+    lines.extend(
+        ranking
+            .too_simple
+            .iter()
+            .map(|(spec, p)| format!("{spec} is too simple (p ≤ {p:.3})")),
+    );
     lines
 }

@@ -203,13 +203,14 @@ impl Figure {
 
 /// N, B and K of a fit, and what a pair of N and K does not carry.
 fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Figure> {
-    let practical = outcome.practical(rate_hz);
-    let mut figures = practical.map_or_else(BTreeMap::new, |p| practical_figures(outcome, &p));
+    let mut figures = outcome
+        .practical(rate_hz)
+        .map_or_else(BTreeMap::new, |p| practical_figures(outcome, &p));
     let model = &outcome.fit.composite;
     for (index, (process, label)) in model.processes.iter().zip(model.labels()).enumerate() {
-        let further = further_figure(process, outcome.scope.sensor);
         let Some((letter, name, unit, parameter, convert)) =
-            further.filter(|_| !outcome.fit.zero.contains(&index))
+            further_figure(process, outcome.scope.sensor)
+                .filter(|_| !outcome.fit.zero.contains(&index))
         else {
             continue;
         };
@@ -220,9 +221,12 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Figure> {
             i.absent.is_none().then_some(ends)
         });
         let value = model.parameters().find(|(of, _)| own(*of));
-        let value = value.map(|(_, value)| convert(value, rate_hz)).ok_or("");
-        let averages = averages(outcome, index, rate_hz);
-        let figure = Figure::new((format!("{label} {name}"), unit), value, interval, averages);
+        let figure = Figure::new(
+            (format!("{label} {name}"), unit),
+            value.map(|(_, value)| convert(value, rate_hz)).ok_or(""),
+            interval,
+            averages(outcome, index, rate_hz),
+        );
         let key = match letter {
             "T" => format!("T_{label}"),
             letter => letter.to_owned(),
@@ -242,8 +246,10 @@ fn practical_figures(outcome: &Outcome, practical: &Practical) -> BTreeMap<Strin
     let figure =
         |name: &str, quantity: Quantity, value: Result<f64, &str>, ends: Option<[f64; 2]>, at| {
             let (unit, factor) = quantity.sheet(sensor);
-            let ends = ends.map(|ends| ends.map(|end| end * factor));
-            let ends = outcome.inference.is_some().then_some(ends);
+            let ends = outcome
+                .inference
+                .is_some()
+                .then_some(ends.map(|ends| ends.map(|end| end * factor)));
             Figure::new((name.to_owned(), unit), value.map(|x| x * factor), ends, at)
         };
     let crossover = pair.crossover_s().map(duration);
@@ -252,16 +258,16 @@ fn practical_figures(outcome: &Outcome, practical: &Practical) -> BTreeMap<Strin
         .as_ref()
         .map_or(String::new(), |t| format!("up to {t}"));
     let from = crossover.map_or(none.clone(), |t| {
-        let until = practical
-            .walk_until_s
-            .map(|t| format!(" to {}", duration(t)));
-        format!("from {t}{}", until.unwrap_or_default())
+        format!(
+            "from {t}{}",
+            practical
+                .walk_until_s
+                .map(|t| format!(" to {}", duration(t)))
+                .unwrap_or_default()
+        )
     });
     let minimum = practical.parameters.minimum;
     let floor = minimum.map_or(none, |m| format!("floor at {}", duration(m.tau_s)));
-    let bias = minimum.map(|m| m.bias_instability()).ok_or("not reached");
-    let is_observed = practical.walk_is_observed();
-    let walked = is_observed.then_some(pair.walk).ok_or("not observed");
     let named = [
         (
             "N",
@@ -272,12 +278,24 @@ fn practical_figures(outcome: &Outcome, practical: &Practical) -> BTreeMap<Strin
             figure(
                 "bias instability B",
                 Quantity::Bias,
-                bias,
+                minimum.map(|m| m.bias_instability()).ok_or("not reached"),
                 ends.instability,
                 floor,
             ),
         ),
-        ("K", figure(walk, Quantity::Walk, walked, ends.walk, from)),
+        (
+            "K",
+            figure(
+                walk,
+                Quantity::Walk,
+                practical
+                    .walk_is_observed()
+                    .then_some(pair.walk)
+                    .ok_or("not observed"),
+                ends.walk,
+                from,
+            ),
+        ),
     ];
     named.map(|(key, figure)| (key.to_owned(), figure)).into()
 }
@@ -304,12 +322,13 @@ fn further_figure(process: &Process, sensor: Sensor) -> Option<FurtherFigure> {
         }),
         Process::GaussMarkov(_) => ("T", TIME, "s", Parameter::Beta, |beta, _| 1.0 / beta),
         // Of the increments over a sample, as IEEE 952 has it.
-        Process::Quantization(_) => {
-            let name = "quantization Q";
-            ("Q", name, increment, Parameter::Q2, |q2, rate_hz| {
-                q2.sqrt() / rate_hz
-            })
-        }
+        Process::Quantization(_) => (
+            "Q",
+            "quantization Q",
+            increment,
+            Parameter::Q2,
+            |q2, rate_hz| q2.sqrt() / rate_hz,
+        ),
         Process::Drift(_) => ("R", "ramp", ramp, Parameter::Slope, |slope, rate_hz| {
             slope * rate_hz
         }),
@@ -326,8 +345,13 @@ fn averages(outcome: &Outcome, index: usize, rate_hz: f64) -> String {
         _ => 0.0,
     };
     let largest_at = |level: u32| {
-        let parts = model.processes.iter().map(|p| part(p, level)).enumerate();
-        parts.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+        model
+            .processes
+            .iter()
+            .map(|p| part(p, level))
+            .enumerate()
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(i, _)| i)
     };
     let levels = outcome.counted_levels();
     let leads = || levels.iter().filter(|l| largest_at(**l) == Some(index));
@@ -336,8 +360,15 @@ fn averages(outcome: &Outcome, index: usize, rate_hz: f64) -> String {
         (Some(first), Some(last)) if first == last => time(first),
         (Some(first), Some(last)) => format!("{} – {}", time(first), time(last)),
         _ => {
-            let parts = levels.iter().map(|l| part(&model.processes[index], *l));
-            format!("none ({} at most)", percent(parts.fold(0.0, f64::max)))
+            format!(
+                "none ({} at most)",
+                percent(
+                    levels
+                        .iter()
+                        .map(|l| part(&model.processes[index], *l))
+                        .fold(0.0, f64::max)
+                )
+            )
         }
     }
 }

@@ -248,8 +248,10 @@ impl Calibration {
     /// The noise model of an estimator, at the rate of the recordings; axes without a recording have no noise.
     #[must_use]
     pub fn model(&self, estimator: Estimator) -> Model {
-        let own = self.outcomes.iter().filter(|o| o.estimator == estimator);
-        nav_sim_calibration::model_of(own, self.settings.rate_hz)
+        nav_sim_calibration::model_of(
+            self.outcomes.iter().filter(|o| o.estimator == estimator),
+            self.settings.rate_hz,
+        )
     }
 
     /// The fits of one estimator, or all of them.
@@ -341,10 +343,10 @@ fn one_switching_on(report: &Report, measured: &mut [(Channel, Replicate)]) {
         .flat_map(|file| file.recordings().skip(1))
         .map(|(name, _)| name)
         .collect();
-    let of_later = measured
+    measured
         .iter_mut()
-        .filter(|(_, replicate)| later.contains(&replicate.name));
-    of_later.for_each(|(_, replicate)| replicate.mean = f64::NAN);
+        .filter(|(_, replicate)| later.contains(&replicate.name))
+        .for_each(|(_, replicate)| replicate.mean = f64::NAN);
 }
 
 /// Refuses copies of a recording.
@@ -394,11 +396,10 @@ pub(crate) fn without_warm_up(
     mut recording: Recording,
     leave_out: bool,
 ) -> (Recording, Vec<WarmUp>) {
-    let begins_otherwise = |s: &Signal| warm_up(&s.samples);
     let found: Vec<_> = recording
         .signals
         .par_iter()
-        .filter_map(begins_otherwise)
+        .filter_map(|s: &Signal| warm_up(&s.samples))
         .collect();
     if let Some(samples) = longest(&found).filter(|_| leave_out) {
         for signal in &mut recording.signals {
@@ -479,8 +480,10 @@ pub(crate) fn read_curves(
     let mut is_unsaid = false;
     let mut curves = Curves::new();
     for named in named {
-        let estimator = named.estimator.and_then(|name| name.parse().ok());
-        let estimator = estimator.unwrap_or(Estimator::Given);
+        let estimator = named
+            .estimator
+            .and_then(|name| name.parse().ok())
+            .unwrap_or(Estimator::Given);
         is_unsaid |= named.sensor.or(sensor).is_none();
         let sensor = named.sensor.or(sensor).unwrap_or(Sensor::Accel);
         let scope = Scope {
@@ -502,14 +505,19 @@ pub(crate) fn read_curves(
         }
         curves.push((scope, estimator, named.curve));
     }
-    let has = |e: &Estimator| curves.iter().any(|(_, estimator, _)| estimator == e);
-    let estimators = Estimator::ALL.into_iter().filter(has).collect();
-    let settings = Settings {
-        estimators,
-        rate_hz,
-        ..settings.clone()
-    };
-    Ok((curves, settings, is_unsaid))
+    let estimators = Estimator::ALL
+        .into_iter()
+        .filter(|e: &Estimator| curves.iter().any(|(_, estimator, _)| estimator == e))
+        .collect();
+    Ok((
+        curves,
+        Settings {
+            estimators,
+            rate_hz,
+            ..settings.clone()
+        },
+        is_unsaid,
+    ))
 }
 
 /// The models of curves.

@@ -150,8 +150,9 @@ impl Command for Calibrate {
     }
 
     fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        let curve = files("curve", &self.curve);
-        Ok(curve.chain(listed("recording", &self.inputs)?).collect())
+        Ok(files("curve", &self.curve)
+            .chain(listed("recording", &self.inputs)?)
+            .collect())
     }
 
     fn run(&self, context: &Context<'_>) -> Result<Calibration> {
@@ -204,8 +205,7 @@ impl Answer for Calibration {
         let estimators = &self.settings.estimators;
         let of_estimator = |estimator: &Estimator| {
             let stem = stem_of(*estimator, estimators);
-            let names = (model_ending(&stem), stem);
-            self.files_of(*estimator, names, None)
+            self.files_of(*estimator, (model_ending(&stem), stem), None)
         };
         estimators.iter().flat_map(of_estimator).collect()
     }
@@ -226,8 +226,12 @@ impl Calibrate {
 
     /// The curves in the place of recordings, and whether they do not say of which sensor: then as of an accelerometer.
     fn curves(&self, path: &Path, settings: &Settings) -> Result<(Curves, Settings, bool)> {
-        let rate_hz = self.recordings.reading.rate_hz;
-        read_curves(path, rate_hz, self.recordings.sensor(), settings)
+        read_curves(
+            path,
+            self.recordings.reading.rate_hz,
+            self.recordings.sensor(),
+            settings,
+        )
     }
 
     /// The draws behind intervals.

@@ -107,8 +107,12 @@ fn spread(outcomes: &[&Outcome], rate_hz: f64) -> Option<Spread> {
             let (process, parameter) = (&labels[found.of.process], found.of.parameter.name());
             Variation::new(composite, rate_hz, process, parameter, law).ok()
         };
-        let varying = outcome.inference.iter().flat_map(|i| &i.varying);
-        let laws: Vec<Variation> = varying.filter_map(variation).collect();
+        let laws: Vec<Variation> = outcome
+            .inference
+            .iter()
+            .flat_map(|i| &i.varying)
+            .filter_map(variation)
+            .collect();
         outcome
             .scope
             .channels()
@@ -120,14 +124,14 @@ fn spread(outcomes: &[&Outcome], rate_hz: f64) -> Option<Spread> {
 
 fn intervals(outcome: &Outcome, channel: Channel) -> impl Iterator<Item = Interval> {
     let labels = outcome.fit.composite.labels();
-    let known = super::fits::intervals(outcome)
+    super::fits::intervals(outcome)
         .iter()
-        .filter(|i| i.low.is_finite());
-    known.map(move |i| Interval {
-        channel,
-        process: labels[i.of.process].clone(),
-        parameter: i.of.parameter.name().to_owned(),
-        low: i.low,
-        high: i.high,
-    })
+        .filter(|i| i.low.is_finite())
+        .map(move |i| Interval {
+            channel,
+            process: labels[i.of.process].clone(),
+            parameter: i.of.parameter.name().to_owned(),
+            low: i.low,
+            high: i.high,
+        })
 }

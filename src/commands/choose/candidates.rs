@@ -233,9 +233,13 @@ impl Laboratory {
             models: Vec::new(),
         };
         let own = |unit: &Unit| {
-            let n2 = ModelChoice::Given(ModelSpec::n2());
             let (_, outcomes, settings) = laboratory
-                .fit(&[unit], Estimator::Awv, &n2, Some(Pool::Axes))
+                .fit(
+                    &[unit],
+                    Estimator::Awv,
+                    &ModelChoice::Given(ModelSpec::n2()),
+                    Some(Pool::Axes),
+                )
                 .map_err(|e| {
                     Failure::from(e).within(&format!("the noise of {} alone", unit.name))
                 })?;
@@ -407,16 +411,20 @@ impl Drive {
         runs: u64,
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<Fold, Failure> {
-        let models = self.models(laboratory, Some(k), candidates)?;
-        let beliefs = self.beliefs(candidates, &models)?;
+        let beliefs = self.beliefs(candidates, &self.models(laboratory, Some(k), candidates)?)?;
         let expected = self.expected(&beliefs, &laboratory.models[k]);
         recordings.retain(|r| self.independent_windows(r.len()) >= 1.0);
-        let truth = Truth::Static(&recordings);
-        let sampled = match monte_carlo::run(&self.experiment(truth, &beliefs), runs, progress) {
-            Ok(results) => {
-                let score = |r: &RunResult| Score::of_runs(&r.runs, r.outages.len());
-                Some(results.iter().map(score).collect())
-            }
+        let sampled = match monte_carlo::run(
+            &self.experiment(Truth::Static(&recordings), &beliefs),
+            runs,
+            progress,
+        ) {
+            Ok(results) => Some(
+                results
+                    .iter()
+                    .map(|r: &RunResult| Score::of_runs(&r.runs, r.outages.len()))
+                    .collect(),
+            ),
             // none is as long as the trajectory, or lacks its last sample
             Err(ExperimentError::Truth(TruthError::TooShort { .. })) => None,
             Err(_) if recordings.is_empty() => None,
@@ -446,15 +454,15 @@ impl Drive {
         let mut made: Vec<(&Candidate, Model)> = Vec::new();
         let mut models = Vec::new();
         for candidate in candidates {
-            let known = made
+            let model = match made
                 .iter()
-                .find(|(other, _)| other.is_calibrated_as(candidate));
-            let model = match known {
+                .find(|(other, _)| other.is_calibrated_as(candidate))
+            {
                 Some((_, model)) => model.clone(),
                 None => {
-                    let calibrated = laboratory.calibrate(candidate, without);
-                    let (_, outcomes, settings) =
-                        calibrated.map_err(|e| Failure::from(e).within(&candidate.to_string()))?;
+                    let (_, outcomes, settings) = laboratory
+                        .calibrate(candidate, without)
+                        .map_err(|e| Failure::from(e).within(&candidate.to_string()))?;
                     model_of(&outcomes, settings.rate_hz)
                 }
             };
@@ -479,15 +487,18 @@ impl Drive {
             Inflation::None => Ok(model.clone()),
             Inflation::Tenfold => {
                 let on_variance = 100.0;
-                let factor = |sensor| Factor {
-                    sensor,
-                    on_variance,
-                };
-                Ok(scaled(model, &Sensor::ALL.map(factor)))
+                Ok(scaled(
+                    model,
+                    &Sensor::ALL.map(|sensor| Factor {
+                        sensor,
+                        on_variance,
+                    }),
+                ))
             }
             Inflation::Tuned => {
-                let truths = laboratory.others(without);
-                let truths = truths.map(|k| laboratory.models[k].clone().into());
+                let truths = laboratory
+                    .others(without)
+                    .map(|k| laboratory.models[k].clone().into());
                 let full = self.scenario.with_full_noise();
                 let full = |model: &Model| full.belief(model, &self.outages, &self.track);
                 let task = Task {
@@ -501,8 +512,10 @@ impl Drive {
                     aim: Aim::Mean,
                     allow_smaller: true,
                 };
-                let factors = task.factors().map_err(|source| unfit(candidate, source))?;
-                Ok(scaled(model, &factors))
+                Ok(scaled(
+                    model,
+                    &task.factors().map_err(|source| unfit(candidate, source))?,
+                ))
             }
         }
     }
@@ -528,8 +541,10 @@ impl Drive {
 
     /// Every filter where a model makes the errors.
     fn expected(&self, beliefs: &[Belief], truth: &Model) -> Vec<Score> {
-        let experiment = self.experiment(Truth::Model(truth), beliefs);
-        let sources = TruthSide::together(&TruthSide::sources(&experiment, truth));
+        let sources = TruthSide::together(&TruthSide::sources(
+            &self.experiment(Truth::Model(truth), beliefs),
+            truth,
+        ));
         let score = |belief: &Belief| {
             Score::expected(&FilterPass::new(&self.track, belief).errors_at_ends(&sources))
         };

@@ -155,20 +155,18 @@ impl ChoiceMade {
             bars.extend([(low, height), (high, height), (f64::NAN, f64::NAN)]);
         }
         let rows = names.len() as f64;
-        let best = vec![(0.0, -0.5), (0.0, rows - 0.5)];
         let series = vec![
-            Series::dashed("best", Colour::RIGHT, best),
+            Series::dashed("best", Colour::RIGHT, vec![(0.0, -0.5), (0.0, rows - 0.5)]),
             Series::line("", Colour::BELIEVED, bars),
             Series::points("", Colour::BELIEVED, points),
         ];
-        let panel = Panel {
-            height: 0.1 * (rows + 1.0),
-            ..Panel::new(Axis::names(names), series)
-        };
         Chart::new(
             "Log score against the best",
             Axis::linear("nats"),
-            vec![panel],
+            vec![Panel {
+                height: 0.1 * (rows + 1.0),
+                ..Panel::new(Axis::names(names), series)
+            }],
         )
     }
 }

@@ -119,12 +119,13 @@ impl Answer for ChoiceMade {
 
     /// The winner's model with its curves and draws, and the ranking.
     fn files(&self) -> Vec<OutputFile<'_>> {
-        let names = ("model.toml".to_owned(), "model".to_owned());
-        let inflated = self
-            .inflated
-            .as_ref()
-            .map(|(model, how)| (model, how.name()));
-        let mut files = self.calibration.files_of(self.estimator, names, inflated);
+        let mut files = self.calibration.files_of(
+            self.estimator,
+            ("model.toml".to_owned(), "model".to_owned()),
+            self.inflated
+                .as_ref()
+                .map(|(model, how)| (model, how.name())),
+        );
         files.push(OutputFile::whole("ranking.json", json(self)));
         files
     }
@@ -147,10 +148,10 @@ impl Command for Choose {
 
     fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
         self.candidates()?;
-        let trajectory = files("trajectory", [&self.trajectory]);
-        let scenario = files("scenario", &self.settings.file.scenario);
-        let recordings = listed("recording", &self.inputs)?;
-        Ok(trajectory.chain(recordings).chain(scenario).collect())
+        Ok(files("trajectory", [&self.trajectory])
+            .chain(listed("recording", &self.inputs)?)
+            .chain(files("scenario", &self.settings.file.scenario))
+            .collect())
     }
 
     /// Files are read twice, so that no more than a few are in memory.
@@ -198,8 +199,10 @@ impl Command for Choose {
                 "{} recordings are too few to leave one out: {FEWEST} or more are needed",
                 files.len()
             );
-            let hint = "each recording is a file; nav-sim calibrate takes fewer";
-            return refused(message, hint);
+            return refused(
+                message,
+                "each recording is a file; nav-sim calibrate takes fewer",
+            );
         }
         let units = units(&measured);
         let samples: Vec<usize> = units.iter().map(samples_in).collect();
@@ -208,8 +211,8 @@ impl Command for Choose {
         let runs_on = |k: &usize| {
             // two on each window that lies in the recording side by side; whole batches
             let windows = drive.independent_windows(samples[*k]);
-            let usual = ((2.0 * windows / 8.0).ceil() as u64 * 8).clamp(16, 64);
-            self.runs.unwrap_or(usual)
+            self.runs
+                .unwrap_or(((2.0 * windows / 8.0).ceil() as u64 * 8).clamp(16, 64))
         };
         let judges = laboratory.judges()?;
         context.begin("runs", judges.iter().map(runs_on).sum());
@@ -218,25 +221,37 @@ impl Command for Choose {
             let file = &files[*k];
             let (read, _) = recordings::read(std::slice::from_ref(&file.path), &reading)?;
             // a warm-up that was left out of the curves is no stretch to navigate on either
-            let measured = |recording| without_warm_up(recording, options.skip_warm_up).0;
-            let read: Vec<Recording> = read.into_iter().map(measured).collect();
+            let read: Vec<Recording> = read
+                .into_iter()
+                .map(|recording| without_warm_up(recording, options.skip_warm_up).0)
+                .collect();
             let advance = |n| context.advance(n);
-            let fold = drive.leave_out(&laboratory, *k, read, &candidates, runs_on(k), &advance)?;
-            folds.push((file.file.clone(), fold));
+            folds.push((
+                file.file.clone(),
+                drive.leave_out(&laboratory, *k, read, &candidates, runs_on(k), &advance)?,
+            ));
         }
         context.end();
         let ranking = Ranking::new(&candidates, &folds);
         let winner = &candidates[ranking.candidates[0].index];
         // an estimator of single recordings never wins: this is of all of them
         let (groups, outcomes, settings) = laboratory.calibrate(winner, None)?;
-        let model = model_of(&outcomes, settings.rate_hz);
-        let model = drive.inflated(&laboratory, None, winner, &model)?;
-        let bootstrap = Bootstrap {
-            seed,
-            ..Bootstrap::default()
-        };
-        let mut calibration =
-            Calibration::new(groups, outcomes, settings, Some(bootstrap), &|_| {});
+        let model = drive.inflated(
+            &laboratory,
+            None,
+            winner,
+            &model_of(&outcomes, settings.rate_hz),
+        )?;
+        let mut calibration = Calibration::new(
+            groups,
+            outcomes,
+            settings,
+            Some(Bootstrap {
+                seed,
+                ..Bootstrap::default()
+            }),
+            &|_| {},
+        );
         calibration.turn_on.clear();
         calibration.note = CalibrationNote {
             reading: self.recordings.provenance(self.gaps),
@@ -321,8 +336,10 @@ fn nominal_hz(found_hz: f64, fix_hz: f64) -> f64 {
 fn units(measured: &Measured) -> Vec<Unit> {
     let unit = |file: &FileReport| {
         let names: Vec<String> = file.recordings().map(|(name, _)| name).collect();
-        let replicates = measured.replicates.iter();
-        let own = replicates.filter(|(_, r)| names.contains(&r.name));
+        let own = measured
+            .replicates
+            .iter()
+            .filter(|(_, r)| names.contains(&r.name));
         Unit {
             name: file.file.clone(),
             replicates: own.cloned().collect(),

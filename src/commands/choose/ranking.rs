@@ -111,8 +111,9 @@ impl Ranking {
             .map(|c| place(c, &candidates[c], winner, rivals, folds))
             .collect();
         placed.sort_by(|a, b| {
-            let order = b.log_score.value.total_cmp(&a.log_score.value);
-            b.eligible.cmp(&a.eligible).then(order)
+            b.eligible
+                .cmp(&a.eligible)
+                .then(b.log_score.value.total_cmp(&a.log_score.value))
         });
         let without = |left_out: usize| {
             let mut rest = all.clone();

@@ -198,8 +198,7 @@ pub struct Export {
 /// # Errors
 /// As [`exported`].
 pub fn export(file: &ModelFile, name: &str, target: Target) -> Result<String, Failure> {
-    let export = Export::new(file, target, Policy::Matched, Horizon::default())?;
-    Ok(export.text(name))
+    Ok(Export::new(file, target, Policy::Matched, Horizon::default())?.text(name))
 }
 
 impl Export {
@@ -215,15 +214,16 @@ impl Export {
     ) -> Result<Self, Failure> {
         let rate_hz = file.model.rate_hz;
         let axes = |sensor: Sensor| -> Vec<(Axis, &Composite)> {
-            let own = file.present().filter(|c| c.sensor == sensor);
-            own.map(|c| (c.axis, file.model.axis(c))).collect()
+            file.present()
+                .filter(|c| c.sensor == sensor)
+                .map(|c| (c.axis, file.model.axis(c)))
+                .collect()
         };
         let mut curves = Vec::new();
         for sensor in Sensor::ALL {
             let noise: Vec<&Composite> = axes(sensor).iter().map(|(_, noise)| *noise).collect();
             check(target, policy, sensor, &noise)?;
-            let curve = Curve::largest(&noise, rate_hz, horizon);
-            curves.push(curve.refuse_within(sensor)?);
+            curves.push(Curve::largest(&noise, rate_hz, horizon).refuse_within(sensor)?);
         }
         let bias = if target.has_one_time && policy != Policy::Strict {
             Bias::MarkovOf(curves[0].shared_correlation_time_s(&curves[1], policy))
@@ -235,13 +235,15 @@ impl Export {
         let of_sensor = |sensor: Sensor| -> Result<SensorExport, Failure> {
             let (curve, axes) = (&curves[sensor as usize], axes(sensor));
             let noise: Vec<&Composite> = axes.iter().map(|(_, noise)| *noise).collect();
-            let largest = AxisParameters::of(&noise, rate_hz, horizon, policy, range_s);
-            let largest = largest.refuse_within(sensor)?;
+            let largest = AxisParameters::of(&noise, rate_hz, horizon, policy, range_s)
+                .refuse_within(sensor)?;
             let exported = curve.pair(policy, bias);
             let turn_on = file.turn_on.unwrap_or_default().sigma(sensor);
             // A random walk moves so far within the horizon.
-            let walked = largest.walk.walk * horizon.to_s.sqrt();
-            let spread = largest.markov.markov.map_or(walked, |m| m.sigma);
+            let spread = largest
+                .markov
+                .markov
+                .map_or(largest.walk.walk * horizon.to_s.sqrt(), |m| m.sigma);
             let deviation = |noise: &Composite| noise.allan_variance(second).sqrt();
             Ok(SensorExport {
                 sensor,

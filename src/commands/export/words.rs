@@ -73,8 +73,11 @@ impl Export {
         let misfit = self.misfit.iter();
         let mut doubts: Vec<String> = misfit.map(|misfit| format!("the model {misfit}")).collect();
         for s in &self.sensors {
-            let own = s.doubts(self.policy).into_iter();
-            doubts.extend(own.map(|doubt| format!("{}: {doubt}", s.sensor.name())));
+            doubts.extend(
+                s.doubts(self.policy)
+                    .into_iter()
+                    .map(|doubt| format!("{}: {doubt}", s.sensor.name())),
+            );
         }
         doubts.extend(self.filled(&[]).0.iter().filter_map(|e| {
             let (Entry { key, value, .. }, wanted) = (e, e.wanted?);

@@ -21,8 +21,11 @@ impl FuseAnswer {
     /// Verdict, figures, charts and notes.
     pub(super) fn page(&self) -> Document {
         let (solution, summary) = (&self.solution, &self.summary);
-        let tone = tone(summary.verdict.kind);
-        let mut document = Document::new("INS/GNSS fusion of recorded data", tone, self.verdict());
+        let mut document = Document::new(
+            "INS/GNSS fusion of recorded data",
+            tone(summary.verdict.kind),
+            self.verdict(),
+        );
         document.facts(&self.facts());
         let outages: Vec<_> = summary
             .outcome
@@ -164,8 +167,10 @@ impl FuseAnswer {
         };
         let outages = 0..self.summary.outcome.outages.len();
         let ends: Vec<_> = outages.flat_map(of_outage).collect();
-        let ends = ends.iter().map(|(title, keys)| (&**title, &**keys));
-        let rows: Vec<_> = rows.into_iter().chain(ends).collect();
+        let rows: Vec<_> = rows
+            .into_iter()
+            .chain(ends.iter().map(|(title, keys)| (&**title, &**keys)))
+            .collect();
         let table = Table::of_keys(self, &["", "filter", "smoothed"], &rows);
         document.lead(table.without_unknown());
         let mut table = |title: &str, table: Table| {
@@ -312,13 +317,16 @@ fn cause(cause: &Cause) -> String {
     match cause {
         Cause::Clocks(clocks) => apart(clocks),
         Cause::Displaced(found) => {
-            let arm = found
+            let options: Vec<_> = found
                 .lever_arm_b
-                .map(|[arm, sigma]| format!("--lever-arm={} (± {})", three(arm), three(sigma)));
-            let delay = found
-                .delay_s
-                .map(|[delay, sigma]| format!("--gnss-delay={delay:.3} (± {sigma:.3})"));
-            let options: Vec<_> = arm.into_iter().chain(delay).collect();
+                .map(|[arm, sigma]| format!("--lever-arm={} (± {})", three(arm), three(sigma)))
+                .into_iter()
+                .chain(
+                    found
+                        .delay_s
+                        .map(|[delay, sigma]| format!("--gnss-delay={delay:.3} (± {sigma:.3})")),
+                )
+                .collect();
             let [now, then] = found.nis;
             let (now, then) = (readable(now), readable(then));
             format!(
@@ -354,27 +362,39 @@ fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
         DVec2::new(moved.y, moved.x)
     };
     let error = |row: &Row| {
-        let error = row.error.map(|e| DVec2::new(e.values[1], e.values[0]));
-        error.unwrap_or(DVec2::NAN)
+        row.error
+            .map(|e| DVec2::new(e.values[1], e.values[0]))
+            .unwrap_or(DVec2::NAN)
     };
     let track = |rows: &[Row], point: &dyn Fn(&Row) -> DVec2| -> Vec<(f64, [f64; 2])> {
-        let shown = rows.iter().step_by(rows.len().div_ceil(MOST_PLACES).max(1));
-        shown.map(|row| (row.t_s, point(row).into())).collect()
+        rows.iter()
+            .step_by(rows.len().div_ceil(MOST_PLACES).max(1))
+            .map(|row| (row.t_s, point(row).into()))
+            .collect()
     };
     let mut chart = track_map("solution", &track(&solution.rows, &place), "Track", outages);
     let line = |track: Vec<(f64, [f64; 2])>| track.into_iter().map(|(_, p)| p.into()).collect();
     let mut series = Vec::new();
     // the lines lie on one another but for metres: wide beneath narrow beneath dashed, all are seen
     if solution.rows.iter().any(|row| row.error.is_some()) {
-        let reference = track(&solution.rows, &|row| place(row) - error(row));
-        let line = Mark::Line(line(reference), Stroke::Bold);
-        series.push(Series::new("reference", Colour::Ink, line));
+        series.push(Series::new(
+            "reference",
+            Colour::Ink,
+            Mark::Line(
+                line(track(&solution.rows, &|row| place(row) - error(row))),
+                Stroke::Bold,
+            ),
+        ));
     }
     let drawn = &mut chart.panels[0].series;
     series.append(drawn);
-    let smoothed = solution.smoothed.iter();
-    let smoothed = smoothed.map(|rows| line(track(rows, &place)));
-    series.extend(smoothed.map(|line| Series::dashed("smoothed", SMOOTHED, line)));
+    series.extend(
+        solution
+            .smoothed
+            .iter()
+            .map(|rows| line(track(rows, &place)))
+            .map(|line| Series::dashed("smoothed", SMOOTHED, line)),
+    );
     *drawn = series;
     chart
 }
@@ -402,10 +422,13 @@ fn solutions(solution: &Solution) -> Vec<(&[Row], [&'static str; 2], [Colour; 2]
 fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let mut series = Vec::new();
     for (rows, [stated, error], [believed, real]) in solutions(solution) {
-        let sigma = thinned(rows)
-            .map(|row| (row.t_s, row.sigma[0].hypot(row.sigma[1])))
-            .collect();
-        series.push(Series::dashed(stated, believed, sigma));
+        series.push(Series::dashed(
+            stated,
+            believed,
+            thinned(rows)
+                .map(|row| (row.t_s, row.sigma[0].hypot(row.sigma[1])))
+                .collect(),
+        ));
         let errors = rows
             .iter()
             .filter_map(|row| Some((row.t_s, row.error?.values[0].hypot(row.error?.values[1]))));
@@ -423,17 +446,24 @@ fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
     let chart = |(i, name): (usize, &&str)| {
         let is_velocity = (3..6).contains(&i);
         let error = |row: &Row| {
-            let known = row
-                .error
-                .filter(|e| !is_velocity || e.velocity_sigma < UNEVEN);
-            (row.t_s, known.map_or(f64::NAN, |e| e.values[i]))
+            (
+                row.t_s,
+                row.error
+                    .filter(|e| !is_velocity || e.velocity_sigma < UNEVEN)
+                    .map_or(f64::NAN, |e| e.values[i]),
+            )
         };
         let mut series = Vec::new();
         for (rows, [stated, line], [believed, real]) in solutions(solution) {
-            let sigma = thinned(rows)
-                .map(|row| (row.t_s, -row.sigma[i], row.sigma[i]))
-                .collect();
-            series.push(Series::new(stated, believed, Mark::Band(sigma)));
+            series.push(Series::new(
+                stated,
+                believed,
+                Mark::Band(
+                    thinned(rows)
+                        .map(|row| (row.t_s, -row.sigma[i], row.sigma[i]))
+                        .collect(),
+                ),
+            ));
             series.push(Series::line(line, real, rows.iter().map(error).collect()));
         }
         Chart::over_time(
@@ -489,10 +519,13 @@ fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
             )
         }
     };
-    let panels = ["north", "east", "down"]
-        .into_iter()
-        .enumerate()
-        .map(panel)
-        .collect();
-    Chart::over_time("Innovations of position, normalised", panels, outages)
+    Chart::over_time(
+        "Innovations of position, normalised",
+        ["north", "east", "down"]
+            .into_iter()
+            .enumerate()
+            .map(panel)
+            .collect(),
+        outages,
+    )
 }

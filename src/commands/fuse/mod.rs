@@ -276,8 +276,7 @@ impl FromStr for MountingChoice {
                 if sigma_deg.iter().all(|s: &f64| (0.0..=MAX_SIGMA_DEG).contains(s)) =>
             {
                 let [roll, pitch, yaw] = [roll, pitch, yaw].map(|angle: f64| angle * DEG);
-                let q_s_b = RollPitchYaw { roll, pitch, yaw }.to_quat();
-                Ok(Self::Given(q_s_b, DVec3::from(sigma_deg) * DEG))
+                Ok(Self::Given(RollPitchYaw { roll, pitch, yaw }.to_quat(), DVec3::from(sigma_deg) * DEG))
             }
             _ => Err(
                 "expected degrees, such as -9.5,-60.8,-166.8 or -9.5,-60.8,-166.8:1.5,0.5,0.8, or flu, rfu, auto"
@@ -323,16 +322,16 @@ fn gnss_sigma(text: &str) -> Result<GnssSigma, &'static str> {
     };
     let (position, velocity) = factors.split_once(':').unwrap_or((factors, factors));
     let factor = |text: &str| number(text).ok().filter(|factor| *factor > 0.0);
-    let both = factor(position).zip(factor(velocity));
-    both.map(|(position, velocity)| (None, [position, velocity]))
+    factor(position)
+        .zip(factor(velocity))
+        .map(|(position, velocity)| (None, [position, velocity]))
         .ok_or("expected factors > 0: x3 or x3:2")
 }
 
 /// `POS` or `N,E,D` in metres, then `:VEL` or `:N,E,D` in m/s.
 fn fix_sigma(text: &str) -> Result<FixSigma, &'static str> {
     let three = |part: &str| {
-        let three = numbers::<3>(part).or(numbers::<1>(part).map(|[all]| [all; 3]));
-        three.filter(|sigma| sigma.iter().all(|x| *x > 0.0)).ok_or(
+        numbers::<3>(part).or(numbers::<1>(part).map(|[all]| [all; 3])).filter(|sigma| sigma.iter().all(|x| *x > 0.0)).ok_or(
             "expected metres above 0, one or three (north, east, down), and after a colon m/s: 2,2,4:0.1",
         )
     };
@@ -360,10 +359,10 @@ impl FromStr for StartChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let numbers = text
+        match text
             .split_once(':')
-            .map(|(deg, sigma)| (number(deg), number(sigma)));
-        match numbers {
+            .map(|(deg, sigma)| (number(deg), number(sigma)))
+        {
             _ if text == "auto" => Ok(Self::Auto),
             Some((Ok(deg), Ok(sigma_deg)))
                 if sigma_deg > 0.0 && sigma_deg <= MAX_SIGMA_DEG && deg.abs() <= 360.0 =>
@@ -393,8 +392,7 @@ impl From<FusionError> for Failure {
                 Some("a filter of fewer states, or the drive in parts".to_owned())
             }
             FusionError::Diverged { .. } => {
-                let failure = Self::could_not(&e);
-                return failure.hint("check axes, units and the initial state");
+                return Self::could_not(&e).hint("check axes, units and the initial state");
             }
             _ => None,
         };
@@ -472,12 +470,15 @@ impl Drive {
                 .filter(|t| !t.is_empty())
         };
         let imu = read_imu(&request.imu, request.columns.as_deref(), topic(0))?;
-        let span_s = imu
-            .samples
-            .first()
-            .zip(imu.samples.last())
-            .map(|(first, last)| (first.t_s, last.t_s));
-        let (mut gnss, remarks) = read_gnss(&request.gnss, unsaid.as_ref(), span_s, topic(1))?;
+        let (mut gnss, remarks) = read_gnss(
+            &request.gnss,
+            unsaid.as_ref(),
+            imu.samples
+                .first()
+                .zip(imu.samples.last())
+                .map(|(first, last)| (first.t_s, last.t_s)),
+            topic(1),
+        )?;
         for fix in &mut gnss {
             *fix = fix.with_sigmas_times(position, velocity);
             fix.t_s -= request.gnss_delay_s;
@@ -503,11 +504,12 @@ impl Drive {
                 "the model was converted from {from} Hz to {to:.3} Hz"
             ));
         }
-        let of_file = initial
-            .as_ref()
-            .map(|start| start.sigma.clone())
-            .unwrap_or_default();
-        let mut expected = request.expected(of_file);
+        let mut expected = request.expected(
+            initial
+                .as_ref()
+                .map(|start| start.sigma.clone())
+                .unwrap_or_default(),
+        );
         inputs::expect_turn_on(&mut expected, &model, &request.model, context);
         expected.validate().refuse()?;
         let options = trajectory_file::Options::default();
@@ -561,9 +563,12 @@ impl Drive {
             aids: &[],
         };
         let mut settings = self.settings.clone();
-        let of_model = (&self.model.model, self.request.filter, &self.expected);
-        let (belief, reduction) =
-            belief(of_model, self.imu_rate_hz, &self.gnss, &settings.outages)?;
+        let (belief, reduction) = belief(
+            (&self.model.model, self.request.filter, &self.expected),
+            self.imu_rate_hz,
+            &self.gnss,
+            &settings.outages,
+        )?;
         let plan = OutagePlan {
             fixed: settings.outages,
             ..OutagePlan::default()
@@ -573,10 +578,10 @@ impl Drive {
         context.warn_each(&placed.remarks);
         settings.outages = placed.windows;
         let mounting = match self.request.mounting {
-            Some(MountingChoice::Auto) => {
-                let found = mounting::find(&recorded, &settings, &belief);
-                Some(found.map_err(|e| self.not_mounted(e, &recorded, &settings, &belief))?)
-            }
+            Some(MountingChoice::Auto) => Some(
+                mounting::find(&recorded, &settings, &belief)
+                    .map_err(|e| self.not_mounted(e, &recorded, &settings, &belief))?,
+            ),
             _ => None,
         };
         if let Some(Mounting { q_s_b, sigma_b, .. }) = mounting {
@@ -638,22 +643,24 @@ impl Drive {
             settings: &settings,
             is_given: self.initial.is_some(),
         };
-        let explained = is_unexplained
+        let cause = is_unexplained
             .then(|| {
                 scene.cause(&Recorded {
                     gnss: &weighed.gnss,
                     ..recorded
                 })
             })
-            .flatten();
-        let cause = explained.map(|cause| cause.after(delay_s));
+            .flatten()
+            .map(|cause| cause.after(delay_s));
         let kind = if cause.is_some() {
             verdict.max(VerdictKind::Doubtful)
         } else {
             verdict
         };
-        let against = |(verdict, finding)| (verdict > VerdictKind::Consistent).then_some(finding);
-        let evidence = findings.into_iter().filter_map(against).collect();
+        let evidence = findings
+            .into_iter()
+            .filter_map(|(verdict, finding)| (verdict > VerdictKind::Consistent).then_some(finding))
+            .collect();
         let constants = belief
             .groups
             .iter()
@@ -759,8 +766,13 @@ impl Drive {
                 mounting_sigma_b: found.sigma_b,
                 ..settings.clone()
             };
-            let start = coarse(there, &settings, belief).ok()?.start;
-            displaced(there, belief, &start, &settings)?.delay_s
+            displaced(
+                there,
+                belief,
+                &coarse(there, &settings, belief).ok()?.start,
+                &settings,
+            )?
+            .delay_s
         };
         let Some(mut clocks) = clocks_apart(recorded, rest) else {
             return e.into();
@@ -806,15 +818,21 @@ impl Scene<'_> {
 
     /// Mean NIS per component with a start of its own.
     fn nis(&self, recorded: &Recorded<'_>) -> Option<f64> {
-        let solution = fuse(
-            recorded,
-            self.belief,
-            &self.start(recorded)?,
-            self.settings,
-            None,
+        Some(
+            outcome(
+                &fuse(
+                    recorded,
+                    self.belief,
+                    &self.start(recorded)?,
+                    self.settings,
+                    None,
+                )
+                .ok()?,
+                &[],
+            )
+            .nis_per_component,
         )
-        .ok()?;
-        Some(outcome(&solution, &[]).nis_per_component).filter(|nis| nis.is_finite())
+        .filter(|nis| nis.is_finite())
     }
 
     fn start(&self, recorded: &Recorded<'_>) -> Option<Start> {
@@ -844,8 +862,12 @@ impl Cause {
 
 /// A start that states the attitude of the vehicle: that of the IMU is known no better than the mounting.
 fn beside_mounting(mut start: Start, settings: &Settings) -> Start {
-    let mounting_deg = (settings.mounting_sigma_b / DEG).to_array();
-    for (sigma, mounting) in start.sigma.att_sigma_deg.iter_mut().zip(mounting_deg) {
+    for (sigma, mounting) in start
+        .sigma
+        .att_sigma_deg
+        .iter_mut()
+        .zip((settings.mounting_sigma_b / DEG).to_array())
+    {
         *sigma = sigma.hypot(mounting).min(30.0).max(*sigma);
     }
     start
@@ -854,11 +876,13 @@ fn beside_mounting(mut start: Start, settings: &Settings) -> Start {
 /// Heading that the motion between outages hardly shows.
 fn doubt_heading(solution: &Solution, outages: &[Outage]) -> Option<HeadingDoubt> {
     let start_s = solution.rows.first()?.t_s;
-    let fixed = solution
-        .rows
-        .iter()
-        .filter(|row| !outages.iter().any(|o| o.withholds(row.t_s)));
-    weak_heading(fixed.map(|row| (row.t_s - start_s, row.sigma[8])))
+    weak_heading(
+        solution
+            .rows
+            .iter()
+            .filter(|row| !outages.iter().any(|o| o.withholds(row.t_s)))
+            .map(|row| (row.t_s - start_s, row.sigma[8])),
+    )
 }
 
 // The filter of a fusion: made for a recording whose trajectory is not known.
@@ -937,11 +961,13 @@ fn receiver(gnss: &[GnssFix], interval_s: f64) -> GnssSettings {
 /// its own rate.
 fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, continuous::RateError> {
     let kept = |axis: &Composite| {
-        let processes = axis
-            .processes
-            .iter()
-            .filter(|p| !matches!(p, Process::Quantization(_)));
-        Composite::new(processes.copied().collect())
+        Composite::new(
+            axis.processes
+                .iter()
+                .filter(|p| !matches!(p, Process::Quantization(_)))
+                .copied()
+                .collect(),
+        )
     };
     let axes = std::array::from_fn(|i| kept(&model.axes[i]));
     continuous::at_rate(
@@ -1179,16 +1205,19 @@ fn vehicle(solution: &Solution, settings: &AidingSettings) -> Option<Value> {
         return None;
     }
     let mut found = json!({ "aids": aid_innovations(&solution.aids) });
-    let keys = [
+    for (i, (key, unit)) in [
         ("wheel_scale", 1.0),
         ("mounting_pitch_deg", DEG),
         ("mounting_yaw_deg", DEG),
-    ];
-    for (i, (key, unit)) in keys.into_iter().enumerate() {
-        let known = solution
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        if let Some([value, sigma]) = solution
             .vehicle
-            .filter(|_| settings.state_sigmas()[i] > 0.0);
-        if let Some([value, sigma]) = known.map(|v| v.map(|estimates| estimates[i] / unit)) {
+            .filter(|_| settings.state_sigmas()[i] > 0.0)
+            .map(|v| v.map(|estimates| estimates[i] / unit))
+        {
             found[key] = json!({ "value": value, "sigma": sigma });
         }
     }
@@ -1242,8 +1271,9 @@ fn directory(answer: &FuseAnswer) -> Vec<OutputFile<'static>> {
         smoothed.map(|rows| kml(rows, "smoothed solution", title)),
         Some(json(summary)),
     ];
-    let files = FILES.into_iter().zip(contents);
-    files
+    FILES
+        .into_iter()
+        .zip(contents)
         .filter_map(|(name, text)| Some(OutputFile::whole(name, text?)))
         .collect()
 }
@@ -1316,8 +1346,11 @@ fn innovations_csv(solution: &Solution) -> String {
     ]);
     for fix in &solution.fixes {
         let status = if fix.used { "used" } else { "withheld" };
-        let used = u8::from(fix.used).to_string();
-        let mut cells = vec![fixed(fix.t_s, 6), used, status.to_owned()];
+        let mut cells = vec![
+            fixed(fix.t_s, 6),
+            u8::from(fix.used).to_string(),
+            status.to_owned(),
+        ];
         for list in [&fix.innovation, &fix.sigma] {
             cells.extend((0..6).map(|i| list.get(i).map_or_else(String::new, |x| fixed(*x, 6))));
         }

@@ -92,8 +92,7 @@ fn notes(summary: &Summary, answer: &RunAnswer, page: &mut Document) {
             .into_iter()
             .for_each(|doubt| page.note(Importance::Detail, doubt));
     }
-    let shown = largest(summary, 1);
-    for outage in shown.iter().map(|k| &summary.outages[*k]) {
+    for outage in largest(summary, 1).iter().map(|k| &summary.outages[*k]) {
         sources(outage)
             .into_iter()
             .for_each(|line| page.note(Importance::Remark, line));
@@ -102,13 +101,12 @@ fn notes(summary: &Summary, answer: &RunAnswer, page: &mut Document) {
 
 /// `sources of the horizontal error at the end of 300–390 s: gyro.AR1 78 %, gyro.WN 11 %, gnss.velocity 10 %`
 fn sources(outage: &OutageSummary) -> Option<String> {
-    let ranked = outage
+    let shares: Vec<String> = outage
         .budget
         .as_ref()?
         .ranked(&[0, 1])
         .into_iter()
-        .take(SOURCES);
-    let shares: Vec<String> = ranked
+        .take(SOURCES)
         .map(|(name, share)| format!("{name} {:.0} %", 100.0 * share))
         .collect();
     let place = window(outage.start_s, outage.end_s);
@@ -133,12 +131,15 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
     let summary = &answer.navigation.summary;
     if summary.outages.is_empty() {
         page.section("Accuracy over the run");
-        let columns = [
-            ("state", "@"),
-            ("RMSE, mean", "."),
-            ("ASEE, mean", "../../asee_mean/@"),
-        ];
-        page.lead(Table::of(answer, "/accuracy/rmse_mean/*", &columns));
+        page.lead(Table::of(
+            answer,
+            "/accuracy/rmse_mean/*",
+            &[
+                ("state", "@"),
+                ("RMSE, mean", "."),
+                ("ASEE, mean", "../../asee_mean/@"),
+            ],
+        ));
         return;
     }
     page.section("At the ends of outages");
@@ -178,8 +179,10 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
     for k in shown {
         let outage = &summary.outages[*k];
         let table = Table::of(answer, &format!("/outages/{k}/rmse_end/*"), &columns);
-        let title = format!("States, {}", window(outage.start_s, outage.end_s));
-        page.folded(&title, |page| page.table(&table));
+        page.folded(
+            &format!("States, {}", window(outage.start_s, outage.end_s)),
+            |page| page.table(&table),
+        );
     }
 }
 
@@ -209,8 +212,11 @@ fn provenance(answer: &RunAnswer, page: &mut Document) {
         "nav-sim {}; the command is in manifest.json.",
         env!("CARGO_PKG_VERSION")
     ));
-    let columns = [("input", "role"), ("file", "path"), ("BLAKE3", "blake3")];
-    page.table(&Table::of(&answer.inputs, "/*", &columns));
+    page.table(&Table::of(
+        &answer.inputs,
+        "/*",
+        &[("input", "role"), ("file", "path"), ("BLAKE3", "blake3")],
+    ));
     let configuration = toml::to_string_pretty(&answer.origin.configuration).unwrap_or_default();
     page.folded("Configuration", |page| page.code(&configuration));
 }
@@ -237,8 +243,9 @@ fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
         let table = Table::of(answer, &format!("/outages/{k}/{key}/*"), &columns);
         let (start_s, end_s) = (outages[*k].start_s, outages[*k].end_s);
         if !table.is_empty() {
-            let title = format!("{}, {kind}", window(start_s, end_s));
-            page.folded(&title, |page| page.table(&table));
+            page.folded(&format!("{}, {kind}", window(start_s, end_s)), |page| {
+                page.table(&table)
+            });
         }
     }
 }
@@ -275,11 +282,14 @@ pub(super) fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
             Mark::Points(summary.outages.iter().map(end).collect()),
         ),
     ];
-    let panel = Panel {
-        height: 1.2,
-        ..Panel::new(Axis::log("horizontal error (m)"), series)
-    };
-    Chart::over_time("Horizontal position error", vec![panel], &windows(summary))
+    Chart::over_time(
+        "Horizontal position error",
+        vec![Panel {
+            height: 1.2,
+            ..Panel::new(Axis::log("horizontal error (m)"), series)
+        }],
+        &windows(summary),
+    )
 }
 
 /// Quantiles of the horizontal error over time, those of a covariance analysis beside the runs dashed.
@@ -289,11 +299,14 @@ pub(super) fn fan_chart(fan: &[FanEpoch], summary: &Summary) -> Chart {
             .map(|e| (e.t_s, e.quantiles_m[low], e.quantiles_m[high]))
             .collect()
     };
-    let median = fan.iter().map(|e| (e.t_s, e.quantiles_m[2])).collect();
     let mut series = vec![
         Series::new("5 to 95 %", Colour::REAL, Mark::Band(between(0, 4))),
         Series::new("25 to 75 %", Colour::REAL, Mark::InnerBand(between(1, 3))),
-        Series::line("median", Colour::REAL, median),
+        Series::line(
+            "median",
+            Colour::REAL,
+            fan.iter().map(|e| (e.t_s, e.quantiles_m[2])).collect(),
+        ),
     ];
     if fan.iter().any(|e| e.lincov_m.is_some()) {
         let expected = |i: usize| {
@@ -306,10 +319,9 @@ pub(super) fn fan_chart(fan: &[FanEpoch], summary: &Summary) -> Chart {
             [0, 2, 4].map(|i| Series::dashed("covariance analysis", Colour::BELIEVED, expected(i))),
         );
     }
-    let panel = Panel::new(Axis::log("horizontal error (m)"), series);
     Chart::over_time(
         "Percentiles of the horizontal position error",
-        vec![panel],
+        vec![Panel::new(Axis::log("horizontal error (m)"), series)],
         &windows(summary),
     )
 }
@@ -339,10 +351,13 @@ pub(super) fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
         let mut series = vec![Series::line("", Colour::Ink, over_time(epochs, value))];
         // of expected values there is no scatter, and no band for it
         if summary.runs > 0 {
-            let zone = Mark::Zone(band[0], band[1]);
             series.insert(
                 0,
-                Series::new("95 % band of a right filter", Colour::RIGHT, zone),
+                Series::new(
+                    "95 % band of a right filter",
+                    Colour::RIGHT,
+                    Mark::Zone(band[0], band[1]),
+                ),
             );
         }
         Panel {
@@ -373,8 +388,11 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], answer: &RunAnswer) -> S
     let verdict = &summary.verdict;
     let [is_recorded, is_modelled] = ["static", "truth"].map(|role| answer.has_input(role));
     let ratios = summary.reduction.iter().flat_map(|quality| {
-        let states = quality.outage_end.iter().chain([&quality.mean]);
-        states.flat_map(|state| state.0)
+        quality
+            .outage_end
+            .iter()
+            .chain([&quality.mean])
+            .flat_map(|state| state.0)
     });
     let is_far = verdict.beyond_linear.is_some();
     let is_analysed = summary.method == Method::Lincov.name()

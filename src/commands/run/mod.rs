@@ -151,8 +151,7 @@ impl Command for Run {
     const JUDGES: &'static [&'static str] = &["require"];
 
     fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        let trajectory = files("trajectory", [&self.trajectory]);
-        Ok(trajectory
+        Ok(files("trajectory", [&self.trajectory])
             .chain(files("model", [&self.model]))
             .chain(files("truth", &self.truth))
             .chain(inputs::listed("static", &self.recordings)?)
@@ -195,11 +194,14 @@ impl Run {
         if self.spread {
             inputs.truth = TrueImu::Drawn(self.drawn(&made_by, &scenario, seed)?);
         }
-        let outages = inputs::placed(&scenario, &inputs.trajectory, seed, context);
-        let outages = outages.map_err(|e| match &self.settings.file.scenario {
-            Some(file) if self.settings.outages.is_empty() => e.within(&file.display().to_string()),
-            _ => e,
-        })?;
+        let outages = inputs::placed(&scenario, &inputs.trajectory, seed, context).map_err(
+            |e| match &self.settings.file.scenario {
+                Some(file) if self.settings.outages.is_empty() => {
+                    e.within(&file.display().to_string())
+                }
+                _ => e,
+            },
+        )?;
         let wanting = self
             .require
             .iter()
@@ -261,10 +263,13 @@ impl Run {
             );
         };
         let of_run = |run| {
-            let drawn = spread.draw(&file.model, seed, run);
-            let drawn = drawn.expect("the spread was read with its model");
-            continuous::at_rate(&drawn, scenario.imu.rate_hz)
-                .refuse_within(format!("a model drawn from the [spread] of {path}"))
+            continuous::at_rate(
+                &spread
+                    .draw(&file.model, seed, run)
+                    .expect("the spread was read with its model"),
+                scenario.imu.rate_hz,
+            )
+            .refuse_within(format!("a model drawn from the [spread] of {path}"))
         };
         (0..scenario.run.runs).map(of_run).collect()
     }
@@ -279,8 +284,7 @@ impl Run {
         let imu_hz = scenario.imu.rate_hz;
         let read_model = |path: &Path| {
             let file = inputs::model(path, context)?;
-            let model = inputs::at_rate(path, &file.model, imu_hz, context)?;
-            Ok::<_, Failure>((model, file))
+            Ok::<_, Failure>((inputs::at_rate(path, &file.model, imu_hz, context)?, file))
         };
         let trajectory = inputs::trajectory(&self.trajectory, context)?;
         let (model, file) = read_model(&self.model)?;
@@ -288,46 +292,55 @@ impl Run {
         let truth = self.truth.as_deref().map(read_model).transpose()?;
         // recordings are their own truth: what they had of a constant bias is taken from them
         if self.recordings.is_empty() {
-            let made_by = truth.as_ref().map_or(&file, |(_, file)| file);
-            let path = self.truth.as_ref().unwrap_or(&self.model);
-            inputs::make_turn_on(&mut scenario.imu, made_by, path, context);
+            inputs::make_turn_on(
+                &mut scenario.imu,
+                truth.as_ref().map_or(&file, |(_, file)| file),
+                self.truth.as_ref().unwrap_or(&self.model),
+                context,
+            );
         }
         let analysed = scenario.run.method == Method::Lincov;
         let draws = |path: &Path, file: &ModelFile| -> Option<Draws> {
-            let found = analysed.then(|| draws_file::usable(path, &file.model, imu_hz))?;
-            found.unwrap_or_else(|doubt| {
-                context.warn(format!("{doubt}: no intervals from the calibration"));
-                None
-            })
+            analysed
+                .then(|| draws_file::usable(path, &file.model, imu_hz))?
+                .unwrap_or_else(|doubt| {
+                    context.warn(format!("{doubt}: no intervals from the calibration"));
+                    None
+                })
         };
         let model_draws = draws(&self.model, &file);
         let made_by = truth.as_ref().map_or(&file, |(_, file)| file).clone();
         let (truth, truth_draws) = match (truth, self.recordings.as_slice()) {
-            (Some((model, file)), []) => {
-                let drawn = self.truth.as_deref().and_then(|path| draws(path, &file));
-                (TrueImu::Model(model), drawn)
-            }
+            (Some((model, file)), []) => (
+                TrueImu::Model(model),
+                self.truth.as_deref().and_then(|path| draws(path, &file)),
+            ),
             (None, []) => (TrueImu::AsBelieved, None),
-            (_, paths) => {
-                let recordings = inputs::recordings(paths, self.rate_hz, context)?;
-                (TrueImu::Recordings(recordings), None)
-            }
+            (_, paths) => (
+                TrueImu::Recordings(inputs::recordings(paths, self.rate_hz, context)?),
+                None,
+            ),
         };
-        let inputs = NavigateInputs {
-            trajectory,
-            model,
-            truth,
-            model_draws,
-            truth_draws,
-        };
-        Ok((inputs, file, made_by))
+        Ok((
+            NavigateInputs {
+                trajectory,
+                model,
+                truth,
+                model_draws,
+                truth_draws,
+            },
+            file,
+            made_by,
+        ))
     }
 }
 
 /// Runs of this request that are summed together: the bytes of results depend on it alone, not on who computed them.
 pub(crate) fn block_of(request: &Run, context: &Context<'_>) -> Result<u64> {
-    let trajectory = inputs::trajectory(&request.trajectory, context)?;
-    Ok(block(&trajectory, &request.scenario()?))
+    Ok(block(
+        &inputs::trajectory(&request.trajectory, context)?,
+        &request.scenario()?,
+    ))
 }
 
 /// Runs `first..first + count` of filters on the same noise, one result a filter (none for covariance analysis); nothing if the
@@ -382,10 +395,15 @@ impl PreparedRun<'_> {
         let (model, request) = (&self.inputs.model, self.request);
         let track = scenario.track(&self.inputs.trajectory, model, &outages)?;
         let belief = scenario.belief(model, &outages, &track).map_err(|e| {
-            let scenario = request.settings.file.scenario.as_deref();
-            let settings = request.gnss.as_deref().or(scenario);
-            let advice = "raise it, or take the full filter (--filter full), which reduces nothing";
-            inputs::no_filter(&e, &request.model, settings, advice)
+            inputs::no_filter(
+                &e,
+                &request.model,
+                request
+                    .gnss
+                    .as_deref()
+                    .or(request.settings.file.scenario.as_deref()),
+                "raise it, or take the full filter (--filter full), which reduces nothing",
+            )
         })?;
         Ok((track, belief))
     }
@@ -404,9 +422,15 @@ impl PreparedRun<'_> {
             mut origin,
             seed,
         } = self;
-        let filter = (&track, &belief);
-        let mut navigation =
-            with_runs(&inputs, &scenario, &outages, filter, seed, sampled, context)?;
+        let mut navigation = with_runs(
+            &inputs,
+            &scenario,
+            &outages,
+            (&track, &belief),
+            seed,
+            sampled,
+            context,
+        )?;
         let summary = &mut navigation.summary;
         summary.require = request.require.iter().map(|r| r.check(summary)).collect();
         if let Some(runs) = &navigation.runs {
@@ -484,15 +508,13 @@ impl Answer for RunAnswer {
             ..
         } = summary;
         if *diverged > 0 && diverged == runs {
-            let failure =
-                Failure::could_not(format!("all {runs} runs diverged: there is no result"));
             return Some(
-                failure.hint("does the model fit the IMU, are [imu] and [initial] plausible?"),
+                Failure::could_not(format!("all {runs} runs diverged: there is no result"))
+                    .hint("does the model fit the IMU, are [imu] and [initial] plausible?"),
             );
         }
         if *diverged > 0 {
-            let failure = Failure::bound(format!("{diverged} of {runs} runs diverged"));
-            return Some(failure.hint(
+            return Some(Failure::bound(format!("{diverged} of {runs} runs diverged")).hint(
                 "their indices are in summary.json, under diverged_runs; they are in no other number",
             ));
         }
@@ -503,9 +525,10 @@ impl Answer for RunAnswer {
         }
         verdict.is_far_off().then(|| {
             let nees = summary.nees.mean;
-            let message =
-                format!("the filter is overconfident by far: NEES {nees:.0}, 9 if it is right");
-            Failure::bound(message).hint("the results are written")
+            Failure::bound(format!(
+                "the filter is overconfident by far: NEES {nees:.0}, 9 if it is right"
+            ))
+            .hint("the results are written")
         })
     }
 }
@@ -571,12 +594,14 @@ pub fn navigate(
     context: &Context<'_>,
 ) -> Result<Navigation> {
     let track = scenario.track(&inputs.trajectory, &inputs.model, outages)?;
-    let belief = scenario.belief(&inputs.model, outages, &track).refuse()?;
     with_runs(
         inputs,
         scenario,
         outages,
-        (&track, &belief),
+        (
+            &track,
+            &scenario.belief(&inputs.model, outages, &track).refuse()?,
+        ),
         seed,
         None,
         context,
@@ -602,16 +627,24 @@ fn with_runs(
     // Within 1e-3 the same in a quarter of the time: for what stands beside the figures.
     let merged = track.merged();
     let full = |model: &Model| {
-        let scenario = scenario.with_full_noise();
-        scenario.belief(model, outages, track).ok()
+        scenario
+            .with_full_noise()
+            .belief(model, outages, track)
+            .ok()
     };
     let reduction = scenario.filter.states.is_reduced().then(|| {
-        let full = full(&inputs.model);
-        reduction_of((&inputs.model, belief, full.as_ref()), &merged, context)
+        reduction_of(
+            (&inputs.model, belief, full(&inputs.model).as_ref()),
+            &merged,
+            context,
+        )
     });
     // Where the motion hardly shows the heading, no filter of this kind is to be believed.
-    let yaw = FilterPass::new(&merged, belief).yaw_while_measured();
-    context.warn_each(&weak_heading(yaw.into_iter()));
+    context.warn_each(&weak_heading(
+        FilterPass::new(&merged, belief)
+            .yaw_while_measured()
+            .into_iter(),
+    ));
     let experiment = scenario.experiment(
         &inputs.trajectory,
         inputs.truth(),
@@ -628,9 +661,10 @@ fn with_runs(
     // beside runs that were asked for alone it may be impossible
     let expected = possible.ok().and_then(|()| analysis.expected());
     if method != Method::MonteCarlo && expected.is_none() {
-        let message = "the covariance analysis did not stay finite and positive definite";
-        return Err(Failure::could_not(message)
-            .hint("do the models fit the IMU, are [imu] and [initial] plausible?"));
+        return Err(Failure::could_not(
+            "the covariance analysis did not stay finite and positive definite",
+        )
+        .hint("do the models fit the IMU, are [imu] and [initial] plausible?"));
     }
     let mut navigation = match (method, expected) {
         (
@@ -728,8 +762,7 @@ fn motion(recording: &Recording) -> Option<String> {
     let second = (recording.rate_hz.round() as usize).max(1);
     recording.signals.iter().find_map(|signal| {
         let limit = if signal.channel.sensor == Sensor::Accel { MOTION.0 } else { MOTION.1 };
-        let means = signal.samples.chunks_exact(second).map(|c| c.iter().sum::<f64>() / second as f64);
-        let (low, high) = means.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
+        let (low, high) = signal.samples.chunks_exact(second).map(|c| c.iter().sum::<f64>() / second as f64).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
         let message = format!(
             "{}: not static? The mean over a second of {} goes from {:.3} to {:.3} {}: motion becomes errors of the \
              IMU",
@@ -760,9 +793,11 @@ fn sampled(
     context.begin("runs", runs);
     let plan = Plan::new(experiment)?.with_fan();
     let of_block = |first: u64| {
-        let count = block.min(runs - first);
-        let found = monte_carlo::run_range(&plan, first, count, &|| true, &|n| context.advance(n));
-        found.expect("nothing stops it").swap_remove(0)
+        monte_carlo::run_range(&plan, first, block.min(runs - first), &|| true, &|n| {
+            context.advance(n)
+        })
+        .expect("nothing stops it")
+        .swap_remove(0)
     };
     let mut result = of_block(0);
     for first in (block..runs).step_by(block as usize) {
@@ -792,10 +827,9 @@ impl Analysis<'_> {
         let Some(model) = self.model else {
             return Vec::new();
         };
-        let truth = TruthSide::together(&TruthSide::sources(self.experiment, model));
         expected_fan(
             &FilterPass::new(self.track, self.belief),
-            &truth,
+            &TruthSide::together(&TruthSide::sources(self.experiment, model)),
             self.experiment.outages,
         )
     }
@@ -892,8 +926,10 @@ pub(crate) fn reduction_of(
     if model.axes.iter().all(is_exact) {
         return None;
     }
-    let full = full.map(|full| assess(track, full, model));
-    let quality = ReductionQuality::of(&assess(track, belief, model), full.as_ref());
+    let quality = ReductionQuality::of(
+        &assess(track, belief, model),
+        full.map(|full| assess(track, full, model)).as_ref(),
+    );
     context.remark(reduction_line(&quality));
     context.warn_each(&reduction_doubt(&quality));
     Some(quality)
@@ -929,8 +965,10 @@ impl Analysis<'_> {
         };
         for (outage, interval) in outages.iter_mut().zip(intervals(truth, draws, &figures)) {
             let h = &mut outage.horizontal_error_end_m;
-            let rmse = about(&outage.rmse_end.0, &interval);
-            outage.rmse_end_ci95 = rmse.try_into().ok().map(PerState);
+            outage.rmse_end_ci95 = about(&outage.rmse_end.0, &interval)
+                .try_into()
+                .ok()
+                .map(PerState);
             let ends = |value, (low, high)| (Some(value * low), Some(value * high));
             if let [.., p50, p95] = interval[..] {
                 (h.p50_ci95, h.p95_ci95) = (ends(h.p50, p50), ends(h.p95, p95));
@@ -953,11 +991,10 @@ impl Analysis<'_> {
                 return Vec::new();
             };
             let filter = FilterPass::new(&track, &belief);
-            let means = filter.sigma_means(self.experiment.outages);
             filter
                 .sigma_at_ends()
                 .iter()
-                .zip(means)
+                .zip(filter.sigma_means(self.experiment.outages))
                 .map(|(end, mean)| [&end[..], &mean].concat())
                 .collect()
         };
@@ -975,8 +1012,11 @@ impl Analysis<'_> {
 
 /// Intervals of values, by their ends over the values.
 fn about(values: &[f64], ratios: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let ends = |(value, (low, high)): (&f64, &(f64, f64))| (value * low, value * high);
-    values.iter().zip(ratios).map(ends).collect()
+    values
+        .iter()
+        .zip(ratios)
+        .map(|(value, (low, high)): (&f64, &(f64, f64))| (value * low, value * high))
+        .collect()
 }
 
 /// The ends of the interval that the draws give to each figure, over the estimate.
@@ -987,13 +1027,21 @@ fn intervals(
 ) -> Vec<Vec<(f64, f64)>> {
     let drawn: Vec<Figures> = draws.models.par_iter().map(figures).collect();
     let of_figure = |k: usize, (i, x): (usize, &f64)| {
-        let all = drawn.iter().filter_map(|ends| Some(ends.get(k)?[i]));
-        let [low, high] = derived_interval(*x, all.collect(), draws.stretch);
+        let [low, high] = derived_interval(
+            *x,
+            drawn
+                .iter()
+                .filter_map(|ends| Some(ends.get(k)?[i]))
+                .collect(),
+            draws.stretch,
+        );
         (low / x, high / x)
     };
     let of_outage = |(k, own): (usize, &Vec<f64>)| {
-        let own = own.iter().enumerate();
-        own.map(|figure| of_figure(k, figure)).collect()
+        own.iter()
+            .enumerate()
+            .map(|figure| of_figure(k, figure))
+            .collect()
     };
     figures(estimate)
         .iter()
