@@ -83,9 +83,10 @@ impl Command for CheckFiles {
             wrong => {
                 context.warn_each(&failures);
                 let message = format!("{wrong} of {} files are refused", files.len());
-                Some(match failures.iter().any(|failure| failure.code() == 1) {
-                    true => Failure::could_not(message),
-                    false => Failure::input(message),
+                Some(if failures.iter().any(|failure| failure.code() == 1) {
+                    Failure::could_not(message)
+                } else {
+                    Failure::input(message)
                 })
             }
         };
@@ -176,9 +177,10 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
                 vel_m_s: Some([1.0; 3]),
             };
             let read = read_gnss(path, None, None, None);
-            let unsaid = match read.is_err() {
-                true => ", without standard deviations (fuse --gnss-sigma)",
-                false => "",
+            let unsaid = if read.is_err() {
+                ", without standard deviations (fuse --gnss-sigma)"
+            } else {
+                ""
             };
             let (fixes, notes) =
                 read.or_else(|e| read_gnss(path, Some(&given), None, None).map_err(|_| e))?;

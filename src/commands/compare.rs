@@ -441,9 +441,10 @@ impl Comparison {
                 .map(|outage| outage.states[state].ratio_error_pct);
             let low = all.clone().reduce(f64::min)?;
             let [low, high] = [low, all.fold(low, f64::max)].map(|pct| format!("{pct:+.0}"));
-            Some(match low == high {
-                true => format!("{name} {low} %"),
-                false => format!("{name} {low} to {high} %"),
+            Some(if low == high {
+                format!("{name} {low} %")
+            } else {
+                format!("{name} {low} to {high} %")
             })
         };
         let costs: Vec<String> = others.iter().take(NAMED).filter_map(cost).collect();

@@ -183,9 +183,10 @@ impl Answer for Inspection {
                 .filter(|c| c.content == content)
                 .map(|c| c.topic.as_str())
                 .collect();
-            match topics.is_empty() {
-                true => "none".to_owned(),
-                false => topics.join(", "),
+            if topics.is_empty() {
+                "none".to_owned()
+            } else {
+                topics.join(", ")
             }
         };
         let (imu, fix) = (named("imu"), named("fix"));

@@ -156,10 +156,7 @@ impl Command for Require {
                 RequireAnswer::Given(Box::new(asked.given(path, self.vehicle.is_some(), context)?))
             }
             (None, Some(directory)) => {
-                let units = match directory.as_os_str() == BUILT_IN {
-                    true => asked.catalogue()?,
-                    false => asked.units_of(directory, context)?,
-                };
+                let units = if directory.as_os_str() == BUILT_IN { asked.catalogue()? } else { asked.units_of(directory, context)? };
                 RequireAnswer::Ranked(asked.ranked(&units)?)
             }
             (None, None) => RequireAnswer::Needed(Box::new(asked.needed().map_err(|e| {
@@ -261,9 +258,10 @@ impl Requirements {
             ));
         }
         let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
-        let aidings = match has_vehicle {
-            true => self.aidings(&scenario, &model).map_err(unusable)?,
-            false => Vec::new(),
+        let aidings = if has_vehicle {
+            self.aidings(&scenario, &model).map_err(unusable)?
+        } else {
+            Vec::new()
         };
         let outages = match self.ask {
             Ask::Longest => self.long_outages(),
@@ -855,9 +853,10 @@ impl Requirements {
             .map(|first| first.checked_sub(1).map_or(0.0, |last| lengths[last]));
         let at_least_s = lengths.last().copied().unwrap_or(0.0);
         let at_least = || {
-            let rest = match at_least_s < LONGEST_S {
-                true => "to the end of the trajectory",
-                false => "longer ones are not looked at",
+            let rest = if at_least_s < LONGEST_S {
+                "to the end of the trajectory"
+            } else {
+                "longer ones are not looked at"
             };
             format!("≥ {} s, {rest}", seconds(at_least_s))
         };
@@ -1059,11 +1058,10 @@ impl GivenImu {
             ),
             format!("asked: {}", question.in_words()),
             format!("longest outage within the limits, from the same starts: {longest}"),
-            match without.margin() >= 0.0 {
-                true => format!("an IMU without errors would leave {name} {left}"),
-                false => {
-                    format!("no IMU keeps the limit: GNSS and start alone leave {name} {left}")
-                }
+            if without.margin() >= 0.0 {
+                format!("an IMU without errors would leave {name} {left}")
+            } else {
+                format!("no IMU keeps the limit: GNSS and start alone leave {name} {left}")
             },
         ]
     }

@@ -476,9 +476,10 @@ impl TuneAnswer {
             )],
             changed => {
                 let cost = self.cost(&self.after);
-                let cost = match cost.is_finite() {
-                    true => format!("; cost {:.1} % of horizontal RMSE", 100.0 * cost),
-                    false => String::new(),
+                let cost = if cost.is_finite() {
+                    format!("; cost {:.1} % of horizontal RMSE", 100.0 * cost)
+                } else {
+                    String::new()
                 };
                 let [before, after] = [&self.before, &self.after].map(|found| readable(found.nees));
                 let factors = factors_in_words(changed);
@@ -502,13 +503,13 @@ impl TuneAnswer {
     /// What covers the errors of the vehicle's own measurements.
     fn of_aiding(&self) -> Option<String> {
         let factor = self.aiding_sigmas.filter(|factor| *factor != 1.0)?;
-        Some(match factor.is_nan() {
-            true => "no sigma of the aiding covers its errors: give the filter states of them"
-                .to_owned(),
-            false => format!(
+        Some(if factor.is_nan() {
+            "no sigma of the aiding covers its errors: give the filter states of them".to_owned()
+        } else {
+            format!(
                 "every sigma of [aiding] × {}, and then of the model:",
                 readable(factor)
-            ),
+            )
         })
     }
 

@@ -65,9 +65,10 @@ impl Command for Wv {
             ..self.recordings.options()
         };
         let look = |recording: Recording| -> Result<Vec<SignalCurves>> {
-            let recording = match skips_warm_up {
-                true => without_warm_up(recording, true).0,
-                false => recording,
+            let recording = if skips_warm_up {
+                without_warm_up(recording, true).0
+            } else {
+                recording
             };
             let measured = replicates(&recording, scales, &tuning)?;
             let curves = |(channel, replicate): &(Channel, Replicate)| {

@@ -98,9 +98,10 @@ fn words(summary: &Summary) -> String {
             )
         }
         VerdictKind::Consistent | VerdictKind::NotMet => {
-            let rest = match verdict.is_expected() {
-                true => "by covariance analysis".to_owned(),
-                false => independent(verdict.independent_runs),
+            let rest = if verdict.is_expected() {
+                "by covariance analysis".to_owned()
+            } else {
+                independent(verdict.independent_runs)
             };
             format!("{kind}: {nees}, coverage {:.3}; {rest}", verdict.coverage)
         }
@@ -327,9 +328,10 @@ pub(crate) fn unexpected_line(unexpected: &Unexpected) -> String {
         ),
         Unexpected::Aiding { source, key } => (
             format!("the truth has {source}, of which the filter expects less"),
-            match key.ends_with("sigma_m_s") || *key == "aiding.heading.sigma_deg" {
-                true => format!("a larger {key} (nav-sim tune --scenario FILE finds how much)"),
-                false => format!("{key} gives it states"),
+            if key.ends_with("sigma_m_s") || *key == "aiding.heading.sigma_deg" {
+                format!("a larger {key} (nav-sim tune --scenario FILE finds how much)")
+            } else {
+                format!("{key} gives it states")
             },
         ),
         Unexpected::Integration {
@@ -352,9 +354,10 @@ pub(crate) fn reduction_line(quality: &ReductionQuality) -> String {
     let cost = quality
         .cost()
         .map_or(String::new(), |(horizontal, (state, most))| {
-            let largest = match most > horizontal {
-                true => format!(", {} {}", REPORTED_NAMES[state], more(most)),
-                false => String::new(),
+            let largest = if most > horizontal {
+                format!(", {} {}", REPORTED_NAMES[state], more(most))
+            } else {
+                String::new()
             };
             format!(
                 "; RMSE over --filter full at outages: horizontal {}{largest}",

@@ -379,9 +379,10 @@ impl Study {
     /// Reads a study; `set` are keys of `[run]` over its own, as `KEY=VALUE`.
     pub(crate) fn read(path: &Path, set: &[String]) -> Result<Self> {
         let text = source::text(path).map_err(|e| crate::io::Failure::io(path, e))?;
-        let mut study: Self = match path.extension().is_some_and(|ending| ending == "json") {
-            true => serde_json::from_str(&text).refuse_within(path.display())?,
-            false => toml::from_str(&text).refuse_within(path.display())?,
+        let mut study: Self = if path.extension().is_some_and(|ending| ending == "json") {
+            serde_json::from_str(&text).refuse_within(path.display())?
+        } else {
+            toml::from_str(&text).refuse_within(path.display())?
         };
         for assignment in set {
             let (key, value) = assignment.split_once('=').unwrap_or((assignment, ""));
@@ -551,11 +552,14 @@ impl Door {
 
     /// Label of a list's value: the stem of a file, else its text.
     fn label(&self, path: &str, value: &Value) -> Result<String> {
-        let stem = |text: String| match self.is_path(path) {
-            true => Path::new(&text)
-                .file_stem()
-                .map_or(text.clone(), |stem| stem.to_string_lossy().into_owned()),
-            false => text,
+        let stem = |text: String| {
+            if self.is_path(path) {
+                Path::new(&text)
+                    .file_stem()
+                    .map_or(text.clone(), |stem| stem.to_string_lossy().into_owned())
+            } else {
+                text
+            }
         };
         match value {
             Value::Array(list) => Ok(list

@@ -254,9 +254,10 @@ impl Answer for StudyAnswer {
             .collect();
         let (gravest, mut lines) = verdict_counts(&verdicts);
         lines.extend(self.incomplete().map(|failure| failure.to_string()));
-        let tone = match self.complete {
-            true => tone(gravest),
-            false => Tone::Undecided,
+        let tone = if self.complete {
+            tone(gravest)
+        } else {
+            Tone::Undecided
         };
         let mut document = Document::new("Study", tone, lines);
         let names: Vec<String> = self

@@ -141,14 +141,15 @@ impl ShownCalibration<'_> {
         {
             return Tone::Bad;
         }
-        match self
+        if self
             .outcomes
             .iter()
             .any(|o: &&Outcome| o.departure().misfit.is_some())
             || self.diagnoses.iter().any(is_abnormal)
         {
-            true => Tone::Doubtful,
-            false => Tone::Good,
+            Tone::Doubtful
+        } else {
+            Tone::Good
         }
     }
 
@@ -245,9 +246,12 @@ fn parameters(outcome: &Outcome) -> Table {
     let mut table = Table::new(["parameter (SI, of a sample)", "value", "95 % interval"]);
     for (of, value) in model.parameters() {
         // phi is told by its distance from 1
-        let digits = |x: f64| match of.parameter.is_shape() {
-            true => format!("{x:.6}"),
-            false => readable(x),
+        let digits = |x: f64| {
+            if of.parameter.is_shape() {
+                format!("{x:.6}")
+            } else {
+                readable(x)
+            }
         };
         let interval = interval_of(intervals(outcome), of).map(|i| match i.absent {
             None => [i.low, i.high].map(digits).join(" … "),
@@ -495,9 +499,10 @@ fn beginnings(found: &Beginnings) -> Option<(&'static str, String)> {
         None => format!("{name} never settles"),
     };
     let lines: Vec<String> = told.iter().zip(names).map(line).collect();
-    let head = match found.left_out {
-        true => "left out at the beginning",
-        false => "not stationary at the beginning",
+    let head = if found.left_out {
+        "left out at the beginning"
+    } else {
+        "not stationary at the beginning"
     };
     (!lines.is_empty()).then(|| (head, some(&lines)))
 }
@@ -553,9 +558,10 @@ pub(super) fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
     {
         let name = model.name_of(i.of);
         let factor = readable((i.high / i.low).sqrt());
-        notes.push(match i.low > 0.0 {
-            true => format!("{name} is known to a factor of {factor} only"),
-            false => format!("{name} may be zero"),
+        notes.push(if i.low > 0.0 {
+            format!("{name} is known to a factor of {factor} only")
+        } else {
+            format!("{name} may be zero")
         });
     }
     notes.extend(

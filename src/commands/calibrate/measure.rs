@@ -428,16 +428,13 @@ fn shortest(report: &Report, scales: Option<u32>, context: &Context<'_>) {
         found[found.len() / 2],
     );
     if scales < usual {
-        context.warn(match scales < used {
-            false => format!(
-                "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there \
-                 would be more (half of them have {usual}): leave it out for those"
-            ),
-            true => format!(
+        context.warn(if scales < used { format!(
                 "{recording}: its {samples} samples have {scales} scales; the longer ones, up to {used} scales, are \
                  averaged over the longer recordings alone"
-            ),
-        });
+            ) } else { format!(
+                "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there \
+                 would be more (half of them have {usual}): leave it out for those"
+            ) });
     }
 }
 

@@ -137,15 +137,16 @@ impl Command for Calibrate {
             return Ok(());
         };
         let (.., is_unsaid) = self.curves(path, &self.settings()?)?;
-        match is_unsaid {
-            false => Ok(()),
-            true => refused(
+        if is_unsaid {
+            refused(
                 format!(
                     "{}: the curve does not say of which sensor it is",
                     path.display()
                 ),
                 "--axes accel or --axes gyro",
-            ),
+            )
+        } else {
+            Ok(())
         }
     }
 

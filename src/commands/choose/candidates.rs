@@ -101,9 +101,10 @@ impl Candidate {
         let mut all: Vec<Self> = Vec::new();
         for &estimator in estimators {
             for model in models {
-                let model = match estimator == Estimator::Avlr && !is_of_slopes(model) {
-                    true => ModelChoice::Given(white_and_walk()),
-                    false => model.clone(),
+                let model = if estimator == Estimator::Avlr && !is_of_slopes(model) {
+                    ModelChoice::Given(white_and_walk())
+                } else {
+                    model.clone()
                 };
                 for &filter in filters {
                     for &inflation in inflations {
@@ -295,9 +296,10 @@ impl Laboratory {
                 .any(|(_, r)| is_abnormal(&r.name))
         };
         let normal: Vec<usize> = self.others(None).filter(is_normal).collect();
-        Ok(match normal.len() < FEWEST {
-            true => self.others(None).collect(),
-            false => normal,
+        Ok(if normal.len() < FEWEST {
+            self.others(None).collect()
+        } else {
+            normal
         })
     }
 

@@ -117,9 +117,12 @@ impl ChoiceMade {
             )
         });
         let is_common = 2 * ranking.undescribed.len() > folds.len();
-        warn(&ranking.undescribed, &|names| match is_common {
-            true => format!("no candidate describes {names}: a warm-up? try --skip-s auto"),
-            false => format!("no candidate describes {names}: look at it with nav-sim calibrate"),
+        warn(&ranking.undescribed, &|names| {
+            if is_common {
+                format!("no candidate describes {names}: a warm-up? try --skip-s auto")
+            } else {
+                format!("no candidate describes {names}: look at it with nav-sim calibrate")
+            }
         });
         warn(&ranking.decisive, &|names| {
             format!("without any one of {names} another candidate would win")

@@ -298,9 +298,10 @@ fn number(text: &str) -> Result<f64, &'static str> {
 
 fn arm(text: &str) -> Result<[f64; 3], String> {
     let arm: [f64; 3] = numbers(text).ok_or("expected 3 numbers between commas")?;
-    match arm.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
-        true => Ok(arm),
-        false => Err(format!("more than {MAX_LEVER_ARM_M} m")),
+    if arm.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
+        Ok(arm)
+    } else {
+        Err(format!("more than {MAX_LEVER_ARM_M} m"))
     }
 }
 

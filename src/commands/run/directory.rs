@@ -135,11 +135,10 @@ fn text(directory: &Path, name: &str) -> Result<(String, String)> {
     let text = source::text(&path).map_err(|e| {
         let is_missing = e.kind() == std::io::ErrorKind::NotFound;
         let failure = Failure::io(&path, e);
-        match is_missing {
-            true => {
-                failure.hint("not a finished run directory: make one with `nav-sim run … -o DIR`")
-            }
-            false => failure,
+        if is_missing {
+            failure.hint("not a finished run directory: make one with `nav-sim run … -o DIR`")
+        } else {
+            failure
         }
     })?;
     Ok((path.display().to_string(), text))

@@ -34,9 +34,10 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
         ..
     } = &answer.navigation;
     let windows = windows(summary);
-    let tone = match summary.require.iter().all(|met| met.met) {
-        true => tone(summary.verdict.kind),
-        false => Tone::Bad,
+    let tone = if summary.require.iter().all(|met| met.met) {
+        tone(summary.verdict.kind)
+    } else {
+        Tone::Bad
     };
     let required = summary.require.iter();
     // What was asked for comes before the filter.
@@ -406,9 +407,10 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], answer: &RunAnswer) -> S
             return "--filter full has a state for each process of the model".to_owned();
         }
         None if is_recorded || is_modelled || is_analysed && !is_far => {
-            let how = match is_recorded || is_modelled {
-                true => "",
-                false => " --scenario",
+            let how = if is_recorded || is_modelled {
+                ""
+            } else {
+                " --scenario"
             };
             return format!(
                 "the errors are not those of MODEL: nav-sim tune{how} finds variances that cover them"
@@ -422,9 +424,10 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], answer: &RunAnswer) -> S
         is_met_again && verdict.worst_outage.is_none_or(|outage| outage > first)
     };
     let is_linear = answer.origin.configuration.filter.update == FixUpdate::Ekf;
-    let iterated = match is_linear && verdict.beyond_linear.is_some_and(is_after) {
-        true => "; filter.update = \"iterated\" does",
-        false => "",
+    let iterated = if is_linear && verdict.beyond_linear.is_some_and(is_after) {
+        "; filter.update = \"iterated\" does"
+    } else {
+        ""
     };
     format!(
         "errors too large for a linear filter; another MODEL or nav-sim tune does not help{iterated}"

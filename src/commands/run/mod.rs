@@ -180,12 +180,13 @@ impl Run {
         let mut scenario = self.scenario()?;
         let (mut inputs, file, made_by) = self.read(&mut scenario, context)?;
         let is_drawn = scenario.run.method != Method::Lincov || scenario.outage_random.is_some();
-        let seed = match is_drawn {
-            true => context.seed_or(scenario.run.seed),
-            false => context
+        let seed = if is_drawn {
+            context.seed_or(scenario.run.seed)
+        } else {
+            context
                 .given_seed()
                 .or(scenario.run.seed)
-                .unwrap_or_default(),
+                .unwrap_or_default()
         };
         scenario.run.seed = is_drawn
             .then_some(seed)
