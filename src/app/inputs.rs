@@ -1,6 +1,6 @@
 //! Inputs that several commands share: files, settings, outages.
 
-use super::{Context, Failure, Refuse, Result, refused};
+use super::{Context, Failure, Inputs, Refuse, Result, refused};
 use crate::io::model_file::{self, ModelFile, TurnOn};
 use crate::io::recordings::{self, ReadOptions};
 use crate::io::toml_file::Source;
@@ -136,7 +136,7 @@ fn tell_turn_on(who: &str, set: &[(Sensor, f64)], path: &Path, context: &Context
 
 /// States of the filter.
 #[derive(clap::Args, Debug, Clone)]
-pub struct FilterArgs {
+pub(crate) struct FilterArgs {
     /// States of the filter: 15 (one bias per axis, to which the model is reduced), 21 (and a scale factor per axis)
     /// or full (a bias state for each process) [default: 15]
     #[arg(long = "filter", value_name = "STATES")]
@@ -168,7 +168,7 @@ impl FilterArgs {
 
 /// A value of `--outage`: a window, or that there is none.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum OutageFlag {
+pub(crate) enum OutageFlag {
     /// Not even the default ones.
     None,
     /// A window without fixes.
@@ -204,7 +204,7 @@ pub(crate) fn windows_of(outages: &[OutageFlag]) -> Result<Vec<Outage>> {
 
 /// Settings in a TOML file and by key.
 #[derive(clap::Args, Debug, Clone)]
-pub struct ScenarioArgs {
+pub(crate) struct ScenarioArgs {
     /// Settings in one TOML file; flags override it (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     pub scenario: Option<PathBuf>,
@@ -233,7 +233,7 @@ impl ScenarioArgs {
 
 /// The same, with outages in the place of those of the file.
 #[derive(clap::Args, Debug, Clone)]
-pub struct SettingsArgs {
+pub(crate) struct SettingsArgs {
     /// Window without fixes, in seconds (repeatable), or "none" (default: 300:390 and 700:790)
     #[arg(id = "outage", long = "outage", value_name = "START:END")]
     pub outages: Vec<OutageFlag>,
@@ -280,10 +280,7 @@ pub(crate) fn files<'a>(
 }
 
 /// Recordings, those of directories in name order, with their role.
-pub(crate) fn listed(
-    role: &'static str,
-    paths: &[PathBuf],
-) -> Result<Vec<(&'static str, PathBuf)>> {
+pub(crate) fn listed(role: &'static str, paths: &[PathBuf]) -> Result<Inputs> {
     let found = input::listed(paths)?;
     Ok(found.into_iter().map(|path| (role, path)).collect())
 }

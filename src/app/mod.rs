@@ -10,7 +10,7 @@ pub mod reading;
 pub use crate::failure::{Failure, Result};
 pub(crate) use crate::failure::{Refuse, refused};
 pub use crate::io::input::Input;
-pub use command::{Answer, Answered, Asked, Command, Out, OutputFile, answered};
+pub use command::{Answer, Answered, Asked, Command, Inputs, Out, OutputFile, answered};
 pub(crate) use command::{argument, is_path, is_repeated};
 pub use context::{Context, DEFAULT_SEED, Front};
 pub use manifest::Manifest;

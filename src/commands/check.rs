@@ -2,7 +2,7 @@
 
 use super::batch::Study;
 use super::inspect::inspect;
-use crate::app::{Answer, Command, Context, Failure, Result, inputs};
+use crate::app::{Answer, Command, Context, Failure, Inputs, Result, inputs};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::fusion_files::{ImuFile, read_gnss, read_imu, read_initial};
 use crate::io::{contamination_file, curve_file, datasheet, scenario_file};
@@ -60,7 +60,7 @@ impl Command for CheckFiles {
     const NAME: &'static str = "check";
     const PLOT: bool = false;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(Vec::new())
     }
 

@@ -1,7 +1,7 @@
 //! `nav-sim compare`: run directories → ratios between runs.
 
 use crate::app::{
-    Answer, Command, Context, Failure, Manifest, Out, OutputFile, Refuse, Result, refused,
+    Answer, Command, Context, Failure, Inputs, Manifest, Out, OutputFile, Refuse, Result, refused,
 };
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
@@ -39,16 +39,16 @@ Examples:
 pub struct Compare {
     /// Run directories
     #[arg(required = true, value_name = "DIR")]
-    pub runs: Vec<PathBuf>,
+    runs: Vec<PathBuf>,
     /// Run directory to compare with
     #[arg(long, value_name = "DIR")]
-    pub reference: PathBuf,
+    reference: PathBuf,
     /// States in the table (repeatable), or "all"
     #[arg(id = "state", long = "state", value_name = "STATE", default_values = ["pos_e_m", "roll_deg"])]
     pub states: Vec<String>,
     /// Print the table alone in this form
     #[arg(long, value_name = "FORM", value_enum)]
-    pub table: Option<TableForm>,
+    table: Option<TableForm>,
 }
 
 /// How a table is written.
@@ -82,7 +82,7 @@ impl Command for Compare {
         ]
     }
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(self
             .runs
             .iter()

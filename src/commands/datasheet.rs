@@ -1,7 +1,7 @@
 //! `nav-sim datasheet`: models from data sheets, and the catalogue of IMUs.
 
 use crate::app::inputs::files;
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Failure, Inputs, Out, OutputFile, Result};
 use crate::io::atomic::Written;
 use crate::io::datasheet::{CATALOGUE, Datasheet, Entry, Figure, Quantity, catalogued, read};
 use crate::io::model_file::{self, ModelFile};
@@ -27,19 +27,19 @@ Examples:
 pub struct DatasheetArgs {
     /// Catalogue entry (TOML)
     #[arg(value_name = "ENTRY", conflicts_with = "unit")]
-    pub entry: Option<PathBuf>,
+    entry: Option<PathBuf>,
     /// Catalogue entry by name (see --list)
     #[arg(long, value_name = "NAME")]
-    pub unit: Option<String>,
+    unit: Option<String>,
     /// Figures in the place of the entry's.
     #[command(flatten)]
-    pub figures: Figures,
+    figures: Figures,
     /// List the catalogue
     #[arg(long)]
-    pub list: bool,
+    list: bool,
     /// Sample rate of the model
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz, default_value = "100")]
-    pub rate_hz: f64,
+    rate_hz: f64,
 }
 
 /// A model of a data sheet, or the catalogue.
@@ -61,7 +61,7 @@ impl Command for DatasheetArgs {
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(files("entry", &self.entry).collect())
     }
 
@@ -143,25 +143,25 @@ impl Answer for DatasheetAnswer {
 pub struct Figures {
     /// Velocity random walk or noise density of the accelerometers: m/s/sqrt(h), ug/sqrt(Hz), …
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Noise))]
-    pub vrw: Option<Quantity>,
+    vrw: Option<Quantity>,
     /// Angle random walk or noise density of the gyroscopes: deg/sqrt(h), deg/s/sqrt(Hz), …
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Noise))]
-    pub arw: Option<Quantity>,
+    arw: Option<Quantity>,
     /// Bias instability of the accelerometers: ug, mg, m/s²
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Bias))]
-    pub accel_bias: Option<Quantity>,
+    accel_bias: Option<Quantity>,
     /// Bias instability of the gyroscopes: deg/h, deg/s, rad/s
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Bias))]
-    pub gyro_bias: Option<Quantity>,
+    gyro_bias: Option<Quantity>,
     /// Longest correlation time of both biases: s, min, h [default: 300 s, with a warning]
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::CorrelationTime))]
-    pub corr_time: Option<Quantity>,
+    corr_time: Option<Quantity>,
     /// Turn-on bias of the accelerometers, as a standard deviation: mg, m/s²
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::TurnOn))]
-    pub accel_turn_on: Option<Quantity>,
+    accel_turn_on: Option<Quantity>,
     /// Turn-on bias of the gyroscopes, as a standard deviation: deg/s, deg/h
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::TurnOn))]
-    pub gyro_turn_on: Option<Quantity>,
+    gyro_turn_on: Option<Quantity>,
 }
 
 /// Checks a figure of a sensor.

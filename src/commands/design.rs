@@ -1,7 +1,7 @@
 //! `nav-sim design`: the interval that recordings not made yet would give.
 
 use crate::app::inputs::{self, OutageFlag, files};
-use crate::app::{Answer, Command, Context, Failure, Result};
+use crate::app::{Answer, Command, Context, Failure, Inputs, Result};
 use crate::commands::calibrate::ESTIMATORS;
 use crate::commands::run::{NavigateInputs, TrueImu, navigate};
 use crate::io::draws_file::DrawsFile;
@@ -36,19 +36,19 @@ Examples:
       --trajectory trajectories/figure_eight.toml --outage 300:360")]
 pub struct Design {
     /// Noise model of the IMU, as far as it is known
-    pub model: PathBuf,
+    model: PathBuf,
     /// Number of recordings [default: a table of 3, 6 and 12]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..=1000))]
     pub recordings: Option<u32>,
     /// Length of each in hours [default: a table of 1, 3 and 10]
     #[arg(long, value_name = "HOURS", value_parser = parse::positive)]
-    pub hours: Option<f64>,
+    hours: Option<f64>,
     /// How they will be calibrated
     #[arg(long, value_name = "ESTIMATOR", value_parser = parse::one_of::<Estimator>(AVERAGES), default_value_t)]
-    pub estimator: Estimator,
+    estimator: Estimator,
     /// Draws of the bootstrap
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(40..=10_000))]
-    pub draws: u32,
+    draws: u32,
     /// Trajectory: motion profile (.toml) or table (.csv)
     #[arg(long, value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
@@ -59,7 +59,7 @@ pub struct Design {
         value_name = "START:END",
         requires = "trajectory"
     )]
-    pub outages: Vec<OutageFlag>,
+    outages: Vec<OutageFlag>,
 }
 
 /// The estimators of several recordings.
@@ -72,7 +72,7 @@ impl Command for Design {
     type Answer = Designs;
     const NAME: &'static str = "design";
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(files("model", [&self.model])
             .chain(files("trajectory", &self.trajectory))
             .collect())

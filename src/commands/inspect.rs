@@ -2,7 +2,7 @@
 
 use crate::app::inputs::files;
 use crate::app::reading::LogRequest;
-use crate::app::{Answer, Command, Context, Result};
+use crate::app::{Answer, Command, Context, Inputs, Result};
 use crate::io::logs;
 use nav_sim_document::{Document, Importance, Table, Tone, six_digits};
 use nav_sim_logs::{Channel, Content, Error, Log, Stamp};
@@ -25,10 +25,10 @@ Examples:
 pub struct Inspect {
     /// Log
     #[arg(value_name = "FILE")]
-    pub file: PathBuf,
+    file: PathBuf,
     /// How it is read.
     #[command(flatten)]
-    pub log: LogRequest,
+    log: LogRequest,
 }
 
 impl Command for Inspect {
@@ -36,7 +36,7 @@ impl Command for Inspect {
     const NAME: &'static str = "inspect";
     const PLOT: bool = false;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(files("log", [&self.file]).collect())
     }
 

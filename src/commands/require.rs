@@ -1,7 +1,9 @@
 //! The IMU that a limit needs, what a given one makes of it, and a ranking of several.
 
 use crate::app::inputs::{self, ScenarioArgs, files};
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Refuse, Result, refused};
+use crate::app::{
+    Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, refused,
+};
 use crate::io::atomic::Written;
 use crate::io::datasheet::{self, CATALOGUE, Datasheet};
 use crate::io::file_kind::{self, FileKind};
@@ -49,29 +51,29 @@ pub struct Require {
     /// Trajectory: motion profile (.toml) or table (.csv)
     pub trajectory: PathBuf,
     /// Noise model of an IMU
-    pub model: Option<PathBuf>,
+    model: Option<PathBuf>,
     /// Outage: a length in seconds (tried from every second on), START:END, or "longest" (needs MODEL)
     #[arg(long, value_name = "SECONDS")]
-    pub outage: Ask,
+    outage: Ask,
     /// Earliest start of the outage in seconds [default: 300, less if the trajectory is short]
     #[arg(long, value_name = "SECONDS", value_parser = parse::non_negative)]
-    pub start: Option<f64>,
+    start: Option<f64>,
     /// Limit at the end of the outage, as NAME<=LIMIT (repeatable): p50_m, p95_m, rmse_m (horizontal), roll_deg, pitch_deg,
     /// yaw_deg
     #[arg(id = "require", long = "require", value_name = "NAME<=LIMIT")]
-    pub limits: Vec<Limit>,
+    limits: Vec<Limit>,
     /// Scenario file whose section gnss is used
     #[arg(long, value_name = "FILE")]
-    pub gnss: Option<PathBuf>,
+    gnss: Option<PathBuf>,
     /// Receiver, start, IMU rate, aiding.
     #[command(flatten)]
-    pub settings: ScenarioArgs,
+    settings: ScenarioArgs,
     /// What the vehicle knows of its own motion: a car moves neither sideways nor up; with MODEL, a table with and without
     #[arg(long, value_name = "KIND", value_parser = ["car"])]
-    pub vehicle: Option<String>,
+    vehicle: Option<String>,
     /// Rank the catalogued IMUs (`nav-sim datasheet --list`), or those of a directory of entries and model files
     #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = BUILT_IN, conflicts_with = "model")]
-    pub catalogue: Option<PathBuf>,
+    catalogue: Option<PathBuf>,
 }
 
 /// Stands for the units that are known by name.
@@ -125,7 +127,7 @@ impl Command for Require {
         )
     }
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         if let (Ask::Window(outage), Some(start_s)) = (self.outage, self.start) {
             let Outage {
                 start_s: from,

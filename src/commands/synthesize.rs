@@ -1,7 +1,7 @@
 //! `nav-sim synthesize`: replicate recordings of a noise model.
 
 use crate::app::reading::ChannelSet;
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result, refused};
+use crate::app::{Answer, Command, Context, Failure, Inputs, Out, OutputFile, Result, refused};
 use crate::io::model_file::{self, ModelFile};
 use crate::io::{contamination_file, recordings};
 use crate::parse;
@@ -31,22 +31,22 @@ Examples:
 pub struct Synthesize {
     /// Noise model (TOML)
     #[arg(value_name = "MODEL")]
-    pub model: PathBuf,
+    model: PathBuf,
     /// Recordings to make
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
-    pub replicates: u64,
+    replicates: u64,
     /// Samples of each [default: 524284, as in the paper]
     #[arg(long, value_name = "T", conflicts_with = "duration", value_parser = clap::value_parser!(u64).range(2..))]
-    pub samples: Option<u64>,
+    samples: Option<u64>,
     /// Length of each in seconds, instead of --samples
     #[arg(long, value_name = "S", value_parser = parse::positive)]
-    pub duration: Option<f64>,
+    duration: Option<f64>,
     /// Draw each replicate's parameters from the spread that the model states
     #[arg(long)]
-    pub spread: bool,
+    spread: bool,
     /// Corrupt the replicates: a scenario of the paper (section4-II, section4-III, section5-II, section5-III) or a file
     #[arg(long, value_name = "NAME|FILE")]
-    pub contaminate: Option<String>,
+    contaminate: Option<String>,
     /// Signals to make: all, accel, gyro, x, accel.x, … (comma-separated)
     #[arg(
         long,
@@ -54,7 +54,7 @@ pub struct Synthesize {
         value_delimiter = ',',
         default_value = "all"
     )]
-    pub axes: Vec<ChannelSet>,
+    axes: Vec<ChannelSet>,
 }
 
 /// Recordings whose models are drawn; their noise is drawn as they are written.
@@ -101,7 +101,7 @@ impl Command for Synthesize {
     const PLOT: bool = false;
     const PAGE: bool = false;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(self
             .contaminate
             .iter()

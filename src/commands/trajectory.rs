@@ -1,6 +1,8 @@
 //! `nav-sim trajectory`: reference trajectories.
 
-use crate::app::{Answer, Asked, Command, Context, Failure, Out, OutputFile, Result, inputs};
+use crate::app::{
+    Answer, Asked, Command, Context, Failure, Inputs, Out, OutputFile, Result, inputs,
+};
 use crate::io::atomic::Written;
 use crate::io::scenario_file;
 use crate::io::trajectory_file::{self, Options, Rows, parse_origin};
@@ -135,7 +137,7 @@ impl Command for Convert {
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(vec![self.source.input()])
     }
 
@@ -185,7 +187,7 @@ impl Command for CheckTrajectory {
     const NAME: &'static str = "trajectory check";
     const PLOT: bool = false;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(vec![self.source.input()])
     }
 
@@ -395,7 +397,7 @@ impl Command for Record {
     const PLOT: bool = false;
     const PAGE: bool = false;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok([self.source.input(), ("model", self.model.clone())]
             .into_iter()
             .chain(inputs::files("scenario", &self.scenario))

@@ -1,7 +1,9 @@
 //! `nav-sim tune`: the smallest factors on the variances of a noise model that make its filter consistent with other truths.
 
 use crate::app::inputs::{self, SettingsArgs, files};
-use crate::app::{Answer, Command, Context, Failure, Input, Out, OutputFile, Result, refused};
+use crate::app::{
+    Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Result, refused,
+};
 use crate::io::atomic::Written;
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::{self, ModelFile, PROGRAM, known};
@@ -40,26 +42,26 @@ Examples:
       --truth calib_data/consumer_mems.toml")]
 pub struct Tune {
     /// Noise model to be tuned
-    pub model: PathBuf,
+    model: PathBuf,
     /// Noise models that may make the errors, such as those of single recordings [default: MODEL, with the errors in SCENARIO]
     #[arg(id = "truth", long = "truth", value_name = "MODEL2", num_args = 1..)]
-    pub truths: Vec<PathBuf>,
+    truths: Vec<PathBuf>,
     /// Truths are MODEL itself and the draws of its calibration (MODEL.draws.json, which `calibrate` writes), each with the
     /// parameters of a recording of its own where MODEL states a spread: errors count up to the upper end of their 95 % interval
     #[arg(long, conflicts_with = "truth")]
-    pub intervals: bool,
+    intervals: bool,
     /// Trajectory: motion profile (.toml) or table (.csv) [default: a built-in drive with outages of that length]
     #[arg(long, value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
     /// Outages, receiver, start, IMU rate.
     #[command(flatten)]
-    pub settings: SettingsArgs,
+    settings: SettingsArgs,
     /// Meaning of consistent: worst, no error of any truth exceeds what the filter states; mean, the NEES is right on average
     #[arg(id = "for", long = "for", value_name = "AIM", value_parser = parse::one_of::<Aim>(&Aim::NAMES), default_value_t)]
-    pub aim: Aim,
+    aim: Aim,
     /// Filter to tune: full, 15 or 21 (these take longer); the filter that `run` makes by default is assessed too
     #[arg(long, value_name = "STATES", default_value = "full")]
-    pub filter: FilterStates,
+    filter: FilterStates,
 }
 
 /// Help where fixes are too rare to reduce a model.
@@ -78,7 +80,7 @@ impl Command for Tune {
         help: "Model file to write",
     };
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         self.refuse_recordings()?;
         let draws = draws_file::beside(&self.model);
         let draws = (self.intervals && draws.exists()).then_some(draws);

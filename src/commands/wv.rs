@@ -2,7 +2,7 @@
 
 use crate::app::inputs::listed;
 use crate::app::reading::{RecordingRequest, VarianceRequest};
-use crate::app::{Answer, Command, Context, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Inputs, Out, OutputFile, Result};
 use crate::commands::calibrate::{visit, without_warm_up};
 use crate::io::atomic::Written;
 use crate::io::recordings::ReadOptions;
@@ -30,17 +30,17 @@ Examples:
 pub struct Wv {
     /// Recordings, or directories of recordings
     #[arg(required = true, value_name = "FILE")]
-    pub files: Vec<PathBuf>,
+    files: Vec<PathBuf>,
     /// How they are read.
     #[command(flatten)]
     pub recordings: RecordingRequest,
     /// Scales and robustness.
     #[command(flatten)]
-    pub tuning: VarianceRequest,
+    tuning: VarianceRequest,
     /// Where the degrees of freedom of the intervals come from: eta3, the field's usual ones, conservative beyond the
     /// first scale; large-sample, the autocovariance of the coefficients: with the stated coverage
     #[arg(long, value_parser = parse::one_of::<Intervals>(&Intervals::NAMES), default_value_t, help_heading = "Wavelet variance")]
-    pub intervals: Intervals,
+    intervals: Intervals,
 }
 
 impl Command for Wv {
@@ -52,7 +52,7 @@ impl Command for Wv {
         help: "Write the curves as JSON",
     };
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         listed("recording", &self.files)
     }
 

@@ -32,7 +32,7 @@ pub(crate) use model_file::CalibrationNote;
 
 use crate::app::inputs::{files, listed};
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
-use crate::app::{Answer, Command, Context, Out, OutputFile, Result, refused};
+use crate::app::{Answer, Command, Context, Inputs, Out, OutputFile, Result, refused};
 use crate::io::atomic::Written;
 use crate::io::draws_file::DrawsFile;
 use crate::io::hash;
@@ -71,39 +71,39 @@ pub struct Calibrate {
         required_unless_present = "curve",
         conflicts_with = "curve"
     )]
-    pub inputs: Vec<PathBuf>,
+    inputs: Vec<PathBuf>,
     /// Fit a curve instead of recordings: CSV tau_samples,wv,edof, or a .wv.json of calibrate or wv
     #[arg(long, value_name = "FILE", conflicts_with_all = OF_RECORDINGS)]
-    pub curve: Option<PathBuf>,
+    curve: Option<PathBuf>,
     /// Which curve is fitted: an average over the replicates (awv; sr-awv, robust to outliers; dr-awv, robust to
     /// abnormal replicates too), or the curve of a single recording (gmwm, classical; rgmwm, robust; avlr: slopes of its
     /// Allan deviation, read off one by one: WN, QN, RW, DR); all: the three averages (of one recording: gmwm and rgmwm)
     #[arg(long, value_parser = parse::one_of::<EstimatorChoice>(&ESTIMATORS), default_value = "dr-awv")]
-    pub estimator: EstimatorChoice,
+    estimator: EstimatorChoice,
     /// Sum of WN QN AR1 GM MA1 FN RW DR such as 2*AR1+RW+WN+QN, N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN, or auto: the
     /// simplest sum of WN QN RW DR and up to two AR1 that fits as well as the best one, with the reasons
     #[arg(long, value_name = "SUM", default_value = ModelSpec::USUAL)]
-    pub model: String,
+    model: String,
     /// Replicates that dr-awv drops at each end of each scale: a number, or a percentage of all
     #[arg(long, value_name = "A", default_value_t)]
-    pub trim: Trim,
+    trim: Trim,
     /// Weight of a scale in the fit: model, the inverse variance by the fitted model, where a scale far above it weighs
     /// less; edof, the same with the observed wv: the convention of the literature, low where wv is low by chance
     #[arg(long, value_parser = parse::one_of::<Weighting>(&Weighting::NAMES), default_value_t)]
-    pub weighting: Weighting,
+    weighting: Weighting,
     /// Which signals are replicates of one another: axes, those of one axis (a model per axis), or sensor, those of all
     /// axes of a sensor (default: sensor; axes for gmwm, rgmwm and avlr)
     #[arg(long, value_parser = parse::one_of::<Pool>(&Pool::NAMES))]
-    pub pool: Option<Pool>,
+    pool: Option<Pool>,
     /// Draws behind intervals and goodness of fit (0: neither), fewer for tests
     #[arg(long, value_name = "B", hide = true, default_value_t = Bootstrap::DRAWS as u32, value_parser = clap::value_parser!(u32).range(0..=100_000))]
-    pub bootstrap: u32,
+    bootstrap: u32,
     /// How they are read.
     #[command(flatten)]
     pub recordings: RecordingRequest,
     /// Scales and robustness.
     #[command(flatten)]
-    pub tuning: VarianceRequest,
+    tuning: VarianceRequest,
 }
 
 /// Flags about recordings and their averages, which a curve has behind it.
@@ -150,7 +150,7 @@ impl Command for Calibrate {
         }
     }
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(files("curve", &self.curve)
             .chain(listed("recording", &self.inputs)?)
             .collect())

@@ -13,7 +13,7 @@ pub mod ranking;
 
 use crate::app::inputs::{self, SettingsArgs, files, listed};
 use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
-use crate::app::{Answer, Command, Context, Out, OutputFile, Result, refused};
+use crate::app::{Answer, Command, Context, Inputs, Out, OutputFile, Result, refused};
 use crate::commands::calibrate::{
     Calibration, CalibrationNote, CalibrationOptions, ESTIMATORS, EstimatorChoice, Measured,
     measure, without_warm_up,
@@ -53,35 +53,35 @@ Examples:
 pub struct Choose {
     /// Static recordings, three or more files, or directories of them
     #[arg(required = true, value_name = "RECORDINGS")]
-    pub inputs: Vec<PathBuf>,
+    inputs: Vec<PathBuf>,
     /// Trajectory: motion profile (.toml) or table (.csv)
     #[arg(long, value_name = "FILE")]
     pub trajectory: PathBuf,
     /// Outages, receiver, start, what filters expect.
     #[command(flatten)]
-    pub settings: SettingsArgs,
+    settings: SettingsArgs,
     /// Estimators to compare [default: awv, sr-awv, dr-awv and, for comparison, gmwm and avlr of single recordings]
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = parse::one_of::<Estimator>(EACH))]
-    pub estimator: Vec<Estimator>,
+    estimator: Vec<Estimator>,
     /// Models to compare, such as N2,N1,WN+RW,auto [default: N2, and WN+RW with awv]
     #[arg(long, value_name = "MODELS", value_delimiter = ',')]
-    pub model: Vec<String>,
+    model: Vec<String>,
     /// Filters to compare: 15, 21, full [default: 15, and full with awv]
     #[arg(long, value_name = "STATES", value_delimiter = ',')]
-    pub filter: Vec<FilterStates>,
+    filter: Vec<FilterStates>,
     /// How models are inflated: none, tuned (consistent in the mean for the models of the single recordings), x10 (ten
     /// times the standard deviations) [default: none, and all three with awv]
     #[arg(long, value_name = "HOW", value_delimiter = ',')]
-    pub inflate: Vec<Inflation>,
+    inflate: Vec<Inflation>,
     /// Runs on each recording (default: two for each window that fits side by side, 16 to 64)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
-    pub runs: Option<u64>,
+    runs: Option<u64>,
     /// What DR-AWV drops at each end of each scale: a number, or a share such as 30%
     #[arg(long, value_name = "A", default_value_t)]
-    pub trim: Trim,
+    trim: Trim,
     /// What to do where the time jumps or stands still: refuse the file, split it there, or ignore it
     #[arg(long, value_parser = parse::one_of::<Gaps>(WHOLE), default_value_t)]
-    pub gaps: Gaps,
+    gaps: Gaps,
     /// How recordings are read.
     #[command(flatten)]
     pub recordings: ReadingRequest,
@@ -146,7 +146,7 @@ impl Command for Choose {
         ],
     };
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         self.candidates()?;
         Ok(files("trajectory", [&self.trajectory])
             .chain(listed("recording", &self.inputs)?)

@@ -10,7 +10,9 @@ pub use targets::Target;
 pub(crate) use words::Quantity;
 
 use crate::app::inputs::files;
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Refuse, Result, refused};
+use crate::app::{
+    Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, refused,
+};
 use crate::io::atomic::Written;
 use crate::io::model_file;
 use crate::io::model_file::ModelFile;
@@ -41,17 +43,17 @@ Examples:
 pub struct ExportArgs {
     /// Noise model (TOML)
     #[arg(value_name = "MODEL")]
-    pub model: PathBuf,
+    model: PathBuf,
     /// Program to export to
     #[arg(long, value_name = "PROGRAM", value_parser = one_of::<Target>(&Target::NAMES))]
-    pub target: Target,
+    target: Target,
     /// strict: WN and RW as they are; matched: the model's Allan deviation at 1 s and the closest bias; envelope: the
     /// smallest pair that is nowhere below the model
     #[arg(long, value_name = "POLICY", value_parser = one_of::<Policy>(&Policy::NAMES), default_value = Policy::Matched.name())]
-    pub policy: Policy,
+    policy: Policy,
     /// Averaging times over which the pair stands for the model
     #[arg(long, value_name = "FROM:TO", value_parser = horizon, default_value = "1s:100s")]
-    pub horizon: Horizon,
+    horizon: Horizon,
 }
 
 fn horizon(text: &str) -> Result<Horizon, String> {
@@ -88,7 +90,7 @@ impl Command for ExportArgs {
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(files("model", [&self.model]).collect())
     }
 

@@ -4,7 +4,8 @@ mod document;
 
 use crate::app::inputs::files;
 use crate::app::{
-    Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result, inputs, refused,
+    Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Refuse, Result, inputs,
+    refused,
 };
 use crate::commands::run::reduction_of;
 use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
@@ -56,7 +57,7 @@ impl Command for Fuse {
     };
     const PLOT: bool = false;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(files("imu", [&self.imu])
             .chain(files("gnss", [&self.gnss]))
             .chain(files("model", [&self.model]))
@@ -118,13 +119,13 @@ Examples:
 pub struct Fuse {
     /// IMU recording (.csv, .tsv, .txt, .npy, also .gz)
     #[arg(value_name = "IMU")]
-    pub imu: PathBuf,
+    imu: PathBuf,
     /// GNSS fixes (.csv, .txt, .pos, .nmea, also .gz)
     #[arg(value_name = "GNSS")]
-    pub gnss: PathBuf,
+    gnss: PathBuf,
     /// Noise model that the filter believes
     #[arg(value_name = "MODEL")]
-    pub model: PathBuf,
+    model: PathBuf,
     /// Initial state: a file (TOML); the heading and its standard deviation (degrees), where the course does not show it;
     /// auto: level from the IMU, heading from the GNSS course
     #[arg(
@@ -134,11 +135,11 @@ pub struct Fuse {
         default_value = "auto",
         allow_hyphen_values = true
     )]
-    pub initial: StartChoice,
+    initial: StartChoice,
     /// GNSS antenna from the IMU: front, right, down (m)
     #[arg(long = "lever-arm", value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
         hide_default_value = true, allow_hyphen_values = true)]
-    pub lever_arm_m: [f64; 3],
+    lever_arm_m: [f64; 3],
     /// Attitude of the IMU in the vehicle (degrees) if its axes are not front, right, down; after a colon the standard
     /// deviations about the vehicle's front, right, down (1 where not given); flu or rfu: axes of that name; auto:
     /// estimated from the drive of a road vehicle
@@ -147,53 +148,53 @@ pub struct Fuse {
         value_name = "ROLL,PITCH,YAW[:SD,SD,SD]|flu|rfu|auto",
         allow_hyphen_values = true
     )]
-    pub mounting: Option<MountingChoice>,
+    mounting: Option<MountingChoice>,
     /// Reference trajectory to compare with; stretches where it jumps are left out
     #[arg(long, value_name = "TRAJECTORY")]
-    pub reference: Option<PathBuf>,
+    reference: Option<PathBuf>,
     /// Window in which fixes are withheld, on the clock of the data in seconds (repeatable)
     #[arg(long = "outage", value_name = "START:END")]
-    pub outages: Vec<Outage>,
+    outages: Vec<Outage>,
     /// States of the filter: 15 (one bias an axis, to which the model is reduced), 21 (and a scale factor an axis) or
     /// full (a bias state for each process)
     #[arg(long, value_name = "STATES", default_value = "15")]
-    pub filter: FilterStates,
+    filter: FilterStates,
     /// Constant biases that the filter expects beside the model: standard deviations, accelerometer in m/s²,
     /// gyroscope in rad/s
     #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair)]
-    pub turn_on_bias: Option<[f64; 2]>,
+    turn_on_bias: Option<[f64; 2]>,
     /// Standard deviations where the GNSS file states none: of the position in m, and after a colon of the velocity in
     /// m/s; each one number or north,east,down. x3 or x3:2: times what it states
     #[arg(long, value_name = "POS[:VEL]|xPOS[:VEL]", value_parser = gnss_sigma)]
-    pub gnss_sigma: Option<GnssSigma>,
+    gnss_sigma: Option<GnssSigma>,
     /// Time by which receiver or logger stamp the fixes late (s)
     #[arg(long = "gnss-delay", value_name = "S", value_parser = number, default_value = "0", allow_hyphen_values = true)]
-    pub gnss_delay_s: f64,
+    gnss_delay_s: f64,
     /// How long errors of positions last: as the innovations show, no longer than a fix, or so many seconds
     #[arg(long, value_name = "auto|none|SECONDS", value_parser = correlation, default_value = "auto")]
-    pub gnss_correlation: Correlation,
+    gnss_correlation: Correlation,
     /// Road vehicle: its rear axle moves neither sideways nor up; needs the mounting of the IMU
     #[arg(long)]
-    pub nhc: bool,
+    nhc: bool,
     /// The velocity is zero where IMU and fixes show that the vehicle stands
     #[arg(long)]
-    pub zupt: bool,
+    zupt: bool,
     /// Speed of a wheel: a table of t_s and wheel_m_s (or _km_h), negative in reverse; its scale is estimated
     #[arg(long, value_name = "FILE")]
-    pub odometer: Option<PathBuf>,
+    odometer: Option<PathBuf>,
     /// Middle of the rear axle from the IMU: front, right, down (m)
     #[arg(long = "rear-axle", value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
         hide_default_value = true, allow_hyphen_values = true)]
-    pub rear_axle_m: [f64; 3],
+    rear_axle_m: [f64; 3],
     /// Names of the IMU's columns, for a file without a header or instead of it
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
-    pub columns: Option<Vec<String>>,
+    columns: Option<Vec<String>>,
     /// Topic of the IMU in a log that has several; after a comma that of the fixes
     #[arg(long, value_name = "IMU[,FIXES]", value_delimiter = ',')]
-    pub topic: Vec<String>,
+    topic: Vec<String>,
     /// Also smooth the solution: every row is then estimated from all fixes, later ones included
     #[arg(long)]
-    pub smooth: bool,
+    smooth: bool,
 }
 
 impl Fuse {

@@ -2,7 +2,7 @@
 
 use crate::app::inputs::{self, FilterArgs, SettingsArgs, files};
 use crate::app::{
-    Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result, refused,
+    Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Refuse, Result, refused,
 };
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::ModelFile;
@@ -54,39 +54,39 @@ pub struct Run {
     /// Trajectory: motion profile (.toml) or table (.csv)
     pub trajectory: PathBuf,
     /// Noise model that the filter believes
-    pub model: PathBuf,
+    model: PathBuf,
     /// Noise model that makes the INS errors (default: MODEL itself)
     #[arg(long, value_name = "MODEL2", conflicts_with = "static")]
     pub truth: Option<PathBuf>,
     /// Draw the parameters that make the errors of each run from the spread that their model states
     #[arg(long, conflicts_with = "static")]
-    pub spread: bool,
+    spread: bool,
     /// Static recording whose windows make the INS errors (repeatable)
     #[arg(id = "static", long = "static", value_name = "FILE")]
     pub recordings: Vec<PathBuf>,
     /// Sample rate of static recordings without a time column
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz, requires = "static")]
-    pub rate_hz: Option<f64>,
+    rate_hz: Option<f64>,
     /// Outages and other settings of the run.
     #[command(flatten)]
-    pub settings: SettingsArgs,
+    settings: SettingsArgs,
     /// Scenario file whose section gnss is used
     #[arg(long, value_name = "FILE")]
-    pub gnss: Option<PathBuf>,
+    gnss: Option<PathBuf>,
     /// Monte-Carlo runs (default: 100)
     #[arg(long, value_name = "N")]
-    pub runs: Option<u64>,
+    runs: Option<u64>,
     /// States of the filter, and what it expects beside the model.
     #[command(flatten)]
-    pub filter: FilterArgs,
+    filter: FilterArgs,
     /// How statistics are computed: monte-carlo (sampled runs), lincov (linear covariance analysis, no sampling) or
     /// both (runs, compared with their expected values)
     #[arg(long, value_name = "METHOD", value_parser = parse::one_of::<Method>(&Method::NAMES))]
-    pub method: Option<Method>,
+    method: Option<Method>,
     /// Limit on an error at the end of every outage, as NAME<=LIMIT (repeatable): p50_m, p95_m (horizontal),
     /// rmse_pos_e_m, yaw_deg and the other states; or "consistent"; exit code 3 if it is not met
     #[arg(long, value_name = "NAME<=LIMIT")]
-    pub require: Vec<Requirement>,
+    require: Vec<Requirement>,
 }
 
 /// Results of a run. As JSON it is `summary.json`.
@@ -150,7 +150,7 @@ impl Command for Run {
     };
     const JUDGES: &'static [&'static str] = &["require"];
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(files("trajectory", [&self.trajectory])
             .chain(files("model", [&self.model]))
             .chain(files("truth", &self.truth))
