@@ -345,12 +345,6 @@ const LONGEST_S: f64 = 600.0;
 const CONFIRM: &str = "confirm with nav-sim run --method both";
 /// Last line of each page.
 const CHECKED: &str = "covariance analysis against sampled runs: docs/validation.md.";
-/// The error after an outage; none where the trajectory is too short.
-#[derive(Debug, Clone, Serialize)]
-struct DriftPoint {
-    outage_s: u32,
-    value: Option<f64>,
-}
 
 /// Warns of an outage in which errors are beyond linear theory.
 fn note_beyond(beyond: Option<Outage>, document: &mut Document) {
@@ -718,9 +712,12 @@ impl Requirements {
     /// When the model has no filter.
     fn judged(&self, scenario: &Scenario, model: &Model) -> Result<Judgement, RequireError> {
         let (curves, outage, worst) = self.bridged(scenario, model)?;
-        let of_limit = |limit: &Limit| LimitCurve {
-            quantity: limit.quantity,
-            points: drift_curve(&curves, limit.quantity),
+        let of_limit = |Limit { quantity, .. }: &Limit| {
+            let point = |outage_s: u32| {
+                let largest = Drift::largest(&after(&curves, f64::from(outage_s)), *quantity);
+                json!({ "outage_s": outage_s, "value": largest.map(|(_, x)| x) })
+            };
+            json!({ "quantity": quantity, "points": CURVE_S.map(point) })
         };
         let (margins, shown) = if self.ask == Ask::Longest {
             let shown = worst.map(|worst| {
@@ -966,15 +963,6 @@ fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
     curves.iter().filter_map(drift_of_curve).collect()
 }
 
-/// The largest value of a quantity after each of [`CURVE_S`] without fixes.
-fn drift_curve(curves: &[Vec<Drift>], quantity: Quantity) -> Vec<DriftPoint> {
-    let point = |outage_s: u32| DriftPoint {
-        outage_s,
-        value: Drift::largest(&after(curves, f64::from(outage_s)), quantity).map(|(_, x)| x),
-    };
-    CURVE_S.map(point).to_vec()
-}
-
 // A given IMU against its limits.
 
 /// The longest outage that keeps the limits.
@@ -1016,18 +1004,12 @@ type Bridged = (Vec<Vec<Drift>>, Longest, Option<Worst>);
 struct Judgement {
     outage: Longest,
     /// The quantity of each limit, at its worst place, after outages of growing length.
-    curves: Vec<LimitCurve>,
+    curves: Vec<Value>,
     /// The outage of the answer, where it is beyond linear theory.
     beyond_linear: Option<Outage>,
     /// After the outage that was asked for; none where the longest is sought.
     #[serde(flatten)]
     margins: Option<Margins>,
-}
-
-#[derive(Debug, Serialize)]
-struct LimitCurve {
-    quantity: Quantity,
-    points: Vec<DriftPoint>,
 }
 
 /// Limits where the vehicle measures something of its own motion.

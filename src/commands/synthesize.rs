@@ -8,7 +8,7 @@ use crate::parse;
 use nav_sim_document::{Document, Tone};
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::contamination::{Contamination, Rule};
-use nav_sim_signal::noise::{Model, Process, ReplicateError, VirtualImu};
+use nav_sim_signal::noise::{Model, ReplicateError, VirtualImu};
 use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -81,14 +81,7 @@ struct Drawn {
     spread: bool,
     axes: Vec<String>,
     contamination: Option<String>,
-    replicates: Vec<Replicate>,
-}
-
-#[derive(Debug, Serialize)]
-struct Replicate {
-    file: String,
-    contaminated: bool,
-    axes: BTreeMap<String, Vec<Process>>,
+    replicates: Vec<Value>,
 }
 
 impl Command for Synthesize {
@@ -176,11 +169,11 @@ impl Command for Synthesize {
                 .channels
                 .iter()
                 .map(|c| (c.to_string(), model.axis(*c).processes.clone()));
-            let replicate = Replicate {
-                file: name(k),
-                contaminated: synthesis.is_contaminated(k),
-                axes: axes.collect(),
-            };
+            let replicate = json!({
+                "file": name(k),
+                "contaminated": synthesis.is_contaminated(k),
+                "axes": axes.collect::<BTreeMap<_, _>>(),
+            });
             synthesis.drawn.replicates.push(replicate);
             synthesis.models.push(model);
         }

@@ -20,6 +20,7 @@ use nav_sim_navigation::trajectory::plausibility::{Limits, examine};
 use nav_sim_signal::noise::continuous;
 use nav_sim_signal::units::DEG;
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// Make, check and convert reference trajectories
@@ -214,11 +215,13 @@ impl Command for CheckTrajectory {
         }
         let closure = Closure::new(&trajectory, self.rate_hz, GravityModel::default())
             .map_err(|e| Failure::input(format!("{name}: {e}")).hint("give another --rate-hz"))?;
-        let motion = |[speed_m_s, acceleration_m_s2, jerk_m_s3, rate]: [f64; 4]| Motion {
-            speed_m_s,
-            acceleration_m_s2,
-            jerk_m_s3,
-            rate_deg_s: rate / DEG,
+        let motion = |[speed, acceleration, jerk, rate]: [f64; 4]| {
+            json!({
+                "speed_m_s": speed,
+                "acceleration_m_s2": acceleration,
+                "jerk_m_s3": jerk,
+                "rate_deg_s": rate / DEG,
+            })
         };
         let Limits {
             speed,
@@ -256,20 +259,12 @@ pub struct TrajectoryCheck {
     points: usize,
     /// Length of the path: chords between the points.
     path_m: f64,
-    largest: Motion,
-    limits: Motion,
+    largest: Value,
+    limits: Value,
     beyond_limits: Vec<String>,
     warnings: Vec<String>,
     closure: Closed,
     bounds: Bounds,
-}
-
-#[derive(Serialize)]
-struct Motion {
-    speed_m_s: f64,
-    acceleration_m_s2: f64,
-    jerk_m_s3: f64,
-    rate_deg_s: f64,
 }
 
 #[derive(Serialize)]

@@ -9,7 +9,6 @@ use nav_sim_calibration::{
 use nav_sim_document::readable;
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::{Composite, Parameter, ParameterRef, Process};
-use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
@@ -163,46 +162,31 @@ pub(super) fn turn_on_json(found: &TurnOnSpread) -> Value {
     })
 }
 
-/// A figure of a model, in the unit of data sheets.
-#[derive(Serialize)]
-struct Figure {
-    name: String,
-    /// None where the data do not show it.
-    value: Option<f64>,
-    ci95: Option<[f64; 2]>,
-    unit: &'static str,
-    /// The interval in words, or why there is none.
-    interval: String,
-    /// Averaging times at which it is the largest part.
+/// A figure of a model, in the unit of data sheets, or why the data do not show it. `ends`: the 95 % interval where draws were
+/// made, if they determine it; `averages`: averaging times at which it is the largest part.
+fn figure(
+    (name, unit): (String, &str),
+    value: Result<f64, &str>,
+    ends: Option<Option<[f64; 2]>>,
     averages: String,
-}
-
-impl Figure {
-    /// `ends`: the 95 % interval where draws were made, if they determine it.
-    fn new(
-        (name, unit): (String, &'static str),
-        value: Result<f64, &str>,
-        ends: Option<Option<[f64; 2]>>,
-        averages: String,
-    ) -> Self {
-        Self {
-            name,
-            value: value.ok(),
-            ci95: ends.flatten().filter(|_| value.is_ok()),
-            unit,
-            interval: match (value, ends) {
-                (Err(why), _) => why.to_owned(),
-                (_, None) => String::new(),
-                (_, Some(None)) => "not determined".to_owned(),
-                (_, Some(Some(ends))) => ends.map(readable).join(" … "),
-            },
-            averages,
-        }
-    }
+) -> Value {
+    json!({
+        "name": name,
+        "value": value.ok(),
+        "ci95": ends.flatten().filter(|_| value.is_ok()),
+        "unit": unit,
+        "interval": match (value, ends) {
+            (Err(why), _) => why.to_owned(),
+            (_, None) => String::new(),
+            (_, Some(None)) => "not determined".to_owned(),
+            (_, Some(Some(ends))) => ends.map(readable).join(" … "),
+        },
+        "averages": averages,
+    })
 }
 
 /// N, B and K of a fit, and what a pair of N and K does not carry.
-fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Figure> {
+fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
     let mut figures = outcome
         .practical(rate_hz)
         .map_or_else(BTreeMap::new, |p| practical_figures(outcome, &p));
@@ -221,7 +205,7 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Figure> {
             i.absent.is_none().then_some(ends)
         });
         let value = model.parameters().find(|(of, _)| own(*of));
-        let figure = Figure::new(
+        let figure = figure(
             (format!("{label} {name}"), unit),
             value.map(|(_, value)| convert(value, rate_hz)).ok_or(""),
             interval,
@@ -236,7 +220,7 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Figure> {
     figures
 }
 
-fn practical_figures(outcome: &Outcome, practical: &Practical) -> BTreeMap<String, Figure> {
+fn practical_figures(outcome: &Outcome, practical: &Practical) -> BTreeMap<String, Value> {
     let sensor = outcome.scope.sensor;
     let (pair, ends) = (&practical.parameters.walk, &practical.intervals);
     let [white, walk] = match sensor {
@@ -250,7 +234,7 @@ fn practical_figures(outcome: &Outcome, practical: &Practical) -> BTreeMap<Strin
                 .inference
                 .is_some()
                 .then_some(ends.map(|ends| ends.map(|end| end * factor)));
-            Figure::new((name.to_owned(), unit), value.map(|x| x * factor), ends, at)
+            figure((name.to_owned(), unit), value.map(|x| x * factor), ends, at)
         };
     let crossover = pair.crossover_s().map(duration);
     let none = format!("none up to {}", duration(practical.range_s));
