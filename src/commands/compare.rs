@@ -87,7 +87,7 @@ impl Command for Compare {
             .runs
             .iter()
             .chain([&self.reference])
-            .flat_map(|run: &PathBuf| RUN_FILES.map(|name| run.join(name)))
+            .flat_map(|run| RUN_FILES.map(|name| run.join(name)))
             .filter(|path| path.exists())
             .map(|path| ("run", path))
             .collect())
@@ -414,7 +414,7 @@ impl Comparison {
         csv(&self
             .rows
             .iter()
-            .filter(|row: &&Row| self.states.iter().any(|k| REPORTED_NAMES[*k] == row.state))
+            .filter(|row| self.states.iter().any(|k| REPORTED_NAMES[*k] == row.state))
             .map(flat)
             .collect::<Vec<_>>())
     }

@@ -85,10 +85,9 @@ impl FromStr for Ask {
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         match text {
             "longest" => Ok(Self::Longest),
-            window if window.contains(':') => window
-                .parse()
-                .map(Self::Window)
-                .map_err(|e: NotAnOutage| e.to_string()),
+            window if window.contains(':') => {
+                window.parse().map(Self::Window).map_err(|e| e.to_string())
+            }
             length => parse::positive(length)
                 .map(Self::Length)
                 .map_err(|_| "expected a length in seconds, START:END or longest".to_owned()),
@@ -402,7 +401,7 @@ impl Question {
     fn limits_in_words(&self) -> String {
         self.limits
             .iter()
-            .map(|l: &Limit| format!("{} ≤ {}", l.quantity, readable(l.most)))
+            .map(|l| format!("{} ≤ {}", l.quantity, readable(l.most)))
             .collect::<Vec<_>>()
             .join(", ")
     }

@@ -186,7 +186,7 @@ impl Synthesize {
     fn wanted(&self, file: &ModelFile, context: &Context<'_>) -> Result<Vec<Channel>> {
         let (missing, present): (Vec<Channel>, Vec<Channel>) = Channel::ALL
             .into_iter()
-            .filter(|c: &Channel| self.axes.iter().any(|set| set.channels.contains(c)))
+            .filter(|c| self.axes.iter().any(|set| set.channels.contains(c)))
             .partition(|c| file.missing.contains(c));
         let shown = self.model.display();
         if present.is_empty() {

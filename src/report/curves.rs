@@ -30,7 +30,7 @@ impl Band {
         let (ci_low, ci_high) = wv
             .iter()
             .zip(edof)
-            .map(|(nu, edof): (&f64, &f64)| interval::interval(*nu, *edof, CONFIDENCE))
+            .map(|(nu, edof)| interval::interval(*nu, *edof, CONFIDENCE))
             .unzip();
         Self {
             wv,
@@ -228,7 +228,7 @@ impl CurvesFile {
         };
         let curves = outcomes
             .iter()
-            .map(|o: &&Outcome| fitted(o, replicates(o), settings))
+            .map(|o| fitted(o, replicates(o), settings))
             .collect();
         Self {
             schema_version: 1,

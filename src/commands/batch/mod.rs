@@ -95,7 +95,6 @@ pub enum Outcome {
 
 impl BatchRequest {
     /// Directory of the study.
-    #[must_use]
     pub fn directory(&self) -> PathBuf {
         self.out
             .clone()
@@ -166,7 +165,7 @@ impl BatchRequest {
         for cell in &cells {
             let firsts: Vec<u64> = units
                 .iter()
-                .filter(|unit: &&Unit<'_>| unit.cells.iter().any(|own| own.name == cell.name))
+                .filter(|unit| unit.cells.iter().any(|own| own.name == cell.name))
                 .map(|unit| unit.first)
                 .collect();
             if firsts.len() > 1 {
@@ -1062,7 +1061,7 @@ pub(crate) fn part_of(bytes: &[u8]) -> Option<RunResult> {
 fn parse_shard(text: &str) -> Result<(u64, u64), String> {
     text.split_once('/')
         .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)))
-        .filter(|(index, count): &(u64, u64)| index < count)
+        .filter(|(index, count)| index < count)
         .ok_or_else(|| "expected i/n with i from 0 to n − 1, such as 0/4".to_owned())
 }
 

@@ -137,14 +137,11 @@ impl ShownCalibration<'_> {
         if self
             .outcomes
             .iter()
-            .any(|o: &&Outcome| o.goodness().is_some_and(|g| g.is_rejected()))
+            .any(|o| o.goodness().is_some_and(|g| g.is_rejected()))
         {
             return Tone::Bad;
         }
-        if self
-            .outcomes
-            .iter()
-            .any(|o: &&Outcome| o.departure().misfit.is_some())
+        if self.outcomes.iter().any(|o| o.departure().misfit.is_some())
             || self.diagnoses.iter().any(is_abnormal)
         {
             Tone::Doubtful

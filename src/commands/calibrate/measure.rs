@@ -13,7 +13,7 @@ use nav_sim_calibration::{
     Outcome, Pool, Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve, grouped,
     infer_telling, replicates, turn_on, warm_up,
 };
-use nav_sim_signal::imu::{Channel, Recording, Sensor, Signal};
+use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::names::UnknownName;
 use nav_sim_signal::noise::Model;
 use nav_sim_signal::wavelet::{Curve, Tuning, default_levels};
@@ -45,7 +45,6 @@ impl FromStr for EstimatorChoice {
 
 impl EstimatorChoice {
     /// Whether it takes one recording at a time, however many there are.
-    #[must_use]
     pub fn is_single(self) -> bool {
         matches!(self, Self::One(estimator) if estimator.is_single())
     }
@@ -246,7 +245,6 @@ impl Calibration {
     }
 
     /// The noise model of an estimator, at the rate of the recordings; axes without a recording have no noise.
-    #[must_use]
     pub fn model(&self, estimator: Estimator) -> Model {
         nav_sim_calibration::model_of(
             self.outcomes.iter().filter(|o| o.estimator == estimator),
@@ -399,7 +397,7 @@ pub(crate) fn without_warm_up(
     let found: Vec<_> = recording
         .signals
         .par_iter()
-        .filter_map(|s: &Signal| warm_up(&s.samples))
+        .filter_map(|s| warm_up(&s.samples))
         .collect();
     if let Some(samples) = longest(&found).filter(|_| leave_out) {
         for signal in &mut recording.signals {
@@ -504,7 +502,7 @@ pub(crate) fn read_curves(
     }
     let estimators = Estimator::ALL
         .into_iter()
-        .filter(|e: &Estimator| curves.iter().any(|(_, estimator, _)| estimator == e))
+        .filter(|e| curves.iter().any(|(_, estimator, _)| estimator == e))
         .collect();
     Ok((
         curves,

@@ -15,11 +15,11 @@ use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
     Aim, Factor, FilterPass, Task, Track, TrueErrors, TruthSide, scaled,
 };
-use nav_sim_navigation::simulation::{Experiment, ExperimentError, RunResult};
+use nav_sim_navigation::simulation::{Experiment, ExperimentError};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
+use nav_sim_signal::noise::Model;
 use nav_sim_signal::noise::continuous::same_rate;
-use nav_sim_signal::noise::{Kind, Model};
 use rayon::prelude::*;
 use std::fmt;
 
@@ -53,7 +53,6 @@ nav_sim_signal::named!(Inflation { None = "none", Tuned = "tuned", Tenfold = "x1
 
 impl Candidate {
     /// The estimator's model as it is, in the default filter of 15 states.
-    #[must_use]
     pub fn new(estimator: Estimator, model: ModelSpec) -> Self {
         let (filter, inflation) = (FilterStates::default(), Inflation::default());
         Self {
@@ -130,7 +129,6 @@ impl Candidate {
     }
 
     /// Whether it may be chosen. What is made of a single recording, while there are several, is shown for comparison.
-    #[must_use]
     pub const fn is_eligible(&self) -> bool {
         !self.estimator.is_single()
     }
@@ -144,10 +142,7 @@ fn white_and_walk() -> ModelSpec {
 /// Whether every process has a slope of its own in the Allan deviation.
 fn is_of_slopes(model: &ModelChoice) -> bool {
     match model {
-        ModelChoice::Given(spec) => spec
-            .kinds()
-            .iter()
-            .all(|kind: &Kind| kind.shape().is_none()),
+        ModelChoice::Given(spec) => spec.kinds().iter().all(|kind| kind.shape().is_none()),
         ModelChoice::Auto => false,
     }
 }
@@ -424,7 +419,7 @@ impl Drive {
             Ok(results) => Some(
                 results
                     .iter()
-                    .map(|r: &RunResult| Score::of_runs(&r.runs, r.outages.len()))
+                    .map(|r| Score::of_runs(&r.runs, r.outages.len()))
                     .collect(),
             ),
             // none is as long as the trajectory, or lacks its last sample

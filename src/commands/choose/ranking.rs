@@ -99,7 +99,6 @@ impl Ranking {
     ///
     /// # Panics
     /// Without a candidate that may be chosen, or without a recording.
-    #[must_use]
     pub fn new(candidates: &[Candidate], folds: &[(String, Fold)]) -> Self {
         let eligible: Vec<usize> = (0..candidates.len())
             .filter(|c| candidates[*c].is_eligible())

@@ -282,7 +282,6 @@ impl Export {
     }
 
     /// The text of the file; `model` is its name in the head.
-    #[must_use]
     pub fn text(&self, model: &str) -> String {
         self.filled(&self.head(model)).1
     }

@@ -493,7 +493,7 @@ impl Export {
         let value = after("in")
             .and_then(|range| range.split_once(".."))
             .and_then(|(low, high)| Some((low.parse().ok()?, high.parse().ok()?)))
-            .map_or(asked, |(low, high): (f64, f64)| asked.clamp(low, high));
+            .map_or(asked, |(low, high)| asked.clamp(low, high));
         let infinite = after("else").unwrap_or("Inf");
         let is_number = value.is_finite();
         let value = if is_number {

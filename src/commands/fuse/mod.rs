@@ -274,9 +274,9 @@ impl FromStr for MountingChoice {
         let (angles, sigma) = text.split_once(':').unwrap_or((text, "1,1,1"));
         match (numbers(angles), numbers(sigma)) {
             (Some([roll, pitch, yaw]), Some(sigma_deg))
-                if sigma_deg.iter().all(|s: &f64| (0.0..=MAX_SIGMA_DEG).contains(s)) =>
+                if sigma_deg.iter().all(|s| (0.0..=MAX_SIGMA_DEG).contains(s)) =>
             {
-                let [roll, pitch, yaw] = [roll, pitch, yaw].map(|angle: f64| angle * DEG);
+                let [roll, pitch, yaw] = [roll, pitch, yaw].map(|angle| angle * DEG);
                 Ok(Self::Given(RollPitchYaw { roll, pitch, yaw }.to_quat(), DVec3::from(sigma_deg) * DEG))
             }
             _ => Err(

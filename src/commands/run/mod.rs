@@ -872,7 +872,6 @@ impl Analysis<'_> {
 
 impl Navigation {
     /// The statistics of runs of a seed.
-    #[must_use]
     pub fn of_runs(result: RunResult, seed: u64) -> Self {
         let epochs = epochs(&result);
         let summary = Summary::of(&result, &epochs, seed);
@@ -887,7 +886,6 @@ impl Navigation {
 
 impl NavigateInputs {
     /// Along a trajectory, with models that are known for certain.
-    #[must_use]
     pub const fn new(trajectory: Trajectory, model: Model, truth: TrueImu) -> Self {
         Self {
             trajectory,
@@ -1016,7 +1014,7 @@ fn about(values: &[f64], ratios: &[(f64, f64)]) -> Vec<(f64, f64)> {
     values
         .iter()
         .zip(ratios)
-        .map(|(value, (low, high)): (&f64, &(f64, f64))| (value * low, value * high))
+        .map(|(value, (low, high))| (value * low, value * high))
         .collect()
 }
 
