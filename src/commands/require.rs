@@ -20,7 +20,7 @@ use nav_sim_navigation::require::{
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::aiding::AidingSettings;
 use nav_sim_navigation::sensors::imu::Truth;
-use nav_sim_navigation::sensors::outage::{NotAnOutage, Outage};
+use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::ExperimentError;
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::Sensor;
