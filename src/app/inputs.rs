@@ -43,7 +43,7 @@ pub(crate) fn trajectory(path: &Path, context: &Context<'_>) -> Result<Trajector
 /// A model; the axes that it does not name.
 pub(crate) fn model(path: &Path, context: &Context<'_>) -> Result<ModelFile> {
     let file = model_file::read(path)?;
-    context.warn_each(&file.doubts(path));
+    context.warn_each(file.doubts(path));
     Ok(file)
 }
 
@@ -82,7 +82,7 @@ pub(crate) fn recordings(
         ..ReadOptions::default()
     };
     let (recordings, report) = recordings::read(paths, &options)?;
-    context.warn_each(&report.all_warnings());
+    context.warn_each(report.all_warnings());
     report
         .files
         .iter()

@@ -6,7 +6,7 @@ use crate::app::{
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::io::atomic::Written;
-use crate::report::csv::{csv, flat};
+use crate::report::csv::{csv, flat, merged};
 use crate::report::verdict::{SPOKEN, axis_of, tone, verdict_counts};
 use crate::report::{in_order, json};
 use nav_sim_document::{
@@ -17,7 +17,7 @@ use nav_sim_navigation::metrics::{self, OutageComparison, PerState, StateRatio};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -134,10 +134,10 @@ pub(crate) fn between<'a>(
         schema_version: 1,
         reference: name.to_owned(),
         paired: true,
-        verdicts: vec![VerdictRow {
-            run: name.to_owned(),
-            verdict: directory.summary["verdict"].clone(),
-        }],
+        verdicts: vec![merged([
+            json!({ "run": name }),
+            directory.summary["verdict"].clone(),
+        ])],
         rows: Vec::new(),
         consistency: Vec::new(),
         candidates: Vec::new(),
@@ -168,38 +168,36 @@ pub(crate) fn between<'a>(
     separate(&mut found.candidates);
     for candidate in &found.candidates {
         if !candidate.is_reference {
-            found.verdicts.push(VerdictRow {
-                run: candidate.run.clone(),
-                verdict: candidate.verdict.clone(),
-            });
+            let run = json!({ "run": candidate.run });
+            found
+                .verdicts
+                .push(merged([run, candidate.verdict.clone()]));
         }
         for (outage, comparison) in candidate.outages.iter().enumerate() {
             let (outage_start_s, outage_end_s) = found.outages[outage];
             for (state, ratio) in REPORTED_NAMES.iter().zip(comparison.states) {
-                found.rows.push(Row {
-                    label: candidate.label.clone(),
-                    run: candidate.run.clone(),
-                    reference: name.to_owned(),
-                    outage_start_s,
-                    outage_end_s,
-                    state,
-                    ratio,
-                    paired: candidate.is_paired,
-                    outage,
+                let place = json!({
+                    "run": candidate.run,
+                    "reference": name,
+                    "outage_start_s": outage_start_s,
+                    "outage_end_s": outage_end_s,
+                    "state": state,
                 });
+                let rest = json!({ "paired": candidate.is_paired, "outage": outage });
+                let row = [json!(candidate.label), place, json!(ratio), rest];
+                found.rows.push(merged(row));
             }
-            found.consistency.push(ConsistencyRow {
-                run: candidate.run.clone(),
-                outage,
-                outage_start_s,
-                outage_end_s,
-                comparison: comparison.clone(),
-                rmse_end_ratio_error_pct: PerState(
-                    comparison
-                        .states
-                        .map(|state| state.rmse_end_ratio_error_pct),
-                ),
+            let place = json!({
+                "run": candidate.run,
+                "outage": outage,
+                "outage_start_s": outage_start_s,
+                "outage_end_s": outage_end_s,
             });
+            let states = comparison.states;
+            let rmse = PerState(states.map(|state| state.rmse_end_ratio_error_pct));
+            let rmse = json!({ "rmse_end_ratio_error_pct": rmse });
+            let row = merged([place, json!(comparison), rmse]);
+            found.consistency.push(row);
         }
     }
     Ok(found)
@@ -328,11 +326,11 @@ pub struct Comparison {
     /// Whether run k saw the same noise everywhere, so that intervals are those of paired differences.
     paired: bool,
     /// One row a run, the reference first.
-    verdicts: Vec<VerdictRow>,
+    verdicts: Vec<Value>,
     /// One row a run, outage and state.
-    rows: Vec<Row>,
+    rows: Vec<Value>,
     /// One row a run and outage.
-    consistency: Vec<ConsistencyRow>,
+    consistency: Vec<Value>,
     /// The runs.
     #[serde(skip)]
     pub(crate) candidates: Vec<CandidateResult>,
@@ -350,59 +348,6 @@ pub struct Comparison {
     form: Option<TableForm>,
 }
 
-/// Whether the filter of a run is as good as it believes.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct VerdictRow {
-    /// Run directory.
-    run: String,
-    /// The verdict.
-    #[serde(flatten)]
-    verdict: Value,
-}
-
-/// One state of one run in one outage, against the reference.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct Row {
-    /// Scenario and estimator.
-    #[serde(flatten)]
-    label: Label,
-    /// Run directory.
-    run: String,
-    /// Run directory of the reference.
-    reference: String,
-    /// Start of the outage (s).
-    outage_start_s: f64,
-    /// Its end (s).
-    outage_end_s: f64,
-    /// State.
-    state: &'static str,
-    /// Its ratios.
-    #[serde(flatten)]
-    ratio: StateRatio,
-    /// True if run k saw the same noise as that of the reference, so that the intervals are those of paired differences.
-    paired: bool,
-    /// Outage, from 0.
-    outage: usize,
-}
-
-/// Consistency of one run in one outage, beside the reference's.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct ConsistencyRow {
-    /// Run directory.
-    run: String,
-    /// Outage, from 0.
-    outage: usize,
-    /// Its start (s).
-    outage_start_s: f64,
-    /// Its end (s).
-    outage_end_s: f64,
-    /// NEES and coverage.
-    #[serde(flatten)]
-    comparison: OutageComparison,
-    /// (ratio − 1)·100 of the RMSE at its end.
-    rmse_end_ratio_error_pct: PerState<f64>,
-}
-
 impl Comparison {
     /// The paper's Table I.
     pub(crate) fn table(&self) -> Table {
@@ -414,7 +359,11 @@ impl Comparison {
         csv(&self
             .rows
             .iter()
-            .filter(|row| self.states.iter().any(|k| REPORTED_NAMES[*k] == row.state))
+            .filter(|row| {
+                self.states
+                    .iter()
+                    .any(|k| row["state"] == REPORTED_NAMES[*k])
+            })
             .map(flat)
             .collect::<Vec<_>>())
     }
@@ -533,7 +482,7 @@ impl Answer for Comparison {
     fn document(&self) -> Document {
         let verdicts = self.verdicts.iter();
         let verdicts: Vec<_> = verdicts
-            .map(|row| (row.run.as_str(), &row.verdict))
+            .map(|row| (row["run"].as_str().unwrap_or_default(), row))
             .collect();
         let (gravest, counts) = verdict_counts(&verdicts);
         let (lines, tone) = (self.cost().into_iter().chain(counts), tone(gravest));

@@ -4,6 +4,15 @@ use nav_sim_document::shortest;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+/// Results beside one another in one JSON object.
+pub(crate) fn merged<const N: usize>(results: [Value; N]) -> Value {
+    let fields = results.into_iter().flat_map(|result| match result {
+        Value::Object(fields) => fields,
+        _ => Map::new(),
+    });
+    Value::Object(fields.collect())
+}
+
 /// A row without nesting: keys of an object follow its own after `_`, and an interval `ci95_pct` becomes `ci95_low_pct` and
 /// `ci95_high_pct`.
 pub(crate) fn flat(row: &impl Serialize) -> Map<String, Value> {

@@ -328,19 +328,12 @@ impl StudyAnswer {
                     .or_default()
                     .extend(cell.outages.first()?["p95_m"].as_f64().map(|y| (x, y)));
             }
-            let line = |(hue, (name, mut points)): (usize, (Vec<&str>, Vec<(f64, f64)>))| {
+            let mut series = Vec::new();
+            for (hue, (name, mut points)) in lines.into_iter().take(LINES).enumerate() {
                 points.sort_by(|a, b| a.0.total_cmp(&b.0));
-                Series::line(&name.join(" "), Colour::Hue(hue), points)
-            };
-            let panel = Panel::new(
-                Axis::log("horizontal error, p95 (m)"),
-                lines
-                    .into_iter()
-                    .take(LINES)
-                    .enumerate()
-                    .map(line)
-                    .collect(),
-            );
+                series.push(Series::line(&name.join(" "), Colour::Hue(hue), points));
+            }
+            let panel = Panel::new(Axis::log("horizontal error, p95 (m)"), series);
             Some(Chart::new(
                 &format!("Error against {axis}"),
                 Axis::linear(axis),

@@ -2,6 +2,7 @@
 
 use super::document::{fit_name, fit_notes, reasons, turn_on_remark, without_interval};
 use crate::commands::export::Quantity;
+use crate::report::csv::merged;
 use nav_sim_calibration::{
     Candidate, Estimator, Miss, Outcome, ParameterInterval, ParameterSpread, Practical, Ranking,
     Settings, TURN_ON_LEVEL, TurnOnSpread, duration, percent, tau_s,
@@ -9,17 +10,17 @@ use nav_sim_calibration::{
 use nav_sim_document::readable;
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::{Composite, Parameter, ParameterRef, Process};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// The facts of a fit that stand in the provenance of its model too; null where there are none.
-pub(super) fn fit_record(outcome: &Outcome, settings: &Settings) -> Map<String, Value> {
+pub(super) fn fit_record(outcome: &Outcome, settings: &Settings) -> Value {
     let (fit, goodness) = (&outcome.fit, outcome.goodness());
     let worst = outcome.departure().misfit;
     let notes = fit_notes(outcome, settings).into_iter();
     let notes: Vec<String> = notes.chain(without_interval(outcome)).collect();
     let is_trimmed = outcome.estimator == Estimator::DrAwv;
-    object(json!({
+    json!({
         "signals": outcome.scope.name(),
         "model": outcome.spec.to_string(),
         "replicates": outcome.replicates,
@@ -38,14 +39,7 @@ pub(super) fn fit_record(outcome: &Outcome, settings: &Settings) -> Map<String, 
         "worst_ratio": worst.map(|miss| miss.ratio),
         "worst_tau_s": worst.map(|miss| tau_s(miss.level, settings.rate_hz)),
         "notes": notes,
-    }))
-}
-
-fn object(json: Value) -> Map<String, Value> {
-    match json {
-        Value::Object(map) => map,
-        _ => Map::new(),
-    }
+    })
 }
 
 /// A fit: its record, models and figures. `axis` is `all` of pooled axes; `spread_p_value` is the probability that
@@ -81,8 +75,7 @@ pub(super) fn fit_json(outcome: &Outcome, all: &[&Outcome], settings: &Settings)
             "simpler_processes": processes(&i.composite, &i.intervals),
         })
     });
-    let mut record = fit_record(outcome, settings);
-    record.extend(object(json!({
+    let fit_facts = json!({
         "name": fit_name(outcome, all),
         "sensor": outcome.scope.sensor,
         "axis": outcome.scope.axis.map_or("all", |axis| axis.name()),
@@ -99,8 +92,8 @@ pub(super) fn fit_json(outcome: &Outcome, all: &[&Outcome], settings: &Settings)
         "missed": missed,
         "zero": labelled(&fit.zero),
         "at_end": labelled(&fit.at_end),
-    })));
-    record.into()
+    });
+    merged([fit_record(outcome, settings), fit_facts])
 }
 
 fn candidates(ranking: &Ranking) -> Vec<Value> {

@@ -66,7 +66,7 @@ impl CalibrationNote {
     fn provenance(&self, outcomes: &[&Outcome], settings: &Settings, curves: &str) -> Table {
         let estimator = outcomes.first().map_or(Estimator::Given, |o| o.estimator);
         let is_robust = estimator.is_robust();
-        let fit = |outcome: &&Outcome| known(fit_record(outcome, settings).into());
+        let fit = |outcome: &&Outcome| known(fit_record(outcome, settings));
         // TOML integers are signed; larger seeds go as text.
         let seed =
             |seed: u64| i64::try_from(seed).map_or_else(|_| json!(seed.to_string()), Into::into);

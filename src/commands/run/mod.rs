@@ -641,7 +641,7 @@ fn with_runs(
         )
     });
     // Where the motion hardly shows the heading, no filter of this kind is to be believed.
-    context.warn_each(&weak_heading(
+    context.warn_each(weak_heading(
         FilterPass::new(&merged, belief)
             .yaw_while_measured()
             .into_iter(),
@@ -930,7 +930,7 @@ pub(crate) fn reduction_of(
         full.map(|full| assess(track, full, model)).as_ref(),
     );
     context.remark(reduction_line(&quality));
-    context.warn_each(&reduction_doubt(&quality));
+    context.warn_each(reduction_doubt(&quality));
     Some(quality)
 }
 
