@@ -8,11 +8,12 @@ use crate::io::atomic::Written;
 use crate::io::recordings::ReadOptions;
 use crate::parse;
 use crate::report::csv::{csv, flat};
-use crate::report::curves::{Band, CONFIDENCE, SignalCurves, SignalsFile, recording_names};
-use crate::report::curves::{band, curve, scale_axis, sensor_name, variance_axis};
+use crate::report::curves::{
+    Band, CONFIDENCE, SignalCurves, SignalsFile, band, curve, recording_names, scale_axis,
+    sensor_name, variance_axis,
+};
 use crate::report::in_order;
-use nav_sim_calibration::{Replicate, replicates};
-use nav_sim_calibration::{duration, median};
+use nav_sim_calibration::{Replicate, duration, median, replicates};
 use nav_sim_document::{Cell, Chart, Colour, Document, Panel, Series, Table, Tone};
 use nav_sim_signal::imu::{Channel, Recording};
 use nav_sim_signal::wavelet::{WaveletError, haar, interval};

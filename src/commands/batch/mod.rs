@@ -277,7 +277,6 @@ fn estimate(
     changed: usize,
     context: &Context<'_>,
 ) -> Result<String> {
-    const BYTES: f64 = 1.2e6;
     let done = cells.iter().filter(|cell| place.is_done(cell)).count();
     let left: Vec<&Unit<'_>> = units.iter().filter(|unit| !place.has_unit(unit)).collect();
     let passes = units.iter().filter(|unit| unit.first == 0).count();
@@ -296,11 +295,8 @@ fn estimate(
         quiet.end();
         let per_run = quiet.runs_s() / runs as f64 * quiet.threads() as f64;
         let cost: u64 = left.iter().map(|unit| unit.cost()).sum();
-        text += &format!(
-            "\n{} of processor time, {:.0} MB",
-            nav_sim_calibration::duration(per_run * cost as f64),
-            BYTES * (cells.len() - done) as f64 / 1e6
-        );
+        let time = nav_sim_calibration::duration(per_run * cost as f64);
+        text += &format!("\n{time} of processor time");
     }
     for cell in cells {
         context.detail(&cell.name);

@@ -2,8 +2,7 @@
 
 use super::fits::{interval_of, intervals};
 use crate::commands::export::Quantity;
-use crate::report::curves::{CurvesFile, FittedCurve, recording_names};
-use crate::report::curves::{band, curve, sensor_name};
+use crate::report::curves::{CurvesFile, FittedCurve, band, curve, recording_names, sensor_name};
 use crate::report::in_order;
 use nav_sim_calibration::{
     Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE,

@@ -18,8 +18,7 @@ use crate::commands::calibrate::{
     Calibration, CalibrationNote, CalibrationOptions, ESTIMATORS, EstimatorChoice, Measured,
     measure, without_warm_up,
 };
-use crate::io::recordings;
-use crate::io::recordings::{FileReport, Gaps, ReadOptions};
+use crate::io::recordings::{self, FileReport, Gaps, ReadOptions};
 use crate::parse;
 use crate::report::{json, six_digits};
 use candidates::{Candidate, Drive, Fold, Inflation, Laboratory, Unit};

@@ -14,8 +14,7 @@ use crate::app::{
     Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, refused,
 };
 use crate::io::atomic::Written;
-use crate::io::model_file;
-use crate::io::model_file::ModelFile;
+use crate::io::model_file::{self, ModelFile};
 use crate::parse::{one_of, seconds_range};
 use nav_sim_document::{Document, Importance, Tone};
 use nav_sim_signal::imu::{Axis, Sensor};
