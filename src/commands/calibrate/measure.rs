@@ -1,8 +1,6 @@
 //! Calibration: from static recordings, or directories of them, to a noise model for each sensor or axis.
 
-use super::document::ShownCalibration;
-use super::fits::{fit_json, turn_on_json};
-use super::model_file::CalibrationNote;
+use super::document::{CalibrationNote, ShownCalibration, fit_json, turn_on_json};
 use crate::app::reading::note_report;
 use crate::app::{Context, Failure, refused};
 use crate::io::recordings::{FileReport, ReadOptions, Report};

@@ -22,13 +22,11 @@
 //! ```
 
 mod document;
-mod fits;
 mod measure;
-mod model_file;
 
+pub(crate) use document::CalibrationNote;
 pub use measure::{Calibration, CalibrationOptions, EstimatorChoice, calibrate};
 pub(crate) use measure::{Measured, measure, visit, without_warm_up};
-pub(crate) use model_file::CalibrationNote;
 
 use crate::app::inputs::{files, listed};
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
