@@ -168,10 +168,10 @@ pub(crate) fn between<'a>(
     separate(&mut found.candidates);
     for candidate in &found.candidates {
         if !candidate.is_reference {
-            let run = json!({ "run": candidate.run });
-            found
-                .verdicts
-                .push(merged([run, candidate.verdict.clone()]));
+            found.verdicts.push(merged([
+                json!({ "run": candidate.run }),
+                candidate.verdict.clone(),
+            ]));
         }
         for (outage, comparison) in candidate.outages.iter().enumerate() {
             let (outage_start_s, outage_end_s) = found.outages[outage];
@@ -183,8 +183,12 @@ pub(crate) fn between<'a>(
                     "outage_end_s": outage_end_s,
                     "state": state,
                 });
-                let rest = json!({ "paired": candidate.is_paired, "outage": outage });
-                let row = [json!(candidate.label), place, json!(ratio), rest];
+                let row = [
+                    json!(candidate.label),
+                    place,
+                    json!(ratio),
+                    json!({ "paired": candidate.is_paired, "outage": outage }),
+                ];
                 found.rows.push(merged(row));
             }
             let place = json!({
@@ -193,11 +197,16 @@ pub(crate) fn between<'a>(
                 "outage_start_s": outage_start_s,
                 "outage_end_s": outage_end_s,
             });
-            let states = comparison.states;
-            let rmse = PerState(states.map(|state| state.rmse_end_ratio_error_pct));
-            let rmse = json!({ "rmse_end_ratio_error_pct": rmse });
-            let row = merged([place, json!(comparison), rmse]);
-            found.consistency.push(row);
+            let rmse = PerState(
+                comparison
+                    .states
+                    .map(|state| state.rmse_end_ratio_error_pct),
+            );
+            found.consistency.push(merged([
+                place,
+                json!(comparison),
+                json!({ "rmse_end_ratio_error_pct": rmse }),
+            ]));
         }
     }
     Ok(found)

@@ -6,11 +6,15 @@ use serde_json::{Map, Value};
 
 /// Results beside one another in one JSON object.
 pub(crate) fn merged<const N: usize>(results: [Value; N]) -> Value {
-    let fields = results.into_iter().flat_map(|result| match result {
-        Value::Object(fields) => fields,
-        _ => Map::new(),
-    });
-    Value::Object(fields.collect())
+    Value::Object(
+        results
+            .into_iter()
+            .flat_map(|result| match result {
+                Value::Object(fields) => fields,
+                _ => Map::new(),
+            })
+            .collect(),
+    )
 }
 
 /// A row without nesting: keys of an object follow its own after `_`, and an interval `ci95_pct` becomes `ci95_low_pct` and

@@ -333,11 +333,10 @@ impl StudyAnswer {
                 points.sort_by(|a, b| a.0.total_cmp(&b.0));
                 series.push(Series::line(&name.join(" "), Colour::Hue(hue), points));
             }
-            let panel = Panel::new(Axis::log("horizontal error, p95 (m)"), series);
             Some(Chart::new(
                 &format!("Error against {axis}"),
                 Axis::linear(axis),
-                vec![panel],
+                vec![Panel::new(Axis::log("horizontal error, p95 (m)"), series)],
             ))
         };
         self.axes.iter().filter_map(chart).collect()

@@ -371,7 +371,7 @@ impl Export {
     }
 
     /// A line for each sensor: its parameters in the units of data sheets, and how far the pair is from the model.
-    pub(crate) fn summary(&self) -> Vec<String> {
+    fn summary(&self) -> Vec<String> {
         let line = |s: &SensorExport| {
             let (low, high) = (s.closure.lowest.ratio, s.closure.highest.ratio);
             format!(
@@ -384,7 +384,7 @@ impl Export {
     }
 
     /// Warnings before pasting, the most important first.
-    pub(crate) fn doubts(&self) -> Vec<String> {
+    fn doubts(&self) -> Vec<String> {
         let misfit = self.misfit.iter();
         let mut doubts: Vec<String> = misfit.map(|misfit| format!("the model {misfit}")).collect();
         for s in &self.sensors {
