@@ -8,7 +8,7 @@ use nav_sim::calibration::{ModelSpec, Weighting, fit};
 use nav_sim::signal::noise::{Ar1, Process, Quantization, RandomWalk, White};
 use nav_sim::signal::rng::StreamKey;
 use nav_sim::signal::wavelet;
-use nav_sim::signal::wavelet::{Convention, Curve, Tuning};
+use nav_sim::signal::wavelet::{Curve, Tuning};
 use nav_sim_signal::wavelet::interval;
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -56,7 +56,7 @@ fn naive_classical(signal: &[f64], levels: u32) -> Vec<f64> {
 
 fn wavelet_variance(c: &mut Criterion) {
     let signal = signal();
-    let tuning = Tuning::new(0.6, Convention::Exact).unwrap();
+    let tuning = Tuning::new(0.6).unwrap();
     let mut group = c.benchmark_group("wavelet variance, 524284 samples, 18 scales");
     group
         .sample_size(20)

@@ -4,7 +4,7 @@
 use nav_sim::calibration::{Estimator, ModelSpec, Replicate, Trim, Weighting, average, fit};
 use nav_sim::signal::noise::{Ar1, Composite, Process, RandomWalk, Synthesizer, White};
 use nav_sim::signal::rng::StreamKey;
-use nav_sim::signal::wavelet::{Convention, Tuning, both};
+use nav_sim::signal::wavelet::{Tuning, both};
 
 const SAMPLES: usize = 1 << 16;
 const LEVELS: u32 = 15;
@@ -43,7 +43,7 @@ fn replicate(k: u64, tuning: &Tuning) -> Result<Replicate, Box<dyn std::error::E
 }
 
 pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let tuning = Tuning::new(0.6, Convention::Exact)?;
+    let tuning = Tuning::new(0.6)?;
     let replicates = (0..8)
         .map(|k| replicate(k, &tuning))
         .collect::<Result<Vec<_>, _>>()?;

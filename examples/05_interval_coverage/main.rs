@@ -47,7 +47,7 @@ fn lose(signal: &mut [f64], Holes { share, burst }: Holes, generator: &mut Gener
 fn set(design: &Design, set: u64, draws: usize, holes: Holes) -> Result<Vec<Outcome>, Failure> {
     let mut measured = Vec::new();
     for run in 0..design.replicates {
-        let drawn = design.spread.draw(&design.model, set, run)?;
+        let drawn = design.spread.draw(&design.model, set, run);
         let key = StreamKey {
             seed: set,
             scenario: "coverage",

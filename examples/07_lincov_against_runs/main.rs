@@ -66,10 +66,7 @@ fn stronger(model: &Model, kind: Kind, which: usize) -> Result<Model, Failure> {
             .iter_mut()
             .filter(|p| p.kind() == kind);
         let process = own.nth(which).ok_or("the model has no such process")?;
-        let parameter = kind.amplitude().name();
-        let value = process.values().last().copied().unwrap_or(0.0);
-        let changed = process.with_parameter(parameter, 4.0 * value, model.rate_hz);
-        *process = changed.ok_or("the process has no such parameter")??;
+        *process = process.times(4.0, model.rate_hz)?;
     }
     Ok(stronger)
 }

@@ -8,7 +8,8 @@ use nav_sim::calibration::{
 use nav_sim::signal::imu::Channel;
 use nav_sim::signal::noise::contamination::{Contamination, Operation};
 use nav_sim::signal::noise::{
-    Composite, Law, Model, Parameter, Process, Spread, SpreadError, Synthesizer, Variation,
+    Composite, Kind, Law, Model, Parameter, ParameterError, ParameterRef, Process, Spread,
+    Synthesizer, Variation,
 };
 use nav_sim::signal::rng::StreamKey;
 use nav_sim::signal::wavelet::{Curve, Status, Tuning, both, interval};
@@ -164,10 +165,9 @@ impl Design {
     }
 
     /// The model of one replicate (counted from 1), as drawn.
-    pub fn drawn(&self, set: u64, replicate: u64) -> Result<Model, Failure> {
-        Ok(self
-            .spread
-            .draw(&self.model, self.seed_of(set), replicate - 1)?)
+    pub fn drawn(&self, set: u64, replicate: u64) -> Model {
+        let seed = self.seed_of(set);
+        self.spread.draw(&self.model, seed, replicate - 1)
     }
 
     /// The samples of one replicate (counted from 1) of a given model.
@@ -191,7 +191,7 @@ impl Design {
         replicate: u64,
         how: &Contamination,
     ) -> Result<Vec<f64>, Failure> {
-        let mut model = self.drawn(set, replicate)?;
+        let mut model = self.drawn(set, replicate);
         let rate_hz = model.rate_hz;
         how.scale(
             &mut model.axes[self.channel.index()],
@@ -313,10 +313,10 @@ pub fn expected_wv(
     laws: &[Variation],
     rate_hz: f64,
     levels: u32,
-) -> Result<Vec<f64>, SpreadError> {
+) -> Result<Vec<f64>, ParameterError> {
     let mut expected = vec![0.0; levels as usize];
-    for (process, label) in noise.processes.iter().zip(noise.labels()) {
-        let own = laws.iter().filter(|l| l.process() == label);
+    for (at, process) in noise.processes.iter().enumerate() {
+        let own = laws.iter().filter(|l| l.of.process == at);
         for (process, weight) in weighted(process, own, rate_hz)? {
             for (nu, level) in expected.iter_mut().zip(1..) {
                 // nu is a sum over the processes, and so is its expectation: laws of different processes need
@@ -333,29 +333,28 @@ fn weighted<'a>(
     process: &Process,
     laws: impl Iterator<Item = &'a Variation>,
     rate_hz: f64,
-) -> Result<Vec<(Process, f64)>, SpreadError> {
-    let mut all = vec![(*process, 1.0)];
+) -> Result<Vec<(Process, f64)>, ParameterError> {
+    let mut all = vec![(Composite::new(vec![*process]), 1.0)];
     for law in laws {
-        let name = law.parameter();
-        let own = process
-            .kind()
-            .parameters()
-            .iter()
-            .zip(process.values())
-            .find(|(p, _)| p.name() == name);
-        let (parameter, centre) = own.ok_or_else(|| law.no_parameter(process))?;
-        let nodes = nodes(law.law(), centre, *parameter);
+        let of = ParameterRef {
+            process: 0,
+            ..law.of
+        };
+        let nodes = nodes(law.law, all[0].0.value(of), of.parameter);
         let mut next = Vec::with_capacity(all.len() * nodes.len());
-        for (process, weight) in &all {
+        for (noise, weight) in &all {
             for (value, node) in &nodes {
-                let changed = process.with_parameter(name, *value, rate_hz);
-                let changed = changed.ok_or_else(|| law.no_parameter(process))?;
-                next.push((changed.map_err(SpreadError::Reaches)?, weight * node));
+                let mut noise = noise.clone();
+                noise.set(of, *value, rate_hz)?;
+                next.push((noise, weight * node));
             }
         }
         all = next;
     }
-    Ok(all)
+    let processes = all
+        .into_iter()
+        .map(|(noise, weight)| (noise.processes[0], weight));
+    Ok(processes.collect())
 }
 
 // Expectations under the laws of parameters.
@@ -567,7 +566,7 @@ pub struct Movement {
 /// As [`Failure`].
 pub fn outlier_curve(design: &Design, unit: f64, sizes: &[f64]) -> Result<Vec<Movement>, Failure> {
     // Set 0 is one realisation: a sensitivity curve is of a sample, the influence function of its limit.
-    let mut samples = design.synthesized(0, 1, &design.drawn(0, 1)?);
+    let mut samples = design.synthesized(0, 1, &design.drawn(0, 1));
     let middle = samples.len() / 2;
     let clean = samples[middle];
     curve(design, &[1], sizes, |_, size| {
@@ -589,17 +588,15 @@ pub fn abnormal_curve(
     let abnormal: Vec<u64> =
         (1 + design.replicates.saturating_sub(count)..=design.replicates).collect();
     curve(design, &abnormal, factors, |replicate, factor| {
-        let mut model = design.drawn(0, replicate)?;
+        let mut model = design.drawn(0, replicate);
         let rate_hz = model.rate_hz;
         let processes = &mut model.axes[design.channel.index()].processes;
-        let walk = processes.iter_mut().find_map(|p| match p {
-            Process::RandomWalk(walk) => Some((walk.gamma2(), p)),
-            _ => None,
-        });
-        let (gamma2, walk) = walk.ok_or("no random walk whose variance could be made abnormal")?;
-        if let Some(scaled) = walk.with_parameter("gamma2", factor * gamma2, rate_hz) {
-            *walk = scaled.map_err(nav_sim::signal::noise::SpreadError::Reaches)?;
-        }
+        let mut walks = processes
+            .iter_mut()
+            .filter(|p| p.kind() == Kind::RandomWalk);
+        let walk = walks.next();
+        let walk = walk.ok_or("no random walk whose variance could be made abnormal")?;
+        *walk = walk.times(factor, rate_hz)?;
         design.measure(&design.synthesized(0, replicate, &model))
     })
 }
@@ -611,7 +608,7 @@ fn curve(
     sizes: &[f64],
     mut disturbed: impl FnMut(u64, f64) -> Result<Replicate, Failure>,
 ) -> Result<Vec<Movement>, Failure> {
-    let clean = |r| design.measure(&design.synthesized(0, r, &design.drawn(0, r)?));
+    let clean = |r| design.measure(&design.synthesized(0, r, &design.drawn(0, r)));
     let mut replicates = (1..=design.replicates)
         .map(clean)
         .collect::<Result<Vec<_>, _>>()?;

@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, Union
 
@@ -14,7 +15,7 @@ import numpy.typing as npt
 
 from nav_sim import _native
 from nav_sim._errors import NavSimError, warn
-from nav_sim._inputs import FloatArray, Staging, StrPath, as_json, numbers
+from nav_sim._inputs import Staging, StrPath, as_json, numbers, whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -109,6 +110,10 @@ class Answer:
         """What the command prints."""
         return self._native.summary()
 
+    def _repr_html_(self) -> str:
+        # styles of the page stay its own
+        return f'<iframe srcdoc="{escape(self._native.html())}" width="100%" height="600"></iframe>'
+
     def to_html(self, path: StrPath) -> Path:
         """Writes the page of the command, which needs no other file."""
         page = Path(path)
@@ -133,10 +138,11 @@ class Answer:
 A = TypeVar("A", bound=Answer)
 
 
-def ask(kind: type[A], command: str, staging: Staging, progress: Progress = None, **request: Any) -> A:
+def ask(kind: type[A], command: str, staging: Staging, progress: Progress = None, threads: int | None = None, **request: Any) -> A:
     """The answer to a request; what is None in it is left to the engine."""
     with bar(progress) as told:
-        native = _native.answer(command, as_json(request), staging.hidden, told)
+        count = None if threads is None else whole(threads, "threads", 1)
+        native = _native.answer(command, as_json(request), staging.hidden, told, count)
     warn(native.warnings)
     return kind(native)
 
@@ -248,5 +254,3 @@ def axes_or_new(ax: Axes | None) -> Axes:
         found = Figure().add_subplot()
     return found
 
-
-__all__ = ["Answer", "Columns", "FloatArray", "Progress", "ask", "axes_or_new", "flattened", "window", "windows"]

@@ -132,6 +132,7 @@ def calibrate(
     gaps: str | None = None,
     bootstrap: int | None = None,
     seed: int = 1,
+    threads: int | None = None,
     progress: Progress = None,
 ) -> Calibration:
     """Fits a noise model to static recordings, each of them one replicate: `nav-sim calibrate`.
@@ -169,6 +170,8 @@ def calibrate(
         Draws behind the intervals; 0: no intervals.
     seed
         Seed of these draws.
+    threads
+        Threads that compute; by default one a core.
     progress
         True shows a bar; a function is told how many recordings are done, of how many.
 
@@ -183,6 +186,7 @@ def calibrate(
             "calibrate",
             staging,
             progress,
+            threads,
             inputs=files,
             estimator=estimator,
             model=model,

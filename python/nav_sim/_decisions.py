@@ -37,6 +37,7 @@ def tune(
     filter: str | int | None = None,
     scenario: Settings | None = None,
     seed: int | None = None,
+    threads: int | None = None,
     progress: Progress = None,
 ) -> Choice:
     """The smallest factors on a model that make its filter consistent with other truths: `nav-sim tune`.
@@ -44,7 +45,7 @@ def tune(
     `truth` are models that may make the errors, such as those of single recordings, by default the model with the
     errors in the scenario; `intervals=True` takes the draws of its own calibration instead. `aim` is "worst" or "mean"
     (the option --for). Without a `trajectory` it is a drive of the program's own;
-    `outages`, `filter`, `scenario`, `seed` and `progress` as of `run`. `.model` is the tuned one.
+    `outages`, `filter`, `scenario`, `seed`, `threads` and `progress` as of `run`. `.model` is the tuned one.
     """
     truths = truth or [] if isinstance(truth, (list, tuple, type(None))) else [truth]
     with Staging() as staging:
@@ -53,6 +54,7 @@ def tune(
             "tune",
             staging,
             progress,
+            threads,
             model=_model.staged(model, "model", staging),
             truth=[_model.staged(one, f"truth[{k}]", staging) for k, one in enumerate(truths)],
             intervals=intervals,
@@ -76,14 +78,15 @@ def require(
     scenario: Settings | None = None,
     vehicle: str | None = None,
     catalogue: StrPath | bool | None = None,
+    threads: int | None = None,
     progress: Progress = None,
 ) -> Choice:
     """The IMU that keeps the errors at the end of an outage of a trajectory within limits: `nav-sim require`.
 
     With a `model` it is judged, without one `.model` is what is needed. `outage` is a length (s), a pair of start and
     end, or "longest", `start` where a length begins (s); `limits` such as "p95_m<=5"; `catalogue=True` ranks the catalogued IMUs, a path those of a directory. `vehicle="car"`
-    has it know that it moves neither sideways nor up. `gnss`, `scenario` and
-    `progress` as of `run`.
+    has it know that it moves neither sideways nor up. `gnss`, `scenario`,
+    `threads` and `progress` as of `run`.
     """
     asked = outage if isinstance(outage, str) else _window(outage)
     with Staging() as staging:
@@ -92,6 +95,7 @@ def require(
             "require",
             staging,
             progress,
+            threads,
             trajectory=_trajectory.staged(trajectory, staging),
             model=None if model is None else _model.staged(model, "model", staging),
             outage=asked,
@@ -124,12 +128,13 @@ def design(
     trajectory: AnyTrajectory | None = None,
     outages: Outages = None,
     seed: int | None = None,
+    threads: int | None = None,
     progress: Progress = None,
 ) -> Answer:
     """How well recordings that are not made yet would determine a model: `nav-sim design`.
 
     Without `recordings` (how many) or `hours` (each) several are tried. `estimator` as of `calibrate`, `draws` of
-    simulated calibrations; with a `trajectory` what the spread costs there, with `outages` as of `run`; `seed`, `progress`.
+    simulated calibrations; with a `trajectory` what the spread costs there, with `outages` as of `run`; `seed`, `threads`, `progress`.
     """
     with Staging() as staging:
         return ask(
@@ -137,6 +142,7 @@ def design(
             "design",
             staging,
             progress,
+            threads,
             model=_model.staged(model, "model", staging),
             recordings=recordings,
             hours=hours,
@@ -164,13 +170,14 @@ def choose(
     skip_s: float | str | None = None,
     gaps: str | None = None,
     seed: int | None = None,
+    threads: int | None = None,
     progress: Progress = None,
 ) -> Choice:
     """Which estimator and model navigate best on one's own recordings, three or more: `nav-sim choose`.
 
     Each recording makes the errors of runs along the trajectory whose filters were calibrated on the others. `.model` is the winner's.
     `estimator`, `model`, `filter` and `inflate` ("none", "tuned", "x10", …) list what is tried; `rate_hz`, `trim`, `skip_s`
-    and `gaps` are as of `calibrate`, `outages`, `runs`, `scenario`, `seed` and `progress` as of `run`.
+    and `gaps` are as of `calibrate`, `outages`, `runs`, `scenario`, `seed`, `threads` and `progress` as of `run`.
     """
     with Staging() as staging:
         return ask(
@@ -178,6 +185,7 @@ def choose(
             "choose",
             staging,
             progress,
+            threads,
             inputs=staging.recordings(recordings, "recordings", None),
             trajectory=_trajectory.staged(trajectory, staging),
             outage=windows(outages),
@@ -198,13 +206,14 @@ def compare(
     reference: StrPath,
     *,
     states: Sequence[str] = ("pos_e_m", "roll_deg"),
+    threads: int | None = None,
     progress: Progress = None,
 ) -> Answer:
     """Ratios of ASEE and RMSE between run directories, as `Run.write` and the command make them: `nav-sim compare`.
 
-    Each of `runs` is divided by the `reference`; `states` are those of the answer's table; `progress` as of `run`.
+    Each of `runs` is divided by the `reference`; `states` are those of the answer's table; `threads` and `progress` as of `run`.
     """
     directories = runs if isinstance(runs, (list, tuple)) else [runs]
     request: dict[str, Any] = {"runs": [path(run, "runs") for run in directories], "reference": path(reference, "reference")}
     with Staging() as staging:
-        return ask(Answer, "compare", staging, progress, **request, state=states)
+        return ask(Answer, "compare", staging, progress, threads, **request, state=states)

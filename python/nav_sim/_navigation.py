@@ -101,6 +101,7 @@ def run(
     gnss: Settings | None = None,
     scenario: Settings | None = None,
     seed: int | None = None,
+    threads: int | None = None,
     progress: Progress = None,
 ) -> Run:
     """Navigates by INS/GNSS along a trajectory with a noise model in the filter: `nav-sim run`.
@@ -133,6 +134,8 @@ def run(
         that name.
     seed
         Of all random numbers; that of the scenario, or 1, without it.
+    threads
+        Threads that compute; by default one a core.
     progress
         True shows a bar; a function is told how many runs are done, of how many.
 
@@ -147,6 +150,7 @@ def run(
             "run",
             staging,
             progress,
+            threads,
             trajectory=_trajectory.staged(trajectory, staging),
             model=_model.staged(model, "model", staging),
             truth=None if truth is None else _model.staged(truth, "truth", staging),
@@ -177,31 +181,13 @@ def lincov(
     require: str | Sequence[str] | None = None,
     gnss: Settings | None = None,
     scenario: Settings | None = None,
+    threads: int | None = None,
     progress: Progress = None,
 ) -> Run:
     """The errors to expect of a navigation, by covariance analysis, without sampling: `nav-sim run --method lincov`.
 
-    Parameters
-    ----------
-    trajectory
-        A file, columns (`t_s`, `lat_deg`, `lon_deg`, `h_m`, …) or a `Trajectory`.
-    model
-        What the filter believes of the IMU.
-    truth
-        What makes the errors of the IMU, if not the same model.
-    outages
-        Windows without fixes: pairs of start and end (s); [] for none; None for 300 to 390 s and 700 to 790 s.
-    filter
-        States: 15, 21 (and scale factors) or "full" (one for each process).
-    turn_on_bias, scale_ppm
-        Constant biases (m/s², rad/s) and scale factors (ppm) that the filter expects: standard deviations,
-        accelerometer first.
-    require
-        Limits such as "p95_m<=5" or "consistent"; `.unmet` says whether they are missed.
-    gnss, scenario
-        All other settings, by a file or as a dict, as to `run`.
-    progress
-        True shows a bar; a function is told how much is done.
+    `trajectory`, `model`, `truth`, `outages`, `filter`, `turn_on_bias`, `scale_ppm`, `require`, `gnss`, `scenario`,
+    `threads` and `progress` as of `run`.
 
     Returns
     -------
@@ -219,6 +205,7 @@ def lincov(
         require=require,
         gnss=gnss,
         scenario=scenario,
+        threads=threads,
         progress=progress,
     )
 
@@ -282,6 +269,7 @@ def fuse(
     rear_axle_m: Sequence[float] = (0.0, 0.0, 0.0),
     topic: tuple[str | None, str | None] | None = None,
     smooth: bool = False,
+    threads: int | None = None,
     progress: Progress = None,
 ) -> Fusion:
     """Fuses recorded IMU and GNSS data: `nav-sim fuse`.
@@ -324,12 +312,10 @@ def fuse(
         Middle of the rear axle from the IMU: front, right, down (m).
     topic
         Topics of IMU and fixes in a log that has several.
-    filter, turn_on_bias
+    filter, turn_on_bias, threads, progress
         As of `run`.
     smooth
         Also estimate every row from all fixes.
-    progress
-        True shows a bar; a function is told how much is done.
 
     Returns
     -------
@@ -344,6 +330,7 @@ def fuse(
             "fuse",
             staging,
             progress,
+            threads,
             imu=staging.columns(imu, "imu"),
             gnss=staging.table(gnss, "gnss"),
             model=_model.staged(model, "model", staging),

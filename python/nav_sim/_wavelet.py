@@ -147,13 +147,14 @@ def wv(
     intervals: str = "eta3",
     skip_s: float | str | None = None,
     gaps: str | None = None,
+    threads: int | None = None,
     progress: Progress = None,
 ) -> WaveletVariances:
     """Wavelet variances (classical, robust) of static recordings: `nav-sim wv`.
 
     The recordings are given as to `calibrate`, with `rate_hz` where there is no time in them. `axes` takes some of the signals ("gyro", "accel.x"); `intervals` is
     "eta3" or "large-sample"; `skip_s` leaves out seconds at the beginning, "auto" what is not as the rest; `gaps` is
-    "keep", "refuse", "split" or "ignore"; `efficiency`, `scales` and `progress` are as of `calibrate`.
+    "keep", "refuse", "split" or "ignore"; `efficiency`, `scales`, `threads` and `progress` are as of `calibrate`.
     """
     with Staging() as staging:
         files = staging.recordings(recordings, "recordings", axes if isinstance(axes, str) else None)
@@ -162,6 +163,7 @@ def wv(
             "wv",
             staging,
             progress,
+            threads,
             files=files,
             **reading(rate_hz, skip_s, gaps, axes),
             efficiency=efficiency,

@@ -52,7 +52,7 @@ pub(crate) fn model_recording<'py>(
         .map(|name| contamination_file::find(name, file.model.rate_hz))
         .transpose();
     let contamination = found.map_err(|e| error::of_failure(py, &e, ""))?;
-    let made = work(py, None, move |meter| {
+    let made = work(py, None, None, move |meter| {
         let spread = file.spread.as_ref().filter(|_| spread);
         let imu = VirtualImu {
             model: &file.model,

@@ -9,15 +9,16 @@ use std::ffi::OsString;
 
 /// What `command` answers to a request. `hidden`: a directory that no text shows.
 #[pyfunction]
-#[pyo3(signature = (command, request, hidden, progress))]
+#[pyo3(signature = (command, request, hidden, progress, threads=None))]
 pub(crate) fn answer(
     py: Python<'_>,
     command: String,
     request: String,
     hidden: String,
     progress: Option<&Bound<'_, PyAny>>,
+    threads: Option<usize>,
 ) -> PyResult<Answer> {
-    let (answered, warnings) = work(py, progress, move |meter| {
+    let (answered, warnings) = work(py, progress, threads, move |meter| {
         let options = serde_json::from_str(&request).map_err(Failure::input);
         let answered =
             options.and_then(|options| nav_sim::commands::answer(&command, options, meter));

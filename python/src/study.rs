@@ -27,7 +27,7 @@ pub(crate) fn study_run(
         return Err(error::refused(py, &message));
     }
     let limit = time_limit_s.and_then(|s| Duration::try_from_secs_f64(s).ok());
-    let (outcome, warnings) = work(py, progress, move |meter| {
+    let (outcome, warnings) = work(py, progress, threads, move |meter| {
         let deadline = limit.and_then(|limit| Instant::now().checked_add(limit));
         deadline.map(|end| meter.deadline.set(end));
         let request = BatchRequest {
@@ -37,10 +37,7 @@ pub(crate) fn study_run(
             states: vec!["all".to_owned()],
             ..BatchRequest::default()
         };
-        let run = || request.run(&|_| None, &Context::new(meter, None));
-        let pool =
-            threads.and_then(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().ok());
-        let outcome = pool.map_or_else(run, |pool| pool.install(run));
+        let outcome = request.run(&|_| None, &Context::new(meter, None));
         (outcome, meter.warnings())
     })?;
     let outcome = outcome.and_then(|outcome| match outcome.unmet() {

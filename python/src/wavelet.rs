@@ -3,7 +3,7 @@
 use crate::error;
 use crate::work::work;
 use nav_sim::signal::wavelet::{
-    Convention, RobustVariance, Tuning, WaveletError, both, default_levels, gappy, haar, interval,
+    RobustVariance, Tuning, WaveletError, both, default_levels, gappy, haar, interval,
 };
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -30,7 +30,9 @@ pub(crate) fn wavelet<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     // a copy, so that Ctrl-C need not wait and nobody changes what is being read
     let signal = without_mean(x.as_array().to_vec());
-    let found = work(py, None, move |_| variances(&signal, scales, efficiency))?;
+    let found = work(py, None, None, move |_| {
+        variances(&signal, scales, efficiency)
+    })?;
     let found = found.map_err(|e| error::refused(py, &format!("x: {e}")))?;
     let columns = PyDict::new(py);
     let (low, high) = found.ends.into_iter().unzip();
@@ -70,7 +72,7 @@ fn variances(
 ) -> Result<Variances, WaveletError> {
     let levels = scales.unwrap_or_else(|| default_levels(signal.len()));
     let tuning = efficiency
-        .map(|efficiency| Tuning::new(efficiency, Convention::Exact))
+        .map(|efficiency| Tuning::new(efficiency))
         .transpose()?;
     let (wv, coverage) = if signal.iter().any(|x| x.is_nan()) {
         let found = gappy(signal, levels, &tuning.unwrap_or_default())?;

@@ -75,10 +75,11 @@ impl Meter {
 
 /// Does a job on a thread of its own and waits for it without Python's lock.
 ///
-/// A job that nobody waits for any longer ends at its next step, in the background.
+/// It computes on so many `threads`, by default one a core. A job that nobody waits for any longer ends at its next step, in the background.
 pub(crate) fn work<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
+    threads: Option<usize>,
     job: impl FnOnce(&Meter) -> T + Send + 'static,
 ) -> PyResult<T> {
     in_this_process(py)?;
@@ -86,7 +87,12 @@ pub(crate) fn work<T: Send + 'static>(
     let counted = Arc::clone(&meter);
     let (sender, receiver) = channel();
     std::thread::spawn(move || {
-        let outcome = catch_unwind(AssertUnwindSafe(|| job(&counted)));
+        let pool =
+            threads.and_then(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().ok());
+        let outcome = catch_unwind(AssertUnwindSafe(|| match pool {
+            Some(pool) => pool.install(|| job(&counted)),
+            None => job(&counted),
+        }));
         // nobody waits after Ctrl-C
         drop(sender.send(outcome));
     });

@@ -10,6 +10,7 @@ from pathlib import Path
 import nav_sim
 import pytest
 from conftest import CONSUMER, DRIVE, TACTICAL, Command, first_seconds, without_times
+from distributed import Client
 
 
 def test_tune(short: Path, command: Command, tmp_path: Path) -> None:
@@ -116,6 +117,9 @@ def test_a_study(short: Path, command: Command, tmp_path: Path) -> None:
         assert own == commands, name
     assert set(found.table["model"]) == {"tactical", "consumer"} and found.summary()
     assert (found.cell("length_s=5_tactical") / "runs.csv").exists()
+    with Client(processes=False, dashboard_address=None) as client:  # type: ignore[no-untyped-call]
+        spread = nav_sim.Study(STUDY, tmp_path / "dask").run(client.get_executor())
+    assert spread is not None and spread.data == found.data
     with pytest.raises(nav_sim.NavSimError, match="no such cell"):
         found.cell("gone")
     with pytest.raises(nav_sim.NavSimError, match="shard"):

@@ -195,3 +195,11 @@ def test_a_wrong_argument_is_named(arguments: dict[str, Any], words: str) -> Non
     with pytest.raises(NavSimError) as refused:
         lincov(DRIVE, TACTICAL, **arguments)
     assert refused.value.message.startswith(words), refused.value.message
+
+
+def test_threads_and_notebooks(short: Path) -> None:
+    one, two = (nav_sim.run(short, TACTICAL, outages=[(20, 40)], runs=16, threads=n) for n in (1, 2))
+    assert one.text("runs.csv") == two.text("runs.csv")
+    assert one._repr_html_().startswith("<iframe srcdoc=")
+    with pytest.raises(nav_sim.NavSimError, match="threads=0 is not a whole number"):
+        nav_sim.run(short, TACTICAL, threads=0)

@@ -9,7 +9,7 @@ use nav_sim_calibration::{FitRange, ModelSpec, SpecError};
 use nav_sim_document::Importance;
 use nav_sim_logs::Stamp;
 use nav_sim_signal::imu::{Channel, Sensor};
-use nav_sim_signal::wavelet::{Convention, Tuning};
+use nav_sim_signal::wavelet::Tuning;
 use std::str::FromStr;
 
 /// Options for reading recordings.
@@ -229,8 +229,7 @@ impl FromStr for Scales {
 
 impl VarianceRequest {
     pub(crate) fn tuning(&self) -> Result<Tuning, Failure> {
-        Tuning::new(self.efficiency, Convention::Exact)
-            .map_err(|e| Failure::input(format!("--efficiency: {e}")))
+        Tuning::new(self.efficiency).map_err(|e| Failure::input(format!("--efficiency: {e}")))
     }
 
     /// Number of scales, if it is given.

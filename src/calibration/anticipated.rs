@@ -229,8 +229,7 @@ impl Anticipated<'_> {
                 (run * self.recordings + k) as u64,
             )
         });
-        let recorded: Result<Vec<Model>, _> = recorded.collect();
-        let recorded = recorded.map_err(CalibrationError::other)?;
+        let recorded: Vec<Model> = recorded.collect();
         let ratio = |model: &Model, channel: Channel| {
             let own = implied(&in_order(model.axis(channel)), curve);
             own.iter()

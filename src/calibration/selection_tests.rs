@@ -4,7 +4,7 @@ use super::*;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Ar1, Composite, Process, RandomWalk, Synthesizer, White};
 use crate::rng::StreamKey;
-use crate::wavelet::{Convention, Tuning, both};
+use crate::wavelet::{Tuning, both};
 use crate::{
     Bootstrap, FitRange, ModelChoice, Outcome, Pool, Replicate, Trim, Weighting, calibrate,
     grouped, infer,
@@ -15,7 +15,7 @@ fn settings() -> Settings {
         estimators: vec![Estimator::Awv],
         model: ModelChoice::Auto,
         trim: Trim::Count(0),
-        tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
+        tuning: Tuning::new(0.6).unwrap(),
         weighting: Weighting::Edof,
         fit_range: None,
         rate_hz: 1.0,

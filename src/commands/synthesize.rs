@@ -232,7 +232,7 @@ impl Synthesis {
             for channel in &self.channels {
                 contamination
                     .apply(&mut silence, *channel, replicate, model.rate_hz, self.seed)
-                    .map_err(|source| ReplicateError::Contamination { replicate, source })?;
+                    .map_err(|source| ReplicateError { replicate, source })?;
             }
         }
         Ok(model)

@@ -370,7 +370,7 @@ mod tests {
     use super::*;
     use nav_sim_signal::imu::{Axis, Sensor};
     use nav_sim_signal::rng::Generator;
-    use nav_sim_signal::wavelet::{Convention, Tuning, interval};
+    use nav_sim_signal::wavelet::{Tuning, interval};
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
 
@@ -424,7 +424,7 @@ mod tests {
     /// large all have one.
     #[test]
     fn outliers_are_marked_and_chance_is_not() {
-        let tuning = Tuning::new(0.6, Convention::Exact).unwrap();
+        let tuning = Tuning::new(0.6).unwrap();
         let row = |seed: u64, outliers: usize| {
             let mut generator = Generator::seed_from_u64(seed);
             let mut signal: Vec<f64> = (0..4096)

@@ -5,7 +5,7 @@ use super::table::{Asked, Dictionary, Quantity, parse as parse_table};
 use super::{Failure, Place, source};
 use crate::report::{CurvesFile, FittedCurve, SignalsFile};
 use nav_sim_signal::imu::{Axis, Sensor};
-use nav_sim_signal::wavelet::{Convention, Curve, QuantizationResponse, Tuning};
+use nav_sim_signal::wavelet::{Curve, QuantizationResponse, Tuning};
 use std::fmt::Display;
 use std::path::Path;
 
@@ -171,7 +171,7 @@ fn quantization(
         return Ok(None);
     };
     // The efficiency in a file is the true one, which the other convention puts a little beyond the range.
-    let tuning = Tuning::new(efficiency.clamp(0.3, 0.99), Convention::Exact);
+    let tuning = Tuning::new(efficiency.clamp(0.3, 0.99));
     match tuning {
         Ok(tuning) if efficiency > 0.0 && efficiency <= 1.0 => Ok(Some(*tuning.quantization())),
         _ => part.refused("efficiency", efficiency, "a number above 0, up to 1"),

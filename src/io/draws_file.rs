@@ -75,8 +75,8 @@ pub(crate) fn of_recordings(
     seed: u64,
 ) -> Result<Option<Draws>, String> {
     usable_as(path, &file.model, rate_hz, &|run, centre| {
-        let about = |spread: &Spread| spread.draw_about(&centre, &file.model, seed, run).ok();
-        file.spread.as_ref().and_then(about).unwrap_or(centre)
+        let about = |spread: &Spread| spread.draw_about(&centre, &file.model, seed, run);
+        file.spread.as_ref().map(about).unwrap_or(centre)
     })
 }
 

@@ -42,7 +42,7 @@ impl Archive {
 
     /// Names of the arrays, in the order of the archive.
     pub fn names(&self) -> Vec<String> {
-        let names = self.0.file_names().flatten();
+        let names = self.0.file_names();
         names
             .filter_map(|name| Some(name.strip_suffix(ENDING)?.to_owned()))
             .collect()

@@ -112,20 +112,14 @@ COMMANDS = [
         "kalibr openvins vins gtsam px4 ardupilot kf-gins navego psins gnss-ins-sim pyins matlab "
         "lio-sam fast-lio gazebo ros-imu-covariance").split()],
     ("export.json", f"export {MEMS} --target kalibr --policy envelope --horizon 1s:30s --format json"),
-    ("plan.json", "batch plan examples/quick_study.toml --dry-run --seed 1 --format json"),
-    ("planned", "batch plan examples/quick_study.toml --seed 1 -o study"),
-    ("shard", "batch run examples/quick_study.toml --shard 0/2 -o study"),
-    ("status.json", "batch status examples/quick_study.toml --format json -o study"),
-    ("study", "batch run examples/quick_study.toml -o study"),
-    ("study/results", "batch merge examples/quick_study.toml --state all --format json -o study"),
-    ("lincov_study/results", "batch plan lincov_study.toml --seed 1 -o lincov_study"
-     " && batch run lincov_study.toml -o lincov_study && batch merge lincov_study.toml --format json -o lincov_study"),
+    ("study", "batch examples/quick_study.toml --set seed=1 --format json -o @"),
+    ("lincov_study", "batch lincov_study.toml --set seed=1 -o @"),
     ("choice", f"choose recordings --trajectory {QUICK} --outage 30:40 --estimator awv,dr-awv --model N1 --filter 15"
      " --inflate none,x10 --runs 8 --seed 1 --format json -o @"),
     ("design.json", f"design {TACTICAL} --recordings 4 --hours 1 --draws 40 --trajectory {QUICK} --outage 30:50 --seed 1"
      " --format json"),
-    ("require.json", f"require {QUICK} {TACTICAL} --outage 30:50 --p95-m 1 --format json"),
-    ("needed.toml", f"require {QUICK} --outage 30:50 --rmse-m 20 --format json -o @"),
+    ("require.json", f"require {QUICK} {TACTICAL} --outage 30:50 --require p95_m<=1 --format json"),
+    ("needed.toml", f"require {QUICK} --outage 30:50 --require rmse_m<=20 --format json -o @"),
     ("tuned.toml", f"tune {TACTICAL} --truth {MEMS} --trajectory {QUICK} --outage 30:50 --seed 1 --format json -o @"),
 ]
 
@@ -199,15 +193,10 @@ def written(place, name):
 def figures(program, place, name, arguments):
     """Figures of all outputs of a command, by path."""
     words = [word.strip("'") for word in re.findall(r"'[^']*'|\S+", arguments.replace("@", name))]
-    found, printed = {}, ""
-    while words:
-        end = words.index("&&") if "&&" in words else len(words)
-        call, words = words[:end], words[end + 1 :]
-        done = subprocess.run([program, *call, "-j", "2", "--no-progress", "--quiet"], cwd=place, capture_output=True, text=True)
-        printed = done.stdout
-        found[f"{name}/exit code of {call[0]}"] = done.returncode
-        if done.returncode not in (0, 3):
-            print(f"{name}: exit code {done.returncode}\n  {' '.join(call)}\n  {done.stderr.strip()[:2000]}")
+    done = subprocess.run([program, *words, "-j", "2", "--no-progress", "--quiet"], cwd=place, capture_output=True, text=True)
+    printed, found = done.stdout, {f"{name}/exit code of {words[0]}": done.returncode}
+    if done.returncode not in (0, 3):
+        print(f"{name}: exit code {done.returncode}\n  {' '.join(words)}\n  {done.stderr.strip()[:2000]}")
     if "--format json" in arguments and printed:
         found |= figures_of("stdout.json", printed, f"{name}/stdout")
     elif printed and name.endswith((".csv", ".tex")):
@@ -218,9 +207,8 @@ def figures(program, place, name, arguments):
 
 
 def chosen(only):
-    """Commands as they are now spelled, by name: those asked for, and those whose files they read."""
-    now = {name: MAP["commands"].get(name, arguments) for name, arguments in COMMANDS if name not in {**MAP["deleted"], **MAP["moved"]}}
-    now |= {name: arguments for name, arguments in MAP["commands"].items() if name not in now and name not in MAP["deleted"]}
+    """Commands by name: those asked for, and those whose files they read."""
+    now = dict(COMMANDS)
     wanted = {name for name in now if only in name}
     for name in reversed(now):
         readers = " ".join(arguments for other, arguments in now.items() if other in wanted)

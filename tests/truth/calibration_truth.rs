@@ -5,7 +5,7 @@ use nav_sim::signal::noise::{
     Ar1, Composite, Drift, GaussMarkov, Ma1, Process, Quantization, RandomWalk, White,
 };
 use nav_sim::signal::wavelet;
-use nav_sim::signal::wavelet::{Convention, Curve, Tuning};
+use nav_sim::signal::wavelet::{Curve, Tuning};
 use nav_sim_signal::wavelet::{coefficient_count, interval};
 use serde_json::Value;
 
@@ -85,7 +85,7 @@ fn robust_constants() {
     let values = truth["values"].as_object().unwrap();
     assert_eq!(values.len(), 6);
     for (efficiency, row) in values {
-        let tuning = Tuning::new(efficiency.parse().unwrap(), Convention::Exact).unwrap();
+        let tuning = Tuning::new(efficiency.parse().unwrap()).unwrap();
         assert_relative(tuning.c(), row["c"].as_f64().unwrap(), 1e-12, efficiency);
         assert_relative(tuning.a(), row["a"].as_f64().unwrap(), 1e-12, efficiency);
     }
@@ -98,7 +98,7 @@ fn wavelet_variance_of_a_signal() {
     let signal: Vec<f64> = text.lines().skip(1).map(|l| l.parse().unwrap()).collect();
     assert_eq!(signal.len(), 4096);
     let truth = &truth("wv_4096.json")["signals"]["clean"];
-    let tuning = Tuning::new(0.6, Convention::Exact).unwrap();
+    let tuning = Tuning::new(0.6).unwrap();
     let (classical, robust) = wavelet::both(&signal, 11, &tuning).unwrap();
     assert_eq!(classical, wavelet::classical(&signal, 11).unwrap());
     let comparable = truth["robust_comparable"].as_array().unwrap();

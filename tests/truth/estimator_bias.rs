@@ -8,12 +8,12 @@ use nav_sim::signal::noise::{
     Ar1, Composite, Process, Quantization, RandomWalk, Synthesizer, White,
 };
 use nav_sim::signal::rng::StreamKey;
-use nav_sim::signal::wavelet::{Convention, Curve, Tuning, both};
+use nav_sim::signal::wavelet::{Curve, Tuning, both};
 use nav_sim_calibration::trend;
 use rayon::prelude::*;
 
 fn tuning() -> Tuning {
-    Tuning::new(0.6, Convention::Exact).unwrap()
+    Tuning::new(0.6).unwrap()
 }
 
 /// WN + QN + RW with a share of quantization noise at the first scale: 1.5 q2 of 1.5 q2 + sigma2/2.

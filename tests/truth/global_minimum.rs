@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use nav_sim::calibration::{ModelSpec, Weighting, fit};
 use nav_sim::signal::noise::{Ar1, Composite, Process, Quantization, RandomWalk, White};
 use nav_sim::signal::rng::{Generator, StreamKey};
-use nav_sim::signal::wavelet::{Convention, Curve, Tuning, both};
+use nav_sim::signal::wavelet::{Curve, Tuning, both};
 use nav_sim_signal::wavelet::interval;
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -211,7 +211,7 @@ fn simulate(model: &Composite, samples: usize, generator: &mut Generator) -> Vec
 
 /// What is wrong with the fits of so many curves, alternately of N1 and N2.
 fn failures(cases: u64, robust: bool) -> Vec<String> {
-    let tuning = Tuning::new(0.6, Convention::Exact).unwrap();
+    let tuning = Tuning::new(0.6).unwrap();
     let failure = |case: u64| {
         let key = StreamKey {
             seed: 42,

@@ -15,7 +15,6 @@ mod design {
     use nav_sim::signal::noise::*;
     use nav_sim::signal::noise::{Composite, Law, Process, Variation};
     use nav_sim::signal::rng::*;
-    use nav_sim::signal::wavelet::Convention;
     use nav_sim::signal::wavelet::*;
     use rand::{Rng, RngExt};
 
@@ -54,7 +53,7 @@ mod design {
             estimators: vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv],
             spec: ModelSpec::n1(),
             trim: Trim::Count(1),
-            tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
+            tuning: Tuning::new(0.6).unwrap(),
             weighting: Weighting::Edof,
         }
     }
@@ -257,7 +256,7 @@ mod target {
         };
         let n = 20_000_u32;
         let drawn: Vec<Composite> = (0..n)
-            .map(|i| spread.draw(&model, 3, i.into()).unwrap().axes[0].clone())
+            .map(|i| spread.draw(&model, 3, i.into()).axes[0].clone())
             .collect();
         for (j, exact) in (1..).zip(exact) {
             let nu: Vec<f64> = drawn.iter().map(|m| m.haar_wv(j)).collect();
@@ -338,7 +337,7 @@ mod target {
         };
         let n = 8000_u32;
         let first_scale = |run: u32| {
-            let drawn = spread.draw(&model, 1, run.into()).unwrap();
+            let drawn = spread.draw(&model, 1, run.into());
             let key = StreamKey {
                 seed: 1,
                 scenario: "",

@@ -1,11 +1,10 @@
 //! Averages of replicates, by hand and on coarse steps.
 
 use super::*;
-use crate::wavelet::Convention;
 use approx::assert_relative_eq;
 
 fn tuning() -> Tuning {
-    Tuning::new(0.6, Convention::Exact).unwrap()
+    Tuning::new(0.6).unwrap()
 }
 
 fn replicate(samples: usize, classical: f64, robust: f64) -> Replicate {

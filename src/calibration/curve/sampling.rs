@@ -586,7 +586,7 @@ mod shape_tests {
 mod implied_tests {
     use super::*;
     use crate::noise::{Ar1, Quantization, RandomWalk, White};
-    use crate::wavelet::{Convention, Tuning};
+    use crate::wavelet::Tuning;
 
     fn model(values: [f64; 5]) -> Composite {
         Composite::new(vec![
@@ -602,7 +602,7 @@ mod implied_tests {
     fn gradients_are_the_differences() {
         let values = [1.0, 0.6, 0.95, 0.02, 1e-4];
         let levels: Vec<u32> = (1..=10).collect();
-        let tuning = Tuning::new(0.6, Convention::Exact).unwrap();
+        let tuning = Tuning::new(0.6).unwrap();
         for quantization in [None, Some(*tuning.quantization())] {
             let curve = Curve {
                 levels: levels.clone(),

@@ -103,9 +103,9 @@ fn few_coefficients_scatter_as_said() {
 /// polynomials beyond the fourth. Independent coefficients of efficiency 0.6 would scatter by 28 % more.
 #[test]
 fn robust_variances_scatter_as_said() {
-    use crate::wavelet::{Convention, both};
+    use crate::wavelet::both;
     const SIGNALS: usize = 1000;
-    let tuning = Tuning::new(0.6, Convention::Exact).unwrap();
+    let tuning = Tuning::new(0.6).unwrap();
     let law = SamplingLaw::new(
         &Composite::new(vec![Process::White(White::new(1.0).unwrap())]),
         6,

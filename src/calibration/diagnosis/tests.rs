@@ -5,7 +5,7 @@ use crate::curve::{Estimator, Replicate};
 use crate::imu::{Axis, Channel, Sensor};
 use crate::outcome::Settings;
 use crate::rng::{Generator, StreamKey};
-use crate::wavelet::{Convention, Tuning, both};
+use crate::wavelet::{Tuning, both};
 use crate::{ModelChoice, Pool, Trim, Weighting, calibrate, grouped, trend};
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -17,7 +17,7 @@ fn settings() -> Settings {
         estimators: vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv],
         model: ModelChoice::Given("WN+RW".parse().unwrap()),
         trim: Trim::Count(1),
-        tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
+        tuning: Tuning::new(0.6).unwrap(),
         weighting: Weighting::Edof,
         fit_range: None,
         rate_hz: 1.0,

@@ -346,7 +346,7 @@ mod inference_tests {
     use super::{like, *};
     use crate::imu::{Axis, Channel, Sensor};
     use crate::noise::{Composite, Model, Process, RandomWalk, VirtualImu, White};
-    use crate::wavelet::{Convention, Tuning, classical};
+    use crate::wavelet::{Tuning, classical};
     use crate::{
         ModelChoice, Pool, Replicate, Trim, Weighting, calibrate, grouped, infer, replicates,
     };
@@ -364,7 +364,7 @@ mod inference_tests {
             estimators: vec![Estimator::Awv],
             model: ModelChoice::Given(spec.parse().unwrap()),
             trim: Trim::Count(0),
-            tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
+            tuning: Tuning::new(0.6).unwrap(),
             weighting: Weighting::Edof,
             fit_range: None,
             rate_hz: 1.0,

@@ -736,7 +736,7 @@ mod spread_tests;
 mod alike_tests {
     use super::*;
     use crate::noise::{Composite, Process, RandomWalk, White};
-    use crate::wavelet::{Convention, Tuning, both};
+    use crate::wavelet::{Tuning, both};
     use rand::RngExt;
     use rand_distr::StandardNormal;
 
@@ -744,7 +744,7 @@ mod alike_tests {
     const GAMMA2: f64 = 1e-4;
 
     fn tuning() -> Tuning {
-        Tuning::new(0.6, Convention::Exact).unwrap()
+        Tuning::new(0.6).unwrap()
     }
 
     /// Signals of white noise and random walk, their white noise of standard deviation e^(spread/2 · N(0, 1)).

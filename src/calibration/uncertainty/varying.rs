@@ -430,7 +430,7 @@ mod indistinct_tests {
     use crate::imu::{Axis, Channel, Sensor};
     use crate::noise::{Parameter, ParameterRef};
     use crate::rng::StreamKey;
-    use crate::wavelet::{Convention, Tuning, classical};
+    use crate::wavelet::{Tuning, classical};
     use crate::*;
     use rand::RngExt;
     use rand_distr::StandardNormal;
@@ -443,7 +443,7 @@ mod indistinct_tests {
             estimators: vec![Estimator::Awv],
             model: ModelChoice::Given(model.parse().unwrap()),
             trim: Trim::Count(0),
-            tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
+            tuning: Tuning::new(0.6).unwrap(),
             weighting: Weighting::Edof,
             fit_range: None,
             rate_hz: 1.0,

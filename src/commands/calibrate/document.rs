@@ -20,7 +20,6 @@ use nav_sim_signal::noise::practical::Horizon;
 use nav_sim_signal::noise::{
     Composite, Law, LognormalIntervals, Parameter, ParameterRef, Process, Spread, Variation,
 };
-use nav_sim_signal::wavelet::Convention;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -1147,7 +1146,6 @@ impl CalibrationNote {
             "fit_range_s": settings.fit_range.map(|range| [range.from_s, range.to_s]),
             "seed": self.seed.map(seed),
             "efficiency": is_robust.then(|| settings.tuning.efficiency()),
-            "efficiency_convention": is_robust.then(|| Convention::Exact.name()),
             "fits": outcomes.iter().map(fit).collect::<Vec<_>>(),
             "inputs": self.inputs,
             "curves_blake3": curves,

@@ -264,13 +264,8 @@ impl Run {
             );
         };
         let of_run = |run| {
-            continuous::at_rate(
-                &spread
-                    .draw(&file.model, seed, run)
-                    .expect("the spread was read with its model"),
-                scenario.imu.rate_hz,
-            )
-            .refuse_within(format!("a model drawn from the [spread] of {path}"))
+            continuous::at_rate(&spread.draw(&file.model, seed, run), scenario.imu.rate_hz)
+                .refuse_within(format!("a model drawn from the [spread] of {path}"))
         };
         (0..scenario.run.runs).map(of_run).collect()
     }

@@ -254,7 +254,7 @@ fn read_laws(
             .map_err(|e| refuse_law(source, &key, &e))?;
             if into
                 .iter()
-                .any(|v| v.process() == process && v.parameter() == parameter)
+                .any(|v| (v.process.as_str(), v.of.parameter.name()) == (process, parameter))
             {
                 let key = format!("{key}.parameter");
                 return Err(source.refused(&key, "of this process already has a law"));

@@ -119,7 +119,7 @@ fn laws(file: &ModelFile, channel: Channel) -> Option<Vec<String>> {
 }
 
 fn law(v: &Variation) -> String {
-    let constants = match v.law() {
+    let constants = match v.law {
         Law::Beta { a, b, low, width } => {
             format!(
                 "distribution = \"beta\"\na = {a:?}\nb = {b:?}\nlow = {low:?}\nwidth = {width:?}"
@@ -144,7 +144,7 @@ fn law(v: &Variation) -> String {
     };
     format!(
         "process = \"{}\"\nparameter = \"{}\"\n{constants}\n",
-        v.process(),
-        v.parameter()
+        v.process,
+        v.of.parameter.name()
     )
 }

@@ -11,6 +11,7 @@ use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use smallvec::{SmallVec, smallvec};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::TAU;
 
@@ -35,7 +36,7 @@ pub struct Fix {
 
 impl Ekf {
     /// The scalars of a fix: position, then velocity where it is measured.
-    fn scalars_of(&self, fix: &Fix) -> Vec<Scalar> {
+    fn scalars_of(&self, fix: &Fix) -> SmallVec<[Scalar; 6]> {
         let antenna = Antenna::new(&self.nominal, self.omega_ib_b, fix.lever_arm_b);
         let z = antenna.innovation(&self.nominal, fix);
         let sigmas = [fix.pos_sigma_m, fix.vel_sigma_m_s];
@@ -133,6 +134,9 @@ pub fn update(ekf: &mut Ekf, fix: &Fix) -> Lanes {
 /// What a scalar measurement found: estimate less measured, and the variance that the filter states of that.
 type Innovation = [Lanes; 2];
 
+/// Of the scalars of a fix.
+type Innovations = SmallVec<[Innovation; 6]>;
+
 /// Normalised innovation squared.
 fn nis([z, s]: Innovation) -> Lanes {
     z * z / s
@@ -148,7 +152,7 @@ struct Scalar {
 }
 
 /// Uses scalars in sequence, then corrects the nominal state; returns the innovation of each.
-fn use_scalars(ekf: &mut Ekf, scalars: &[Scalar]) -> Vec<Innovation> {
+fn use_scalars(ekf: &mut Ekf, scalars: &[Scalar]) -> Innovations {
     settle(ekf);
     ekf.scratch.error.fill(Lanes::ZERO);
     let found = dispatch(ekf.level, UseScalars { ekf, scalars });
@@ -162,10 +166,10 @@ struct UseScalars<'a> {
 }
 
 impl Kernel for UseScalars<'_> {
-    type Output = Vec<Innovation>;
+    type Output = Innovations;
     #[inline(always)]
-    fn run<W: Wide>(self) -> Vec<Innovation> {
-        let mut found = vec![[Lanes::ZERO; 2]; self.scalars.len()];
+    fn run<W: Wide>(self) -> Innovations {
+        let mut found = Innovations::from_elem([Lanes::ZERO; 2], self.scalars.len());
         for (scalar, [z, s]) in self.scalars.iter().zip(&mut found) {
             let (innovation, variance) = self.ekf.take::<W>(scalar);
             innovation.store(z);
@@ -179,7 +183,7 @@ impl Kernel for UseScalars<'_> {
 pub(crate) fn update_height(ekf: &mut Ekf, h: &Lanes, sigma_m: f64) -> Lanes {
     // the third component of the position error is down: estimated less measured
     let height = Scalar {
-        row: vec![(3 * R + 2, Lanes::splat(1.0))],
+        row: smallvec![(3 * R + 2, Lanes::splat(1.0))],
         z: *h - ekf.nominal.h,
         variance: sigma_m * sigma_m,
     };
@@ -221,7 +225,7 @@ impl<W: Real> Antenna<W> {
 
     /// Position of the antenna: delta r_n − \[C l ×\] psi_n.
     fn position_row(&self, axis: usize) -> Row<W> {
-        let mut row = vec![(3 * R + axis, W::from(1.0))];
+        let mut row = smallvec![(3 * R + axis, W::from(1.0))];
         if self.has_arm {
             row.extend(block(PSI, Mat3::skew(-self.arm_n).0[axis]));
         }
@@ -233,7 +237,7 @@ impl Antenna<Lanes> {
     /// Velocity of the antenna: delta v_n + `of_psi` psi_n + C \[l ×\] (delta b_g + delta u ∘ regressor), u an
     /// unknown of the gyroscope.
     fn velocity_row(&self, axis: usize, sources: &Sources<'_>) -> Row<Lanes> {
-        let mut row = vec![(3 * V + axis, Lanes::splat(1.0))];
+        let mut row = smallvec![(3 * V + axis, Lanes::splat(1.0))];
         if self.has_arm {
             row.extend(block(PSI, self.of_psi.0[axis]));
             push_gyro(&mut row, self.of_bias.0[axis], sources);
@@ -282,8 +286,8 @@ pub(crate) fn fix_rows(
     })
 }
 
-/// A measurement row: states and their coefficients.
-type Row<L> = Vec<(usize, L)>;
+/// A measurement row: states and their coefficients. Sixteen are those of an antenna beside the IMU and two groups of gyroscope biases: no allocation in the time loop.
+type Row<L> = SmallVec<[(usize, L); 16]>;
 
 /// The coefficients of the three states of a block.
 fn block<L>(block: usize, coefficients: [L; 3]) -> impl Iterator<Item = (usize, L)> {
@@ -340,7 +344,7 @@ pub(crate) struct BodyVelocity {
 }
 
 /// Uses a velocity along the vehicle's axes; returns the innovation of each of its axes in sequence.
-pub(crate) fn update_body_velocity(ekf: &mut Ekf, measured: &BodyVelocity) -> Vec<Innovation> {
+pub(crate) fn update_body_velocity(ekf: &mut Ekf, measured: &BodyVelocity) -> Innovations {
     let scalars = ekf.scalars_of_velocity(measured);
     use_scalars(ekf, &scalars)
 }
@@ -370,7 +374,7 @@ impl Ekf {
         Some([self.estimates[first / 3 - BIAS].lane(0), sigma])
     }
 
-    fn scalars_of_velocity(&self, measured: &BodyVelocity) -> Vec<Scalar> {
+    fn scalars_of_velocity(&self, measured: &BodyVelocity) -> SmallVec<[Scalar; 6]> {
         let ins = &self.nominal;
         let point = Antenna::new(ins, self.omega_ib_b, measured.lever_arm_b);
         let states = self.vehicle();

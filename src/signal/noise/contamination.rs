@@ -362,46 +362,20 @@ fn scale(
     factor: f64,
     rate_hz: f64,
 ) -> Result<(), ContaminationError> {
-    let labels = noise.labels();
-    let scaled = labels.iter().position(|l| l == label).and_then(|at| {
-        let process = &noise.processes[at];
-        let value = process
-            .parameters()
-            .into_iter()
-            .find(|(n, _)| *n == parameter)?
-            .1;
-        Some((
-            at,
-            process.with_parameter(parameter, factor * value, rate_hz)?,
-        ))
-    });
-    match scaled {
-        Some((at, process)) => {
-            noise.processes[at] = process?;
-            Ok(())
-        }
-        None => {
-            let names = |(p, l): (&Process, &String)| {
-                p.parameters()
-                    .into_iter()
-                    .map(|(n, _)| format!("{l} {n}"))
-                    .collect::<Vec<_>>()
-            };
-            let known = noise
-                .processes
-                .iter()
-                .zip(&labels)
-                .flat_map(names)
-                .collect();
-            let (process, parameter) = (label.to_owned(), parameter.to_owned());
-            Err(ContaminationError::NothingToScale {
-                channel,
-                process,
-                parameter,
-                known,
-            })
-        }
-    }
+    let named = format!("{label} {parameter}");
+    let found = noise
+        .parameters()
+        .find(|(of, _)| noise.name_of(*of) == named);
+    let Some((of, value)) = found else {
+        let known = noise.parameters().map(|(of, _)| noise.name_of(of));
+        return Err(ContaminationError::NothingToScale {
+            channel,
+            process: label.to_owned(),
+            parameter: parameter.to_owned(),
+            known: known.collect(),
+        });
+    };
+    Ok(noise.set(of, factor * value, rate_hz)?)
 }
 
 fn add_ar1(x: &mut [f64], ar1: Ar1, key: StreamKey<'_>) {

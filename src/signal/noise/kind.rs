@@ -260,6 +260,18 @@ impl Process {
         self.values().last().copied().unwrap_or(0.0)
     }
 
+    /// With its amplitude times a factor. The rate (Hz) is what a GM is sampled at.
+    ///
+    /// # Errors
+    /// When that is outside its domain.
+    pub fn times(&self, factor: f64, rate_hz: f64) -> Result<Self, ParameterError> {
+        let mut values = self.values();
+        if let Some(amplitude) = values.last_mut() {
+            *amplitude *= factor;
+        }
+        self.kind().process(&values, rate_hz).unwrap_or(Ok(*self))
+    }
+
     /// The parameters as (name in model files, value).
     pub fn parameters(&self) -> Vec<(&'static str, f64)> {
         self.kind()
@@ -268,25 +280,6 @@ impl Process {
             .map(|p| p.name())
             .zip(self.values())
             .collect()
-    }
-
-    /// The same process with one parameter changed; none if it has no parameter of that name.
-    ///
-    /// # Errors
-    /// When the value is outside its domain.
-    pub fn with_parameter(
-        &self,
-        name: &str,
-        value: f64,
-        rate_hz: f64,
-    ) -> Option<Result<Self, ParameterError>> {
-        let mut values = self.values();
-        values[self
-            .kind()
-            .parameters()
-            .iter()
-            .position(|p| p.name() == name)?] = value;
-        self.kind().process(&values, rate_hz)
     }
 }
 
@@ -350,6 +343,34 @@ impl Composite {
         format!("{} {}", self.labels()[of.process], of.parameter.name())
     }
 
+    /// The value of a parameter; NaN of one that is not there.
+    pub fn value(&self, of: ParameterRef) -> f64 {
+        let mut own = self.parameters().filter(|(other, _)| *other == of);
+        own.next().map_or(f64::NAN, |(_, value)| value)
+    }
+
+    /// Changes a parameter, if it is there. The rate (Hz) is what a GM is sampled at.
+    ///
+    /// # Errors
+    /// When the value is outside its domain.
+    pub fn set(
+        &mut self,
+        of: ParameterRef,
+        value: f64,
+        rate_hz: f64,
+    ) -> Result<(), ParameterError> {
+        let process = &mut self.processes[of.process];
+        let parameters = process.kind().parameters().iter();
+        let values = parameters.zip(process.values());
+        let values: Vec<f64> = values
+            .map(|(p, old)| if *p == of.parameter { value } else { old })
+            .collect();
+        if let Some(changed) = process.kind().process(&values, rate_hz) {
+            *process = changed?;
+        }
+        Ok(())
+    }
+
     /// All parameters with their values, process by process.
     pub fn parameters(&self) -> impl Iterator<Item = (ParameterRef, f64)> + '_ {
         self.processes.iter().enumerate().flat_map(|(process, p)| {
@@ -389,12 +410,11 @@ mod tests {
 
     #[test]
     fn one_parameter_changes() {
-        let ar1 = Process::from_values("AR1", &[0.5, 2.0], 100.0)
-            .unwrap()
-            .unwrap();
-        let changed = ar1.with_parameter("phi", 0.75, 100.0).unwrap().unwrap();
-        assert_eq!(changed.parameters(), [("phi", 0.75), ("sigma2", 2.0)]);
-        assert!(ar1.with_parameter("gamma2", 1.0, 100.0).is_none());
-        assert!(ar1.with_parameter("phi", 1.0, 100.0).unwrap().is_err());
+        let ar1 = Process::from_values("AR1", &[0.5, 2.0], 100.0);
+        let mut noise = Composite::new(vec![ar1.unwrap().unwrap()]);
+        let of = noise.parameters().next().unwrap().0;
+        noise.set(of, 0.75, 100.0).unwrap();
+        assert_eq!(noise.processes[0].values(), [0.75, 2.0]);
+        assert!(noise.set(of, 1.0, 100.0).is_err() && noise.value(of) == 0.75);
     }
 }

@@ -31,7 +31,7 @@
 //! where one law stands for three axes.
 
 use super::contamination::{Contamination, RefusedRule};
-use super::{Composite, Model, Parameter, ParameterError, Process, Synthesizer};
+use super::{Composite, Model, Parameter, ParameterError, ParameterRef, Synthesizer};
 use crate::imu::{Channel, Recording, Signal};
 use crate::rng::{Generator, StreamKey};
 use rand::RngExt;
@@ -123,9 +123,13 @@ pub struct LognormalIntervals {
 /// The law of one parameter of one process of one axis.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Variation {
-    process: String,
-    parameter: String,
-    law: Law,
+    /// Label of the process, as [`Composite::labels`].
+    pub process: String,
+    /// The parameter.
+    #[serde(skip)]
+    pub of: ParameterRef,
+    /// Its law.
+    pub law: Law,
 }
 
 impl Variation {
@@ -147,41 +151,35 @@ impl Variation {
                 known: labels,
             });
         };
+        let mut own = noise.parameters().filter(|(of, _)| of.process == at);
+        let Some((of, value)) = own.find(|(of, _)| of.parameter.name() == parameter) else {
+            let known = noise.processes[at].parameters();
+            return Err(SpreadError::NoParameter {
+                process: noise.processes[at].code(),
+                parameter: parameter.to_owned(),
+                known: known.into_iter().map(|(name, _)| name).collect(),
+            });
+        };
         let variation = Self {
             process: process.to_owned(),
-            parameter: parameter.to_owned(),
+            of,
             law,
         };
         variation.check_constants()?;
-        // The domains are intervals: a beta law stays inside if its two ends do. A normal law is drawn again
-        // until inside, so only its centre must be there.
-        let (low, high) = match law {
-            Law::Beta { low, width, .. } => (low, low + width),
-            Law::Normal { .. } => {
-                let value = variation.centre(&noise.processes[at])?;
-                (value, value)
-            }
-            Law::Lognormal { median, .. } => (median, median),
+        // The domains are intervals: a beta law stays inside if its two ends do. Other laws are drawn again
+        // until inside, so only their centres must be there.
+        let ends = match law {
+            Law::Beta { low, width, .. } => [low, low + width],
+            Law::Normal { .. } => [value; 2],
+            Law::Lognormal { median, .. } => [median; 2],
         };
-        for end in [low, high] {
-            variation.applied(&noise.processes[at], end, rate_hz)?;
+        for end in ends {
+            noise
+                .clone()
+                .set(of, end, rate_hz)
+                .map_err(SpreadError::Reaches)?;
         }
         Ok(variation)
-    }
-
-    /// Label of the process, as [`Composite::labels`].
-    pub fn process(&self) -> &str {
-        &self.process
-    }
-
-    /// Name of the parameter, as [`Process::parameters`].
-    pub fn parameter(&self) -> &str {
-        &self.parameter
-    }
-
-    /// Its law.
-    pub const fn law(&self) -> Law {
-        self.law
     }
 
     fn check_constants(&self) -> Result<(), SpreadError> {
@@ -204,11 +202,13 @@ impl Variation {
                 check("width", width, width >= 0.0, "a finite number ≥ 0")
             }
             // Below 1, at least 47 % of the draws of a coefficient in (−1, 1) are inside: redrawing ends.
-            Law::Normal { sd } if matches!(self.parameter.as_str(), "phi" | "theta") => {
+            Law::Normal { sd }
+                if matches!(self.of.parameter, Parameter::Phi | Parameter::Theta) =>
+            {
                 check("sd", sd, (0.0..=1.0).contains(&sd), "between 0 and 1")
             }
             Law::Normal { sd } => check("sd", sd, sd >= 0.0, "a finite number ≥ 0"),
-            Law::Lognormal { .. } if self.parameter == Parameter::Theta.name() => {
+            Law::Lognormal { .. } if self.of.parameter == Parameter::Theta => {
                 Err(SpreadError::Lognormal)
             }
             Law::Lognormal { median, sd, .. } => {
@@ -224,73 +224,28 @@ impl Variation {
         }
     }
 
-    /// The error of a law for a parameter that the process does not have.
-    pub fn no_parameter(&self, process: &Process) -> SpreadError {
-        let known = process.parameters().into_iter().map(|(n, _)| n).collect();
-        SpreadError::NoParameter {
-            process: process.code(),
-            parameter: self.parameter.clone(),
-            known,
-        }
-    }
-
-    fn centre(&self, process: &Process) -> Result<f64, SpreadError> {
-        Ok(self.found(process)?.1)
-    }
-
-    /// The parameter and its value.
-    fn found(&self, process: &Process) -> Result<(Parameter, f64), SpreadError> {
-        let mut parameters = process.kind().parameters().iter().zip(process.values());
-        let found = parameters.find(|(p, _)| p.name() == self.parameter);
-        found
-            .map(|(p, value)| (*p, value))
-            .ok_or_else(|| self.no_parameter(process))
-    }
-
-    fn applied(&self, process: &Process, value: f64, rate_hz: f64) -> Result<Process, SpreadError> {
-        let changed = process.with_parameter(&self.parameter, value, rate_hz);
-        changed
-            .ok_or_else(|| self.no_parameter(process))?
-            .map_err(SpreadError::Reaches)
-    }
-
-    /// The process with this parameter drawn.
-    fn draw(
-        &self,
-        process: &Process,
-        rate_hz: f64,
-        g: &mut Generator,
-    ) -> Result<Process, SpreadError> {
-        match self.law {
-            Law::Beta { a, b, low, width } => {
-                let error = |_| SpreadError::Constant {
-                    name: "a",
-                    value: a,
-                    domain: "usable with b",
-                };
-                let share: f64 = g.sample(Beta::new(a, b).map_err(error)?);
-                self.applied(process, low + width * share, rate_hz)
-            }
-            Law::Normal { sd } => {
-                let centre = self.centre(process)?;
-                loop {
-                    match self.applied(
-                        process,
-                        centre + sd * g.sample::<f64, _>(StandardNormal),
-                        rate_hz,
-                    ) {
-                        Err(SpreadError::Reaches(_)) => {}
-                        done => return done,
-                    }
+    /// Draws this parameter of `noise`: again while it is outside its domain.
+    fn draw(&self, noise: &mut Composite, rate_hz: f64, g: &mut Generator) {
+        let parameter = self.of.parameter;
+        let centre = noise.value(self.of);
+        loop {
+            let value = match self.law {
+                Law::Beta { a, b, low, width } => {
+                    // its shapes were checked
+                    let share = Beta::new(a, b).map_or(0.5, |law| g.sample(law));
+                    low + width * share
                 }
-            }
-            Law::Lognormal {
-                median, sd: 0.0, ..
-            } => self.applied(process, median, rate_hz),
-            Law::Lognormal { median, sd, .. } => {
-                let (parameter, _) = self.found(process)?;
-                let scaled = parameter.scaled(median) + sd * g.sample::<f64, _>(StandardNormal);
-                self.applied(process, parameter.unscaled(scaled), rate_hz)
+                Law::Normal { sd } => centre + sd * g.sample::<f64, _>(StandardNormal),
+                Law::Lognormal {
+                    median, sd: 0.0, ..
+                } => median,
+                Law::Lognormal { median, sd, .. } => {
+                    let scaled = parameter.scaled(median) + sd * g.sample::<f64, _>(StandardNormal);
+                    parameter.unscaled(scaled)
+                }
+            };
+            if noise.set(self.of, value, rate_hz).is_ok() {
+                return;
             }
         }
     }
@@ -304,24 +259,14 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// The model of one replicate (counted from 0): every law drawn, from streams of its own.
-    ///
-    /// # Errors
-    /// When a law does not belong to this model ([`Variation::new`] was given another one).
-    pub fn draw(&self, model: &Model, seed: u64, replicate: u64) -> Result<Model, SpreadError> {
+    /// The model of one replicate (counted from 0) of the model that the laws are of: every law drawn, from streams of its own.
+    pub fn draw(&self, model: &Model, seed: u64, replicate: u64) -> Model {
         let mut drawn = model.clone();
         for channel in Channel::ALL {
             let source = channel.to_string();
-            let noise = &mut drawn.axes[channel.index()];
-            let labels = noise.labels();
             for variation in &self.axes[channel.index()] {
-                let Some(at) = labels.iter().position(|l| *l == variation.process) else {
-                    return Err(SpreadError::NoProcess {
-                        label: variation.process.clone(),
-                        known: labels,
-                    });
-                };
-                let process = format!("spread.{}.{}", variation.process, variation.parameter);
+                let name = variation.of.parameter.name();
+                let process = format!("spread.{}.{name}", variation.process);
                 // A stream for each law: to let one more parameter vary changes no other's draws.
                 let key = StreamKey {
                     seed,
@@ -330,47 +275,32 @@ impl Spread {
                     source: &source,
                     process: &process,
                 };
-                noise.processes[at] =
-                    variation.draw(&noise.processes[at], model.rate_hz, &mut key.generator())?;
+                let noise = &mut drawn.axes[channel.index()];
+                variation.draw(noise, model.rate_hz, &mut key.generator());
             }
         }
-        Ok(drawn)
+        drawn
     }
-}
 
-impl Spread {
-    /// The model of one replicate of another centre: what is drawn about `model`, moved as `centre` lies from it on the scale of each
-    /// parameter; parameters without a law are those of `centre`.
-    ///
-    /// # Errors
-    /// As [`Spread::draw`]; `centre` has the processes of the model.
-    pub fn draw_about(
-        &self,
-        centre: &Model,
-        model: &Model,
-        seed: u64,
-        replicate: u64,
-    ) -> Result<Model, SpreadError> {
-        let drawn = self.draw(model, seed, replicate)?;
+    /// The model of one replicate of another centre, which has the processes of the model: what is drawn about `model`, moved as
+    /// `centre` lies from it on the scale of each parameter; parameters without a law are those of `centre`.
+    pub fn draw_about(&self, centre: &Model, model: &Model, seed: u64, replicate: u64) -> Model {
+        let drawn = self.draw(model, seed, replicate);
         let mut moved = centre.clone();
         for (axis, laws) in self.axes.iter().enumerate() {
-            let labels = drawn.axes[axis].labels();
-            for variation in laws {
-                let Some(at) = labels.iter().position(|l| *l == variation.process) else {
-                    continue;
-                };
-                let value = |model: &Model| variation.found(&model.axes[axis].processes[at]);
-                let ((parameter, own), (_, from), (_, to)) =
-                    (value(&drawn)?, value(model)?, value(centre)?);
-                let scaled = parameter.scaled(own) + parameter.scaled(to) - parameter.scaled(from);
-                let process = &mut moved.axes[axis].processes[at];
+            for of in laws.iter().map(|variation| variation.of) {
+                let [own, from, to] =
+                    [&drawn, model, centre].map(|model| model.axes[axis].value(of));
+                let scaled = [own, from, to].map(|value| of.parameter.scaled(value));
+                let value = of.parameter.unscaled(scaled[0] + scaled[2] - scaled[1]);
+                let noise = &mut moved.axes[axis];
                 // An amplitude of 0 has no logarithm: what was drawn stands.
-                *process = variation
-                    .applied(process, parameter.unscaled(scaled), model.rate_hz)
-                    .or_else(|_| variation.applied(process, own, model.rate_hz))?;
+                if noise.set(of, value, model.rate_hz).is_err() {
+                    let _ = noise.set(of, own, model.rate_hz);
+                }
             }
         }
-        Ok(moved)
+        moved
     }
 }
 
@@ -389,30 +319,24 @@ pub struct VirtualImu<'a> {
     pub seed: u64,
 }
 
-/// A replicate that cannot be made.
+/// A contamination that does not fit the model or the record.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ReplicateError {
-    /// The spread does not belong to the model.
-    #[error(transparent)]
-    Spread(#[from] SpreadError),
-    /// The contamination does not fit the model or the record.
-    #[error("{source} (replicate {replicate})")]
-    Contamination {
-        /// Which replicate, counted from 1.
-        replicate: u64,
-        /// Why.
-        source: RefusedRule,
-    },
+#[error("{source} (replicate {replicate})")]
+pub struct ReplicateError {
+    /// Which replicate, counted from 1.
+    pub replicate: u64,
+    /// Why.
+    pub source: RefusedRule,
 }
 
 impl VirtualImu<'_> {
     /// The model of a replicate, counted from 1: parameters drawn, then scaled by the contamination.
     ///
     /// # Errors
-    /// When spread or contamination do not belong to the model.
+    /// When the contamination does not fit the model.
     pub fn model_of(&self, replicate: u64) -> Result<Model, ReplicateError> {
         let mut model = match self.spread {
-            Some(spread) => spread.draw(self.model, self.seed, replicate.wrapping_sub(1))?,
+            Some(spread) => spread.draw(self.model, self.seed, replicate.wrapping_sub(1)),
             None => self.model.clone(),
         };
         for channel in Channel::ALL {
@@ -422,7 +346,7 @@ impl VirtualImu<'_> {
             let (noise, rate_hz) = (&mut model.axes[channel.index()], model.rate_hz);
             contamination
                 .scale(noise, channel, replicate, rate_hz)
-                .map_err(|source| ReplicateError::Contamination { replicate, source })?;
+                .map_err(|source| ReplicateError { replicate, source })?;
         }
         Ok(model)
     }
@@ -453,7 +377,7 @@ impl VirtualImu<'_> {
         if let Some(contamination) = self.contamination {
             contamination
                 .apply(&mut out, channel, replicate, model.rate_hz, self.seed)
-                .map_err(|source| ReplicateError::Contamination { replicate, source })?;
+                .map_err(|source| ReplicateError { replicate, source })?;
         }
         Ok(out)
     }
@@ -461,7 +385,7 @@ impl VirtualImu<'_> {
     /// A replicate (counted from 1) as a recording, means removed.
     ///
     /// # Errors
-    /// When spread or contamination do not belong to the model or the record.
+    /// When the contamination does not fit the model or the record.
     pub fn recording(
         &self,
         replicate: u64,

@@ -1,6 +1,7 @@
 //! Laws, their draws and their refusals.
 
 use super::*;
+use crate::noise::Process;
 
 const RATE: f64 = 100.0;
 
@@ -22,8 +23,7 @@ fn spread(process: &str, parameter: &str, law: Law) -> Spread {
 
 fn drawn(spread: &Spread, replicates: u64, axis: usize, at: (usize, usize)) -> Vec<f64> {
     let model = Model::pooled(RATE, &n1(), &n1());
-    let value =
-        |r| spread.draw(&model, 1, r).unwrap().axes[axis].processes[at.0].parameters()[at.1].1;
+    let value = |r| spread.draw(&model, 1, r).axes[axis].processes[at.0].parameters()[at.1].1;
     (0..replicates).map(value).collect()
 }
 
@@ -59,7 +59,7 @@ fn normal_is_truncated_to_the_domain() {
     spread.axes[0].push(variation);
     let model = Model::pooled(RATE, &noise, &noise);
     let x: Vec<f64> = (0..4000)
-        .map(|r| spread.draw(&model, 1, r).unwrap().axes[0].processes[0].parameters()[0].1)
+        .map(|r| spread.draw(&model, 1, r).axes[0].processes[0].parameters()[0].1)
         .collect();
     let n = x.len() as f64;
     let (mean, pi) = (x.iter().sum::<f64>() / n, std::f64::consts::PI);
@@ -138,10 +138,7 @@ fn draws_move_with_their_centre() {
     centre.axes[0].processes[1] = Process::from_values("AR1", &[0.985_f64.powi(2), 3e-8], RATE)
         .unwrap()
         .unwrap();
-    let (own, moved) = (
-        s.draw(&model, 1, 5).unwrap(),
-        s.draw_about(&centre, &model, 1, 5).unwrap(),
-    );
+    let (own, moved) = (s.draw(&model, 1, 5), s.draw_about(&centre, &model, 1, 5));
     let value = |m: &Model, p: usize, v: usize| m.axes[0].processes[p].values()[v];
     assert!((value(&moved, 0, 0) / value(&own, 0, 0) - 2.0).abs() < 1e-12);
     assert!((value(&moved, 1, 0).ln() / value(&own, 1, 0).ln() - 2.0).abs() < 1e-12);

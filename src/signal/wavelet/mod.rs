@@ -18,7 +18,7 @@ pub mod robust;
 
 pub use gappy::{Gappy, gappy};
 pub use haar::{Curve, classical};
-pub use robust::{Convention, QuantizationResponse, RobustVariance, Status, Tuning, both};
+pub use robust::{QuantizationResponse, RobustVariance, Status, Tuning, both};
 
 /// Why there is no wavelet variance.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -509,20 +509,8 @@ fn second_difference() -> Vec<(f64, f64)> {
 // Tuning of the robust wavelet variance: Tukey's biweight constant for a wanted efficiency.
 //
 // chi(r) = r²(1 − (r/c)²)⁴ on |r| ≤ c. With Z standard normal: a = E chi(Z), M = E\[Z² chi(Z)\] − a,
-// Q = E chi(Z)² − a², efficiency = M²/(2Q) ([Mondal and Percival](crate::bibliography::MondalPercival12)).
-
-/// Rule by which the constant follows from the efficiency.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Convention {
-    /// From the definition.
-    #[default]
-    Exact,
-    /// As the R packages wv, gmwm and simts compute it: the last but one term of Q has the wrong sign, so
-    /// that their "0.6" is c = 4.973 and an efficiency of 0.727. To reproduce their numbers.
-    Wv,
-}
-
-crate::named!(Convention { Exact = "exact", Wv = "wv" }, in files);
+// Q = E chi(Z)² − a², efficiency = M²/(2Q) ([Mondal and Percival](crate::bibliography::MondalPercival12)). The R packages wv, gmwm and
+// simts have the last but one term of Q with the wrong sign: their "0.6" is c = 4.973 and an efficiency of 0.727.
 
 /// From this c on the efficiency grows with c.
 const BRANCH: f64 = 2.6;
@@ -538,7 +526,7 @@ pub struct Tuning {
 
 impl Default for Tuning {
     fn default() -> Self {
-        Self::new(Self::DEFAULT_EFFICIENCY, Convention::Exact).expect("an efficiency in the range")
+        Self::new(Self::DEFAULT_EFFICIENCY).expect("an efficiency in the range")
     }
 }
 
@@ -554,7 +542,7 @@ impl Tuning {
     ///
     /// # Errors
     /// When the efficiency is out of this range.
-    pub fn new(efficiency: f64, convention: Convention) -> Result<Self, WaveletError> {
+    pub fn new(efficiency: f64) -> Result<Self, WaveletError> {
         if !(Self::EFFICIENCIES.0..=Self::EFFICIENCIES.1).contains(&efficiency) {
             return Err(WaveletError::Efficiency(efficiency));
         }
@@ -565,18 +553,16 @@ impl Tuning {
             && low < middle
             && middle < high
         {
-            if Moments::new(middle).efficiency(convention) < efficiency {
+            if Moments::new(middle).efficiency() < efficiency {
                 low = middle;
             } else {
                 high = middle;
             }
         }
         let moments = Moments::new(high);
-        // The true efficiency, also under the convention of R: the degrees of freedom follow from it, not
-        // from the label.
-        let (efficiency, a) = (moments.efficiency(Convention::Exact), moments.chi());
+        let a = moments.chi();
         Ok(Self {
-            efficiency,
+            efficiency: moments.efficiency(),
             c: high,
             a,
             quantization: QuantizationResponse::new(high, a),
@@ -659,15 +645,10 @@ impl Moments {
         1.0 + 2.0 * covariance / variance - second / first
     }
 
-    fn efficiency(&self, convention: Convention) -> f64 {
+    fn efficiency(&self) -> f64 {
         let a = self.chi();
         let m = self.bump(2, 4) - a;
-        let slip = match convention {
-            Convention::Exact => 0.0,
-            // The term of Q in Z^18 is −8 E[Z^18]/c^14; theirs has a plus, 16 of it too much.
-            Convention::Wv => 16.0 * self.even[9] / self.c.powi(14),
-        };
-        let q = self.bump(2, 8) - a * a + slip;
+        let q = self.bump(2, 8) - a * a;
         m * m / (2.0 * q)
     }
 }
@@ -680,12 +661,12 @@ mod robust_tests;
 mod quantization_tests {
     use super::m_scale;
     use crate::rng::Generator;
-    use crate::wavelet::{Convention, Tuning};
+    use crate::wavelet::Tuning;
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
 
     fn tuning() -> Tuning {
-        Tuning::new(0.6, Convention::Exact).unwrap()
+        Tuning::new(0.6).unwrap()
     }
 
     /// Simulated with 2·10⁷ draws by an independent program, known to √(2/0.6/2·10⁷) = 4.1e-4, four of which are allowed.
@@ -722,7 +703,7 @@ mod quantization_tests {
         const SAMPLES: usize = 800;
         let mut generator = Generator::seed_from_u64(3);
         for (efficiency, share) in [(0.6, 0.5), (0.6, 1.0), (0.9, 1.0), (0.4, 0.8)] {
-            let t = Tuning::new(efficiency, Convention::Exact).unwrap();
+            let t = Tuning::new(efficiency).unwrap();
             let mut square = || {
                 let mut uniform = || generator.random::<f64>();
                 let y = std::f64::consts::SQRT_2 * (uniform() - 2.0 * uniform() + uniform());
@@ -756,23 +737,19 @@ mod tuning_tests {
 
     /// Published by the R package wv, as its source computes them.
     #[test]
-    fn the_convention_of_wv_reproduces_its_constants() {
-        let t = Tuning::new(0.6, Convention::Wv).unwrap();
-        assert_relative_eq!(t.c(), 4.973362, max_relative = 1e-6);
-        assert_relative_eq!(t.a(), 0.636724, max_relative = 1e-6);
-        assert_relative_eq!(t.efficiency(), 0.727, max_relative = 1e-3);
+    fn constants_of_the_package_wv() {
+        let its = Moments::new(4.973362);
+        assert_relative_eq!(its.chi(), 0.636724, max_relative = 1e-6);
+        assert_relative_eq!(its.efficiency(), 0.727, max_relative = 1e-3);
     }
 
     #[test]
     fn efficiencies_without_a_constant_are_refused() {
         for efficiency in [f64::NAN, 0.0, 0.29, 0.995, 1.0, 60.0] {
-            assert!(
-                Tuning::new(efficiency, Convention::Exact).is_err(),
-                "{efficiency}"
-            );
+            assert!(Tuning::new(efficiency).is_err(), "{efficiency}");
         }
         for efficiency in [0.3, 0.99] {
-            let t = Tuning::new(efficiency, Convention::Exact).unwrap();
+            let t = Tuning::new(efficiency).unwrap();
             assert_relative_eq!(t.efficiency(), efficiency, max_relative = 1e-12);
         }
     }

@@ -2,13 +2,12 @@
 
 use super::*;
 use crate::rng::Generator;
-use crate::wavelet::Convention;
 use approx::assert_relative_eq;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 
 fn tuning() -> Tuning {
-    Tuning::new(0.6, Convention::Exact).unwrap()
+    Tuning::new(0.6).unwrap()
 }
 
 fn normals(n: usize) -> Vec<f64> {

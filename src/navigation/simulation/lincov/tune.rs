@@ -699,15 +699,8 @@ fn times(process: &Process, on_variance: f64, rate_hz: f64) -> Process {
     } else {
         on_variance
     };
-    let changed = process
-        .with_parameter(
-            process.kind().amplitude().name(),
-            process.amplitude() * factor,
-            rate_hz,
-        )
-        .and_then(Result::ok);
     // beyond the largest number nothing is left to enlarge
-    changed.unwrap_or(*process)
+    process.times(factor, rate_hz).unwrap_or(*process)
 }
 
 // Where a function that falls crosses zero.
