@@ -71,9 +71,7 @@ fn variances(
     efficiency: Option<f64>,
 ) -> Result<Variances, WaveletError> {
     let levels = scales.unwrap_or_else(|| default_levels(signal.len()));
-    let tuning = efficiency
-        .map(|efficiency| Tuning::new(efficiency))
-        .transpose()?;
+    let tuning = efficiency.map(Tuning::new).transpose()?;
     let (wv, coverage) = if signal.iter().any(|x| x.is_nan()) {
         let found = gappy(signal, levels, &tuning.unwrap_or_default())?;
         (
