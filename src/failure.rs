@@ -85,6 +85,11 @@ impl From<usize> for Place {
 /// The result of a command or of a part of it.
 pub type Result<T, E = Failure> = std::result::Result<T, E>;
 
+/// Refuses input (exit code 2), with what helps.
+pub(crate) fn refused<T>(message: impl ToString, hint: impl Into<Cow<'static, str>>) -> Result<T> {
+    Err(Failure::input(message).hint(hint))
+}
+
 impl std::error::Error for Failure {}
 
 impl Failure {

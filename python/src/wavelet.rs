@@ -57,9 +57,7 @@ fn variances(
     efficiency: Option<f64>,
 ) -> Result<Columns, WaveletError> {
     let levels = scales.unwrap_or_else(|| default_levels(signal.len()));
-    let tuning = efficiency
-        .map(|efficiency| Tuning::new(efficiency))
-        .transpose()?;
+    let tuning = efficiency.map(Tuning::new).transpose()?;
     let values = |robust: Vec<RobustVariance>| robust.iter().map(|r| r.value).collect();
     let mut coverage = vec![1.0; levels as usize];
     let wv: Vec<f64> = if signal.iter().any(|x| x.is_nan()) {

@@ -41,6 +41,9 @@ pub enum Out {
     },
 }
 
+/// Files that a command reads, by their roles.
+pub type Inputs = Vec<(&'static str, PathBuf)>;
+
 /// A command: options, inputs, answer.
 pub trait Command: clap::Args + Send + Sync + 'static {
     /// Its answer.
@@ -62,7 +65,7 @@ pub trait Command: clap::Args + Send + Sync + 'static {
     ///
     /// # Errors
     /// When a directory cannot be listed or options do not fit together.
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>>;
+    fn inputs(&self) -> Result<Inputs>;
 
     /// Reads the files and answers; writes nothing.
     ///

@@ -80,6 +80,11 @@ impl<'a> Context<'a> {
         self.note(Importance::Warning, text);
     }
 
+    /// Warns of each.
+    pub(crate) fn warn_each(&self, texts: impl IntoIterator<Item: Display>) {
+        texts.into_iter().for_each(|text| self.warn(text));
+    }
+
     /// Remarks what is worth knowing at once.
     pub fn remark(&self, text: impl Display) {
         self.note(Importance::Remark, text);

@@ -1,6 +1,6 @@
 //! Inputs that several commands share: files, settings, outages.
 
-use super::{Context, Failure, Refuse, Result};
+use super::{Context, Failure, Inputs, Refuse, Result, refused};
 use crate::io::model_file::{self, ModelFile, TurnOn};
 use crate::io::recordings::{self, ReadOptions};
 use crate::io::toml_file::Source;
@@ -21,7 +21,7 @@ use std::str::FromStr;
 /// A trajectory; where no vehicle moves so.
 pub(crate) fn trajectory(path: &Path, context: &Context<'_>) -> Result<Trajectory> {
     let (trajectory, warnings) = trajectory_file::load(path, &trajectory_file::Options::default())?;
-    warnings.iter().for_each(|doubt| context.warn(doubt));
+    context.warn_each(&warnings);
     let (_, beyond) = examine(&trajectory, &LIMITS);
     let farthest = |e: &&Excess| e.worst / e.limit;
     if let Some(worst) = beyond
@@ -43,9 +43,7 @@ pub(crate) fn trajectory(path: &Path, context: &Context<'_>) -> Result<Trajector
 /// A model; the axes that it does not name.
 pub(crate) fn model(path: &Path, context: &Context<'_>) -> Result<ModelFile> {
     let file = model_file::read(path)?;
-    file.doubts(path)
-        .iter()
-        .for_each(|doubt| context.warn(doubt));
+    context.warn_each(file.doubts(path));
     Ok(file)
 }
 
@@ -84,10 +82,7 @@ pub(crate) fn recordings(
         ..ReadOptions::default()
     };
     let (recordings, report) = recordings::read(paths, &options)?;
-    report
-        .all_warnings()
-        .iter()
-        .for_each(|doubt| context.warn(doubt));
+    context.warn_each(report.all_warnings());
     report
         .files
         .iter()
@@ -103,10 +98,7 @@ pub(crate) fn placed(
     context: &Context<'_>,
 ) -> Result<Vec<Outage>> {
     let placed = scenario.outages_on((trajectory.start_s(), trajectory.end_s()), seed)?;
-    placed
-        .remarks
-        .into_iter()
-        .for_each(|remark| context.warn(remark));
+    context.warn_each(placed.remarks);
     Ok(placed.windows)
 }
 
@@ -144,7 +136,7 @@ fn tell_turn_on(who: &str, set: [Option<f64>; 2], path: &Path, context: &Context
 
 /// States of the filter.
 #[derive(clap::Args, Debug, Clone)]
-pub struct FilterArgs {
+pub(crate) struct FilterArgs {
     /// States of the filter: 15 (one bias per axis, to which the model is reduced), 21 (and a scale factor per axis)
     /// or full (a bias state for each process) [default: 15]
     #[arg(long = "filter", value_name = "STATES")]
@@ -176,7 +168,7 @@ impl FilterArgs {
 
 /// A value of `--outage`: a window, or that there is none.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum OutageFlag {
+pub(crate) enum OutageFlag {
     /// Not even the default ones.
     None,
     /// A window without fixes.
@@ -198,8 +190,10 @@ impl FromStr for OutageFlag {
 /// The windows among the values of `--outage`, of which "none" stands alone.
 pub(crate) fn windows_of(outages: &[OutageFlag]) -> Result<Vec<Outage>> {
     if outages.len() > 1 && outages.contains(&OutageFlag::None) {
-        return Err(Failure::input("--outage none stands beside other outages")
-            .hint("give the windows, or none alone"));
+        return refused(
+            "--outage none stands beside other outages",
+            "give the windows, or none alone",
+        );
     }
     let window = |flag: &OutageFlag| match flag {
         OutageFlag::None => None,
@@ -210,7 +204,7 @@ pub(crate) fn windows_of(outages: &[OutageFlag]) -> Result<Vec<Outage>> {
 
 /// Settings in a TOML file and by key.
 #[derive(clap::Args, Debug, Clone)]
-pub struct ScenarioArgs {
+pub(crate) struct ScenarioArgs {
     /// Settings in one TOML file; flags override it (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     pub scenario: Option<PathBuf>,
@@ -239,7 +233,7 @@ impl ScenarioArgs {
 
 /// The same, with outages in the place of those of the file.
 #[derive(clap::Args, Debug, Clone)]
-pub struct SettingsArgs {
+pub(crate) struct SettingsArgs {
     /// Window without fixes, in seconds (repeatable), or "none" (default: 300:390 and 700:790)
     #[arg(id = "outage", long = "outage", value_name = "START:END")]
     pub outages: Vec<OutageFlag>,
@@ -286,10 +280,7 @@ pub(crate) fn files<'a>(
 }
 
 /// Recordings, those of directories in name order, with their role.
-pub(crate) fn listed(
-    role: &'static str,
-    paths: &[PathBuf],
-) -> Result<Vec<(&'static str, PathBuf)>> {
+pub(crate) fn listed(role: &'static str, paths: &[PathBuf]) -> Result<Inputs> {
     let found = input::listed(paths)?;
     Ok(found.into_iter().map(|path| (role, path)).collect())
 }

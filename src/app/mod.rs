@@ -6,9 +6,9 @@ pub(crate) mod inputs;
 
 pub mod reading;
 
-pub(crate) use crate::failure::Refuse;
 pub use crate::failure::{Failure, Result};
+pub(crate) use crate::failure::{Refuse, refused};
 pub use crate::io::input::Input;
-pub use command::{Answer, Answered, Asked, Command, Manifest, Out, OutputFile, answered};
+pub use command::{Answer, Answered, Asked, Command, Inputs, Manifest, Out, OutputFile, answered};
 pub(crate) use command::{argument, is_path, is_repeated};
 pub use context::{Context, DEFAULT_SEED, Front};

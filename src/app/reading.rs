@@ -37,14 +37,9 @@ pub struct ReadingRequest {
 #[derive(clap::Args, Debug, Clone)]
 pub struct LogRequest {
     /// Stamps of a log: header, of the measurement; log, of its arrival
-    #[arg(long, value_name = "WHICH", value_parser = parse::words::<Stamp>(STAMPS), default_value = "header")]
+    #[arg(long, value_name = "WHICH", value_parser = parse::one_of::<Stamp>(&["header", "log"]), default_value = "header")]
     pub stamp: Stamp,
 }
-
-const STAMPS: &[(&str, &str)] = &[
-    ("header", "Of the measurement, as the message states it"),
-    ("log", "Of arrival, as the logger states it"),
-];
 
 /// Options for reading recordings and choosing their signals.
 #[derive(clap::Args, Debug, Clone)]
@@ -53,36 +48,19 @@ pub struct RecordingRequest {
     #[command(flatten)]
     /// Options for reading them.
     pub reading: ReadingRequest,
-    /// What to do where the time jumps or stands still
-    #[arg(long, value_parser = parse::words::<Gaps>(GAPS), default_value_t = Gaps::Keep)]
+    /// What to do where the time jumps or stands still: keep leaves out what is missing, if it is less than a tenth, and
+    /// refuses the file otherwise; refuse; split makes each stretch between gaps a recording of its own (but not one 16
+    /// times shorter than the longest); ignore takes the samples as evenly spaced over the whole time: stamped late, none
+    /// lost
+    #[arg(long, value_parser = parse::one_of::<Gaps>(&Gaps::NAMES), default_value_t = Gaps::Keep)]
     pub gaps: Gaps,
     /// Signals to use: all, accel, gyro, x, accel.x, … (repeatable or comma-separated; default: all)
     #[arg(long, value_name = "AXES", value_delimiter = ',', value_parser = channel_set)]
     pub axes: Vec<ChannelSet>,
 }
 
-const GAPS: &[(&str, &str)] = &[
-    (
-        "keep",
-        "Leave out what is missing, if it is less than a tenth; refuse the file otherwise",
-    ),
-    WHOLE[0],
-    WHOLE[1],
-    WHOLE[2],
-];
-
-/// The same of windows that are navigated, in which nothing may be missing.
-pub(crate) const WHOLE: &[(&str, &str)] = &[
-    ("refuse", "Refuse the file"),
-    (
-        "split",
-        "Make each stretch between gaps a recording of its own (but not one 16 times shorter than the longest)",
-    ),
-    (
-        "ignore",
-        "Take the samples as evenly spaced over the whole time: stamped late, none lost",
-    ),
-];
+/// What to do with gaps in windows that are navigated, in which nothing may be missing.
+pub(crate) const WHOLE: &[&str] = &["refuse", "split", "ignore"];
 
 /// The beginning that is left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -296,5 +274,5 @@ pub(crate) fn note_report(report: &Report, context: &Context<'_>) {
         }
     }
     let doubts = report.all_warnings();
-    doubts.iter().for_each(|doubt| context.warn(doubt));
+    context.warn_each(&doubts);
 }

@@ -2,10 +2,10 @@
 
 use super::batch::Study;
 use super::inspect::inspect;
-use crate::app::{Answer, Command, Context, Failure, Result, inputs};
+use crate::app::{Answer, Command, Context, Failure, Inputs, Result, inputs};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::fusion_files::{ImuFile, read_gnss, read_imu, read_initial};
-use crate::io::{contamination_file, curve_file, datasheet, model_file, scenario_file};
+use crate::io::{contamination_file, curve_file, datasheet, scenario_file};
 use crate::parse;
 use crate::report::six_digits;
 use nav_sim_document::{Document, Note, Tone, seconds};
@@ -36,9 +36,6 @@ pub struct CheckFiles {
     /// Sample rate of recordings without a time column
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
     rate_hz: Option<f64>,
-    /// Also print the contents: scenarios and studies with every key, defaults included; models axis by axis
-    #[arg(long)]
-    dry_run: bool,
 }
 
 /// Files that were looked at.
@@ -56,8 +53,6 @@ struct CheckedFile {
     ok: bool,
     /// Its kind, or its error.
     found: String,
-    #[serde(skip)]
-    contents: Option<String>,
 }
 
 impl Command for CheckFiles {
@@ -65,39 +60,33 @@ impl Command for CheckFiles {
     const NAME: &'static str = "check";
     const PLOT: bool = false;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(Vec::new())
     }
 
     fn run(&self, context: &Context<'_>) -> Result<Checked> {
         let (mut files, mut failures) = (Vec::new(), Vec::new());
         for path in &self.files {
-            let found = check(path, self.rate_hz, context).and_then(|found| {
-                let contents = self.dry_run.then(|| resolved(path)).transpose()?;
-                Ok((found, contents.flatten()))
-            });
+            let found = check(path, self.rate_hz, context);
             let ok = found.is_ok();
-            let (found, contents) = found.unwrap_or_else(|failure| {
+            let found = found.unwrap_or_else(|failure| {
                 let message = failure.to_string();
                 failures.push(failure);
-                (message, None)
+                message
             });
-            files.push(CheckedFile {
-                file: path.display().to_string(),
-                ok,
-                found,
-                contents,
-            });
+            let file = path.display().to_string();
+            files.push(CheckedFile { file, ok, found });
         }
         let unmet = match failures.len() {
             0 => None,
             1 if files.len() == 1 => failures.pop(),
             wrong => {
-                failures.iter().for_each(|failure| context.warn(failure));
+                context.warn_each(&failures);
                 let message = format!("{wrong} of {} files are refused", files.len());
-                Some(match failures.iter().any(|failure| failure.code() == 1) {
-                    true => Failure::could_not(message),
-                    false => Failure::input(message),
+                Some(if failures.iter().any(|failure| failure.code() == 1) {
+                    Failure::could_not(message)
+                } else {
+                    Failure::input(message)
                 })
             }
         };
@@ -107,35 +96,17 @@ impl Command for CheckFiles {
 
 impl Answer for Checked {
     fn document(&self) -> Document {
-        let sound = self.files.iter().filter(|file| file.ok);
-        let lines = sound.map(|CheckedFile { file, found, .. }| format!("{file}: {found}"));
+        let lines = self
+            .files
+            .iter()
+            .filter(|file| file.ok)
+            .map(|CheckedFile { file, found, .. }| format!("{file}: {found}"));
         Document::new("Files", Tone::Good, lines)
-    }
-
-    fn text(&self) -> Option<String> {
-        let sound = self.files.iter().filter(|file| file.ok);
-        let lines = sound.flat_map(|checked| {
-            let line = format!("{}: {}\n", checked.file, checked.found);
-            [line, checked.contents.clone().unwrap_or_default()]
-        });
-        Some(lines.collect())
     }
 
     fn unmet(&self) -> Option<Failure> {
         self.unmet.clone()
     }
-}
-
-/// The configuration that a file stands for, every key of it.
-fn resolved(path: &Path) -> Result<Option<String>> {
-    Ok(match file_kind::of(path)? {
-        FileKind::Scenario => {
-            let scenario = scenario_file::read(path)?;
-            Some(toml::to_string(&scenario).map_err(Failure::could_not)?)
-        }
-        FileKind::Model => Some(model_file::to_toml(&model_file::read(path)?)),
-        _ => None,
-    })
 }
 
 fn tell(notes: &[Note], context: &Context<'_>) {
@@ -154,12 +125,15 @@ fn drive(imu: &ImuFile, context: &Context<'_>) -> String {
 fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<String> {
     Ok(match file_kind::of(path)? {
         FileKind::Scenario => {
-            let scenario = scenario_file::read(path)?;
-            format!("a scenario of {} runs", scenario.run.runs)
+            format!("a scenario of {} runs", scenario_file::read(path)?.run.runs)
         }
         FileKind::Study => {
-            let cells = Study::read(path, &[])?.cells(path.parent().unwrap_or(Path::new("")))?;
-            format!("a study of {} cells", cells.len())
+            format!(
+                "a study of {} cells",
+                Study::read(path, &[])?
+                    .cells(path.parent().unwrap_or(Path::new("")))?
+                    .len()
+            )
         }
         FileKind::Model => {
             let model = inputs::model(path, context)?.model;
@@ -179,9 +153,12 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
         }
         FileKind::Contamination => {
             // the rate only turns seconds into samples
-            let rate_hz = rate_hz.unwrap_or(100.0);
-            let rules = contamination_file::find(&path.to_string_lossy(), rate_hz)?.rules;
-            format!("a contamination of {} operations", rules.len())
+            format!(
+                "a contamination of {} operations",
+                contamination_file::find(&path.to_string_lossy(), rate_hz.unwrap_or(100.0))?
+                    .rules
+                    .len()
+            )
         }
         FileKind::Curve => format!("{} wavelet-variance curves", curve_file::read(path)?.len()),
         FileKind::Record => {
@@ -200,15 +177,20 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
                 vel_m_s: Some([1.0; 3]),
             };
             let read = read_gnss(path, None, None, None);
-            let unsaid = match read.is_err() {
-                true => ", without standard deviations (fuse --gnss-sigma)",
-                false => "",
+            let unsaid = if read.is_err() {
+                ", without standard deviations (fuse --gnss-sigma)"
+            } else {
+                ""
             };
-            let read = read.or_else(|e| read_gnss(path, Some(&given), None, None).map_err(|_| e));
-            let (fixes, notes) = read?;
+            let (fixes, notes) =
+                read.or_else(|e| read_gnss(path, Some(&given), None, None).map_err(|_| e))?;
             tell(&notes, context);
-            let span = fixes.first().zip(fixes.last());
-            let span = seconds(span.map_or(0.0, |(a, b)| b.t_s - a.t_s));
+            let span = seconds(
+                fixes
+                    .first()
+                    .zip(fixes.last())
+                    .map_or(0.0, |(a, b)| b.t_s - a.t_s),
+            );
             format!("{} GNSS fixes over {span} s{unsaid}", fixes.len())
         }
         FileKind::Imu => drive(&read_imu(path, None, None)?, context),
@@ -218,8 +200,10 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
                 // what is no static recording may be one of a drive or a flight
                 Err(refusal) => {
                     let imu = read_imu(path, None, None).ok();
-                    let imu = imu.filter(|imu| moves(&imu.samples)).ok_or(refusal)?;
-                    return Ok(drive(&imu, context));
+                    return Ok(drive(
+                        &imu.filter(|imu| moves(&imu.samples)).ok_or(refusal)?,
+                        context,
+                    ));
                 }
             };
             let mut described: Vec<String> = recordings

@@ -1,9 +1,11 @@
 //! `nav-sim compare`: run directories → ratios between runs.
 
-use crate::app::{Answer, Command, Context, Failure, Manifest, Out, OutputFile, Refuse, Result};
+use crate::app::{
+    Answer, Command, Context, Failure, Inputs, Manifest, Out, OutputFile, Refuse, Result, refused,
+};
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
-use crate::report::csv::{csv, flat};
+use crate::report::csv::{csv, flat, merged};
 use crate::report::verdict::{SPOKEN, axis_of, tone, verdict_counts};
 use crate::report::{in_order, json};
 use nav_sim_document::{
@@ -14,7 +16,7 @@ use nav_sim_navigation::metrics::{self, OutageComparison, PerState, StateRatio};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -36,16 +38,16 @@ Examples:
 pub struct Compare {
     /// Run directories
     #[arg(required = true, value_name = "DIR")]
-    pub runs: Vec<PathBuf>,
+    runs: Vec<PathBuf>,
     /// Run directory to compare with
     #[arg(long, value_name = "DIR")]
-    pub reference: PathBuf,
+    reference: PathBuf,
     /// States in the table (repeatable), or "all"
     #[arg(id = "state", long = "state", value_name = "STATE", default_values = ["pos_e_m", "roll_deg"])]
     pub states: Vec<String>,
     /// Print the table alone in this form
     #[arg(long, value_name = "FORM", value_enum)]
-    pub table: Option<TableForm>,
+    table: Option<TableForm>,
 }
 
 /// How a table is written.
@@ -75,10 +77,12 @@ impl Command for Compare {
         vec!["".into(), ".html".into()]
     }
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        let files = |run: &PathBuf| RUN_FILES.map(|name| run.join(name));
-        let all = self.runs.iter().chain([&self.reference]).flat_map(files);
-        Ok(all
+    fn inputs(&self) -> Result<Inputs> {
+        Ok(self
+            .runs
+            .iter()
+            .chain([&self.reference])
+            .flat_map(|run| RUN_FILES.map(|name| run.join(name)))
             .filter(|path| path.exists())
             .map(|path| ("run", path))
             .collect())
@@ -100,18 +104,19 @@ fn compare(runs: &[PathBuf], reference: &Path, states: Vec<usize>) -> Result<Com
     let name = reference.display().to_string();
     let directory = run_directory::read(reference)?;
     let read = |path: &PathBuf| {
-        let of_itself = is_same_place(path, reference);
         Ok((
             path.display().to_string(),
             run_directory::read(path)?,
-            of_itself,
+            is_same_place(path, reference),
         ))
     };
     let read = runs.iter().map(read).collect::<Result<Vec<_>>>()?;
-    let runs = read
-        .iter()
-        .map(|(run, found, of_itself)| (run.as_str(), found, *of_itself));
-    between(runs, (&name, &directory), states)
+    between(
+        read.iter()
+            .map(|(run, found, of_itself)| (run.as_str(), found, *of_itself)),
+        (&name, &directory),
+        states,
+    )
 }
 
 /// Compares runs by name, each with whether it is the reference itself.
@@ -124,10 +129,10 @@ pub(crate) fn between<'a>(
         schema_version: 1,
         reference: name.to_owned(),
         paired: true,
-        verdicts: vec![VerdictRow {
-            run: name.to_owned(),
-            verdict: directory.summary["verdict"].clone(),
-        }],
+        verdicts: vec![merged([
+            json!({ "run": name }),
+            directory.summary["verdict"].clone(),
+        ])],
         rows: Vec::new(),
         consistency: Vec::new(),
         candidates: Vec::new(),
@@ -147,50 +152,56 @@ pub(crate) fn between<'a>(
         }
         let is_paired = differences.is_empty();
         found.paired &= is_paired;
-        let compared = compared(
+        found.candidates.push(compared(
             run.to_owned(),
             candidate,
             directory,
             is_paired,
             is_reference,
-        )?;
-        found.candidates.push(compared);
+        )?);
     }
     separate(&mut found.candidates);
     for candidate in &found.candidates {
         if !candidate.is_reference {
-            found.verdicts.push(VerdictRow {
-                run: candidate.run.clone(),
-                verdict: candidate.verdict.clone(),
-            });
+            found.verdicts.push(merged([
+                json!({ "run": candidate.run }),
+                candidate.verdict.clone(),
+            ]));
         }
         for (outage, comparison) in candidate.outages.iter().enumerate() {
             let (outage_start_s, outage_end_s) = found.outages[outage];
             for (state, ratio) in REPORTED_NAMES.iter().zip(comparison.states) {
-                found.rows.push(Row {
-                    label: candidate.label.clone(),
-                    run: candidate.run.clone(),
-                    reference: name.to_owned(),
-                    outage_start_s,
-                    outage_end_s,
-                    state,
-                    ratio,
-                    paired: candidate.is_paired,
-                    outage,
+                let place = json!({
+                    "run": candidate.run,
+                    "reference": name,
+                    "outage_start_s": outage_start_s,
+                    "outage_end_s": outage_end_s,
+                    "state": state,
                 });
+                let row = [
+                    json!(candidate.label),
+                    place,
+                    json!(ratio),
+                    json!({ "paired": candidate.is_paired, "outage": outage }),
+                ];
+                found.rows.push(merged(row));
             }
-            found.consistency.push(ConsistencyRow {
-                run: candidate.run.clone(),
-                outage,
-                outage_start_s,
-                outage_end_s,
-                comparison: comparison.clone(),
-                rmse_end_ratio_error_pct: PerState(
-                    comparison
-                        .states
-                        .map(|state| state.rmse_end_ratio_error_pct),
-                ),
+            let place = json!({
+                "run": candidate.run,
+                "outage": outage,
+                "outage_start_s": outage_start_s,
+                "outage_end_s": outage_end_s,
             });
+            let rmse = PerState(
+                comparison
+                    .states
+                    .map(|state| state.rmse_end_ratio_error_pct),
+            );
+            found.consistency.push(merged([
+                place,
+                json!(comparison),
+                json!({ "rmse_end_ratio_error_pct": rmse }),
+            ]));
         }
     }
     Ok(found)
@@ -205,35 +216,40 @@ fn compared(
     is_reference: bool,
 ) -> Result<CandidateResult> {
     if candidate.manifest.hashes("trajectory") != reference.manifest.hashes("trajectory") {
-        return Err(
-            Failure::input(format!("{run}: not the trajectory of the reference"))
-                .hint("compare runs along one and the same trajectory file"),
+        return refused(
+            format!("{run}: not the trajectory of the reference"),
+            "compare runs along one and the same trajectory file",
         );
     }
     let runs = [candidate, reference].map(|side| side.experiment.runs.len());
     if is_paired && runs[0] != runs[1] {
         let [own, other] = runs;
-        let message =
-            format!("{run}: {own} runs against {other} of the reference, of the same seed");
-        return Err(Failure::input(message).hint("make both with one number of --runs"));
+        return refused(
+            format!("{run}: {own} runs against {other} of the reference, of the same seed"),
+            "make both with one number of --runs",
+        );
     }
     let mut outages = metrics::compare(&candidate.experiment, &reference.experiment, is_paired)
         .refuse_within(&run)?;
     // the reference is itself, whatever its calibration leaves open
     if !is_reference {
-        let open = candidate
-            .asee_mean_ci95
-            .iter()
-            .zip(&reference.asee_mean_ci95);
-        for (outage, ends) in outages.iter_mut().zip(open) {
+        for (outage, ends) in outages.iter_mut().zip(
+            candidate
+                .asee_mean_ci95
+                .iter()
+                .zip(&reference.asee_mean_ci95),
+        ) {
             if let (Some(interval), Some(of_reference)) = ends {
                 outage.widen(interval, of_reference);
             }
         }
     }
     let label = Label::of(&run, candidate.origin.model.estimator.as_deref());
-    let epochs = candidate.experiment.epochs.iter();
-    let both = epochs.zip(&reference.experiment.epochs);
+    let both = candidate
+        .experiment
+        .epochs
+        .iter()
+        .zip(&reference.experiment.epochs);
     let pct = |a: f64, b: f64| 100.0 * (a / b - 1.0);
     let curve = both.map(|(c, r)| (c.t_s, std::array::from_fn(|i| pct(c.asee[i], r.asee[i]))));
     Ok(CandidateResult {
@@ -277,8 +293,8 @@ fn differences(candidate: &RunDirectory, reference: &RunDirectory) -> Vec<&'stat
 
 /// What made the INS errors: a recording, a model, or the filter's own.
 fn truth(manifest: &Manifest) -> Vec<&str> {
-    let given = ["static", "truth", "model"].map(|role| manifest.hashes(role));
-    given
+    ["static", "truth", "model"]
+        .map(|role| manifest.hashes(role))
         .into_iter()
         .find(|hashes| !hashes.is_empty())
         .unwrap_or_default()
@@ -314,17 +330,17 @@ pub struct Comparison {
     /// Whether run k saw the same noise everywhere, so that intervals are those of paired differences.
     paired: bool,
     /// One row a run, the reference first.
-    verdicts: Vec<VerdictRow>,
+    verdicts: Vec<Value>,
     /// One row a run, outage and state.
-    rows: Vec<Row>,
+    rows: Vec<Value>,
     /// One row a run and outage.
-    consistency: Vec<ConsistencyRow>,
+    consistency: Vec<Value>,
     /// The runs.
     #[serde(skip)]
     pub(crate) candidates: Vec<CandidateResult>,
     /// Start and end of each outage (s).
     #[serde(skip)]
-    pub(crate) outages: Vec<(f64, f64)>,
+    outages: Vec<(f64, f64)>,
     /// Why runs are not paired with the reference.
     #[serde(skip)]
     doubts: Vec<String>,
@@ -336,59 +352,6 @@ pub struct Comparison {
     form: Option<TableForm>,
 }
 
-/// Whether the filter of a run is as good as it believes.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct VerdictRow {
-    /// Run directory.
-    run: String,
-    /// The verdict.
-    #[serde(flatten)]
-    verdict: Value,
-}
-
-/// One state of one run in one outage, against the reference.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct Row {
-    /// Scenario and estimator.
-    #[serde(flatten)]
-    label: Label,
-    /// Run directory.
-    run: String,
-    /// Run directory of the reference.
-    reference: String,
-    /// Start of the outage (s).
-    outage_start_s: f64,
-    /// Its end (s).
-    outage_end_s: f64,
-    /// State.
-    state: &'static str,
-    /// Its ratios.
-    #[serde(flatten)]
-    ratio: StateRatio,
-    /// True if run k saw the same noise as that of the reference, so that the intervals are those of paired differences.
-    paired: bool,
-    /// Outage, from 0.
-    outage: usize,
-}
-
-/// Consistency of one run in one outage, beside the reference's.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct ConsistencyRow {
-    /// Run directory.
-    run: String,
-    /// Outage, from 0.
-    outage: usize,
-    /// Its start (s).
-    outage_start_s: f64,
-    /// Its end (s).
-    outage_end_s: f64,
-    /// NEES and coverage.
-    #[serde(flatten)]
-    comparison: OutageComparison,
-    /// (ratio − 1)·100 of the RMSE at its end.
-    rmse_end_ratio_error_pct: PerState<f64>,
-}
-
 impl Comparison {
     /// The paper's Table I.
     pub(crate) fn table(&self) -> Table {
@@ -397,11 +360,14 @@ impl Comparison {
 
     /// The ratios of the states that are shown, for other programs.
     fn rows_csv(&self) -> String {
-        let is_shown = |row: &&Row| self.states.iter().any(|k| REPORTED_NAMES[*k] == row.state);
         csv(&self
             .rows
             .iter()
-            .filter(is_shown)
+            .filter(|row| {
+                self.states
+                    .iter()
+                    .any(|k| row["state"] == REPORTED_NAMES[*k])
+            })
             .map(flat)
             .collect::<Vec<_>>())
     }
@@ -428,9 +394,10 @@ impl Comparison {
                 .map(|outage| outage.states[state].ratio_error_pct);
             let low = all.clone().reduce(f64::min)?;
             let [low, high] = [low, all.fold(low, f64::max)].map(|pct| format!("{pct:+.0}"));
-            Some(match low == high {
-                true => format!("{name} {low} %"),
-                false => format!("{name} {low} to {high} %"),
+            Some(if low == high {
+                format!("{name} {low} %")
+            } else {
+                format!("{name} {low} to {high} %")
             })
         };
         let costs: Vec<String> = others.iter().take(NAMED).filter_map(cost).collect();
@@ -442,58 +409,42 @@ impl Comparison {
         })
     }
 
-    /// Departure of the ASEE over time: a chart a scenario, with a curve an estimator; where the names of the runs tell
-    /// neither, one with all runs.
-    fn charts(&self) -> Vec<Chart> {
+    /// Departure of the ASEE over time: a curve a run.
+    fn chart(&self) -> Chart {
         let others = self.others();
-        let title = format!("ASEE against {}", self.name_of_reference());
-        let [scenarios, estimators] = layout(&self.candidates);
-        let is_grid = scenarios.len() > 1 && estimators.len() > 1 && !estimators.contains(&"");
-        if !is_grid || scenarios.len() > SCENARIOS {
-            let curves = others.iter().enumerate();
-            let curves = curves.map(|(hue, (name, c))| (name.as_str(), hue, *c));
-            return vec![self.chart(&title, &curves.collect::<Vec<_>>())];
-        }
-        let of_scenario = |scenario: &&str| {
-            let curves = others.iter().filter(|(_, c)| c.label.scenario == *scenario);
-            let curves = curves.filter_map(|(_, c)| {
-                let estimator = c.label.estimator.as_str();
-                let hue = estimators.iter().position(|e| *e == estimator)?;
-                Some((estimator, hue, *c))
-            });
-            let curves: Vec<_> = curves.collect();
-            let title = format!("{title}, scenario {scenario}");
-            (!curves.is_empty()).then(|| self.chart(&title, &curves))
-        };
-        scenarios.iter().filter_map(of_scenario).collect()
-    }
-
-    fn chart(&self, title: &str, curves: &[(&str, usize, &CandidateResult)]) -> Chart {
         let panel = |state: &usize| {
-            let line = |(name, hue, c): &(&str, usize, &CandidateResult)| {
-                let points = c.curve.iter().map(|(t, pct)| (*t, pct[*state]));
-                Series::line(name, Colour::Hue(*hue), points.collect())
+            let line = |(hue, (name, c)): (usize, &(String, &CandidateResult))| {
+                Series::line(
+                    name,
+                    Colour::Hue(hue),
+                    c.curve.iter().map(|(t, pct)| (*t, pct[*state])).collect(),
+                )
             };
             let zero = Series::new("", Colour::Ink, Mark::Level(0.0));
             let axis = Axis::linear(&format!("{}: (ratio − 1)·100 (%)", SPOKEN[*state]))
                 .including(-1.0, 1.0);
             let series = std::iter::once(zero)
-                .chain(curves.iter().map(line))
+                .chain(others.iter().enumerate().map(line))
                 .collect();
             Panel {
                 height: 0.8,
                 ..Panel::new(axis, series)
             }
         };
-        let panels = self.states.iter().map(panel).collect();
-        Chart::over_time(title, panels, &self.outages)
+        Chart::over_time(
+            &format!("ASEE against {}", self.name_of_reference()),
+            self.states.iter().map(panel).collect(),
+            &self.outages,
+        )
     }
 
     /// A row a run and outage, as they stand in comparison.json.
     fn consistency_table(&self) -> Table {
         let states = self.states.iter().map(|s| {
-            let key = format!("rmse_end_ratio_error_pct/{}", REPORTED_NAMES[*s]);
-            (format!("RMSE {} (%)", axis_of(*s)), key)
+            (
+                format!("RMSE {} (%)", axis_of(*s)),
+                format!("rmse_end_ratio_error_pct/{}", REPORTED_NAMES[*s]),
+            )
         });
         let states: Vec<(String, String)> = states.collect();
         let mut columns = vec![
@@ -535,7 +486,7 @@ impl Answer for Comparison {
     fn document(&self) -> Document {
         let verdicts = self.verdicts.iter();
         let verdicts: Vec<_> = verdicts
-            .map(|row| (row.run.as_str(), &row.verdict))
+            .map(|row| (row["run"].as_str().unwrap_or_default(), row))
             .collect();
         let (gravest, counts) = verdict_counts(&verdicts);
         let (lines, tone) = (self.cost().into_iter().chain(counts), tone(gravest));
@@ -550,8 +501,7 @@ impl Answer for Comparison {
             ));
             document.lead(self.table());
         }
-        document.text(CAPTION);
-        document.charts(&self.charts(), "");
+        document.chart(&self.chart(), CAPTION);
         if !self.outages.is_empty() {
             document.section("Consistency and errors");
             document.text("NEES (9 if right) and coverage over the outage; RMSE at its end against the reference, (ratio − 1)·100.");
@@ -563,8 +513,6 @@ impl Answer for Comparison {
 
 /// Runs that the verdict names.
 const NAMED: usize = 3;
-/// Scenarios that have a chart each; of more, one chart has all runs.
-const SCENARIOS: usize = 6;
 
 const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's own standard deviation: 0 % is as the reference believes.";
 
@@ -657,9 +605,8 @@ fn ratio_table(candidates: &[CandidateResult], states: &[usize], outages: &[(f64
             .iter()
             .flat_map(|s| estimators.iter().map(move |e| (*s, *e)))
     };
-    let name = |(s, e)| format!("{} {e}", axis_of(s)).trim_end().to_owned() + " (%)";
     let mut table = Table::new(["scenario", "outage"])
-        .and(columns().map(name))
+        .and(columns().map(|(s, e)| format!("{} {e}", axis_of(s)).trim_end().to_owned() + " (%)"))
         .with_keys(2);
     for scenario in scenarios {
         for (outage, (start_s, end_s)) in outages.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! `nav-sim datasheet`: models from data sheets, and the catalogue of IMUs.
 
 use crate::app::inputs::files;
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Failure, Inputs, Out, OutputFile, Result};
 use crate::io::datasheet::{CATALOGUE, Datasheet, Entry, Figure, Quantity, catalogued, read};
 use crate::io::model_file::{self, ModelFile};
 use crate::io::suggest::nearest;
@@ -26,19 +26,19 @@ Examples:
 pub struct DatasheetArgs {
     /// Catalogue entry (TOML)
     #[arg(value_name = "ENTRY", conflicts_with = "unit")]
-    pub entry: Option<PathBuf>,
+    entry: Option<PathBuf>,
     /// Catalogue entry by name (see --list)
     #[arg(long, value_name = "NAME")]
-    pub unit: Option<String>,
+    unit: Option<String>,
     /// Figures in the place of the entry's.
     #[command(flatten)]
-    pub figures: Figures,
+    figures: Figures,
     /// List the catalogue
     #[arg(long)]
-    pub list: bool,
+    list: bool,
     /// Sample rate of the model
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz, default_value = "100")]
-    pub rate_hz: f64,
+    rate_hz: f64,
 }
 
 /// A model of a data sheet, or the catalogue.
@@ -59,16 +59,18 @@ impl Command for DatasheetArgs {
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(files("entry", &self.entry).collect())
     }
 
     fn run(&self, context: &Context<'_>) -> Result<DatasheetAnswer> {
         if self.list {
-            let units = CATALOGUE
-                .iter()
-                .map(|(name, _)| CataloguedUnit::named(name));
-            return Ok(DatasheetAnswer::Catalogue(units.collect::<Result<_>>()?));
+            return Ok(DatasheetAnswer::Catalogue(
+                CATALOGUE
+                    .iter()
+                    .map(|(name, _)| CataloguedUnit::named(name))
+                    .collect::<Result<_>>()?,
+            ));
         }
         let mut sheet = match (&self.entry, &self.unit) {
             (Some(path), _) => read(path)?,
@@ -78,20 +80,20 @@ impl Command for DatasheetArgs {
         self.figures.over(&mut sheet);
         let made = sheet.model_file(self.rate_hz).map_err(Failure::input)?;
         if made.file.missing.len() == made.file.model.axes.len() {
-            let failure = Failure::input("no figure is given that makes a noise model");
-            let hint = "give --vrw and --arw, or --unit NAME (nav-sim datasheet --list)";
-            return Err(failure.hint(hint));
+            return Err(
+                Failure::input("no figure is given that makes a noise model")
+                    .hint("give --vrw and --arw, or --unit NAME (nav-sim datasheet --list)"),
+            );
         }
-        let lacking = Sensor::ALL
+        Sensor::ALL
             .into_iter()
-            .flat_map(|sensor| lacking(&sheet, sensor));
-        lacking
+            .flat_map(|sensor| lacking(&sheet, sensor))
             .chain(made.doubts)
             .for_each(|doubt| context.warn(doubt));
-        let left_out = Sensor::ALL
+        Sensor::ALL
             .into_iter()
-            .flat_map(|sensor| left_out(&sheet, sensor));
-        left_out.for_each(|note| context.remark(note));
+            .flat_map(|sensor| left_out(&sheet, sensor))
+            .for_each(|note| context.remark(note));
         context.remark("an assumption, not a calibration");
         Ok(DatasheetAnswer::Model(Box::new(made.file)))
     }
@@ -139,25 +141,25 @@ impl Answer for DatasheetAnswer {
 pub struct Figures {
     /// Velocity random walk or noise density of the accelerometers: m/s/sqrt(h), ug/sqrt(Hz), …
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Noise))]
-    pub vrw: Option<Quantity>,
+    vrw: Option<Quantity>,
     /// Angle random walk or noise density of the gyroscopes: deg/sqrt(h), deg/s/sqrt(Hz), …
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Noise))]
-    pub arw: Option<Quantity>,
+    arw: Option<Quantity>,
     /// Bias instability of the accelerometers: ug, mg, m/s²
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Bias))]
-    pub accel_bias: Option<Quantity>,
+    accel_bias: Option<Quantity>,
     /// Bias instability of the gyroscopes: deg/h, deg/s, rad/s
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Bias))]
-    pub gyro_bias: Option<Quantity>,
+    gyro_bias: Option<Quantity>,
     /// Longest correlation time of both biases: s, min, h [default: 300 s, with a warning]
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::CorrelationTime))]
-    pub corr_time: Option<Quantity>,
+    corr_time: Option<Quantity>,
     /// Turn-on bias of the accelerometers, as a standard deviation: mg, m/s²
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::TurnOn))]
-    pub accel_turn_on: Option<Quantity>,
+    accel_turn_on: Option<Quantity>,
     /// Turn-on bias of the gyroscopes, as a standard deviation: deg/s, deg/h
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::TurnOn))]
-    pub gyro_turn_on: Option<Quantity>,
+    gyro_turn_on: Option<Quantity>,
 }
 
 /// Checks a figure of a sensor.
@@ -196,13 +198,14 @@ fn named(name: &str) -> Result<Datasheet> {
     if let Some(sheet) = catalogued(name) {
         return sheet;
     }
-    let failure = Failure::input(format!("--unit {name}: the catalogue has no such unit"));
-    Err(failure.hint(
-        match nearest(name, CATALOGUE.iter().map(|(known, _)| *known)) {
-            Some(meant) => format!("did you mean {meant}?"),
-            None => "nav-sim datasheet --list shows what there is".to_owned(),
-        },
-    ))
+    Err(
+        Failure::input(format!("--unit {name}: the catalogue has no such unit")).hint(
+            match nearest(name, CATALOGUE.iter().map(|(known, _)| *known)) {
+                Some(meant) => format!("did you mean {meant}?"),
+                None => "nav-sim datasheet --list shows what there is".to_owned(),
+            },
+        ),
+    )
 }
 
 fn lacking(sheet: &Datasheet, sensor: Sensor) -> impl Iterator<Item = String> {
@@ -215,10 +218,10 @@ fn lacking(sheet: &Datasheet, sensor: Sensor) -> impl Iterator<Item = String> {
         (Figure::Bias, "bias instability", format!("{sensor}-bias")),
         (Figure::TurnOn, "turn-on bias", format!("{sensor}-turn-on")),
     ];
-    let lacking = figures
+    figures
         .into_iter()
-        .filter(move |f| sheet.value(sensor, f.0).is_none());
-    lacking.map(move |(_, name, flag)| format!("{sensor}: no {name} is given (--{flag})"))
+        .filter(move |f| sheet.value(sensor, f.0).is_none())
+        .map(move |(_, name, flag)| format!("{sensor}: no {name} is given (--{flag})"))
 }
 
 fn left_out(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
@@ -271,8 +274,12 @@ impl CataloguedUnit {
         let [class, name] =
             [&self.class, &self.name].map(|text| text.as_deref().unwrap_or_default());
         let figures = |sensor: Sensor| {
-            let own = self.figures.iter().filter(|f| f.sensor == sensor);
-            let shown: Vec<_> = own.map(|f| format!("{} {}", f.figure, f.given)).collect();
+            let shown: Vec<_> = self
+                .figures
+                .iter()
+                .filter(|f| f.sensor == sensor)
+                .map(|f| format!("{} {}", f.figure, f.given))
+                .collect();
             format!("\n  {sensor:<5} {}", shown.join(", "))
         };
         let figures = Sensor::ALL.map(figures).concat();

@@ -1,7 +1,7 @@
 //! `nav-sim design`: the interval that recordings not made yet would give.
 
 use crate::app::inputs::{self, OutageFlag, files};
-use crate::app::{Answer, Command, Context, Failure, Result};
+use crate::app::{Answer, Command, Context, Failure, Inputs, Result};
 use crate::commands::calibrate::ESTIMATORS;
 use crate::commands::run::{NavigateInputs, TrueImu, navigate};
 use crate::io::draws_file::DrawsFile;
@@ -10,9 +10,7 @@ use crate::parse;
 use nav_sim_calibration::{
     Anticipated, Bootstrap, Estimator, Outcome, ParameterInterval, Scattering, Settings,
 };
-use nav_sim_document::{
-    Axis, Chart, Colour, Document, Importance, Panel, Series, Table, Tone, readable, window,
-};
+use nav_sim_document::{Document, Importance, Table, Tone, readable, window};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::metrics::OutageSummary;
 use nav_sim_navigation::scenario::{Method, Scenario};
@@ -38,19 +36,19 @@ Examples:
       --trajectory trajectories/figure_eight.toml --outage 300:360")]
 pub struct Design {
     /// Noise model of the IMU, as far as it is known
-    pub model: PathBuf,
+    model: PathBuf,
     /// Number of recordings [default: a table of 3, 6 and 12]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..=1000))]
     pub recordings: Option<u32>,
     /// Length of each in hours [default: a table of 1, 3 and 10]
     #[arg(long, value_name = "HOURS", value_parser = parse::positive)]
-    pub hours: Option<f64>,
+    hours: Option<f64>,
     /// How they will be calibrated
-    #[arg(long, value_name = "ESTIMATOR", value_parser = parse::words::<Estimator>(AVERAGES), default_value_t)]
-    pub estimator: Estimator,
+    #[arg(long, value_name = "ESTIMATOR", value_parser = parse::one_of::<Estimator>(AVERAGES), default_value_t)]
+    estimator: Estimator,
     /// Draws of the bootstrap
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(40..=10_000))]
-    pub draws: u32,
+    draws: u32,
     /// Trajectory: motion profile (.toml) or table (.csv)
     #[arg(long, value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
@@ -61,11 +59,11 @@ pub struct Design {
         value_name = "START:END",
         requires = "trajectory"
     )]
-    pub outages: Vec<OutageFlag>,
+    outages: Vec<OutageFlag>,
 }
 
 /// The estimators of several recordings.
-const AVERAGES: &[(&str, &str)] = ESTIMATORS.split_at(3).0;
+const AVERAGES: &[&str] = ESTIMATORS.split_at(3).0;
 
 /// Longest recording that is planned (h): a year.
 const LONGEST_H: f64 = 8766.0;
@@ -74,9 +72,10 @@ impl Command for Design {
     type Answer = Designs;
     const NAME: &'static str = "design";
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        let model = files("model", [&self.model]);
-        Ok(model.chain(files("trajectory", &self.trajectory)).collect())
+    fn inputs(&self) -> Result<Inputs> {
+        Ok(files("model", [&self.model])
+            .chain(files("trajectory", &self.trajectory))
+            .collect())
     }
 
     fn run(&self, context: &Context<'_>) -> Result<Designs> {
@@ -88,12 +87,16 @@ impl Command for Design {
         let mut destination = None;
         if let Some(path) = &self.trajectory {
             let trajectory = inputs::trajectory(path, context)?;
-            let span = (trajectory.start_s(), trajectory.end_s());
-            let outages = scenario.outages_on(span, 0)?.windows;
+            let outages = scenario
+                .outages_on((trajectory.start_s(), trajectory.end_s()), 0)?
+                .windows;
             scenario.imu.rate_hz = file.model.rate_hz;
             scenario.validate().map_err(Failure::input)?;
-            let inputs = NavigateInputs::new(trajectory, file.model.clone(), TrueImu::AsBelieved);
-            destination = Some((inputs, scenario, outages));
+            destination = Some((
+                NavigateInputs::new(trajectory, file.model.clone(), TrueImu::AsBelieved),
+                scenario,
+                outages,
+            ));
         }
         let bootstrap = Bootstrap {
             draws: self.draws as usize,
@@ -104,9 +107,9 @@ impl Command for Design {
         let mut designs = Vec::new();
         for k in recordings {
             for h in &hours {
-                let design = self.design(&file, &mut destination, bootstrap, k, *h);
                 designs.push(
-                    design.map_err(|e| Failure::input(e).hint("more, or longer recordings"))?,
+                    self.design(&file, &mut destination, bootstrap, k, *h)
+                        .map_err(|e| Failure::input(e).hint("more, or longer recordings"))?,
                 );
             }
         }
@@ -327,21 +330,22 @@ const NEARLY_ALL: f64 = 0.8;
 
 /// The parameter that would be known least: its name, and how well.
 fn least_known(parameters: &[DesignedParameter]) -> String {
-    let known = parameters
+    parameters
         .iter()
-        .filter_map(|p| Some((p, p.half_width_pct?)));
-    let widest = known.max_by(|a, b| a.1.total_cmp(&b.1));
-    widest.map_or("–".to_owned(), |(p, half)| {
-        format!("{} ± {} %", p.name(), readable(half))
-    })
+        .filter_map(|p| Some((p, p.half_width_pct?)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map_or("–".to_owned(), |(p, half)| {
+            format!("{} ± {} %", p.name(), readable(half))
+        })
 }
 
 impl DesignOutcome {
     /// Parameters whose intervals are nearly all due to what recordings differ by: longer ones tell no more.
     fn lengths_do_not_help(&self) -> usize {
         let is_floor = |p: &&DesignedParameter| {
-            let widths = p.endless_half_width_pct.zip(p.half_width_pct);
-            widths.is_some_and(|(floor, all)| floor >= NEARLY_ALL * all)
+            p.endless_half_width_pct
+                .zip(p.half_width_pct)
+                .is_some_and(|(floor, all)| floor >= NEARLY_ALL * all)
         };
         self.parameters.iter().filter(is_floor).count()
     }
@@ -367,14 +371,13 @@ impl Designs {
                 readable(q.p95_m)
             )
         });
-        let lines = std::iter::once(first).chain(p95).collect();
         (
             if open == 0 {
                 Tone::Good
             } else {
                 Tone::Doubtful
             },
-            lines,
+            std::iter::once(first).chain(p95).collect(),
         )
     }
 
@@ -419,9 +422,6 @@ impl Answer for Designs {
         }
         document.note(Importance::Remark, STATED);
         document.lead(self.lead());
-        let parameters = designs.first().map_or(0, |d| d.parameters.len());
-        let charts = (0..parameters).filter_map(|k| against_hours(designs, k));
-        document.charts(&charts.collect::<Vec<_>>(), AGAINST);
         if designs.iter().any(|d| !d.horizontal_p95.is_empty()) {
             document.section("What that is in navigation");
             document.table(&Table::of(
@@ -441,9 +441,8 @@ impl Answer for Designs {
         if designs.len() > 1 {
             document.section("All parameters");
             let plan = |(i, d): (usize, &DesignOutcome)| {
-                let title = format!("{} × {} h (± %)", d.recordings, d.hours);
                 (
-                    title,
+                    format!("{} × {} h (± %)", d.recordings, d.hours),
                     format!("../../../{i}/parameters/@/half_width_pct|not determined"),
                 )
             };
@@ -463,40 +462,9 @@ impl Answer for Designs {
     }
 }
 
-const AGAINST: &str = "Half of the 95 % interval to expect (% of the value) against the length of each recording; dashed: however long they are.";
-
-/// One parameter of several designs: a curve over hours for each number of recordings.
-fn against_hours(designs: &[DesignOutcome], k: usize) -> Option<Chart> {
-    let name = designs.first()?.parameters[k].name();
-    let (mut series, mut floors) = (Vec::new(), Vec::new());
-    let of_count = designs.chunk_by(|a, b| a.recordings == b.recordings);
-    for (hue, designs) in of_count.enumerate() {
-        let point = |d: &DesignOutcome| {
-            let half = d.parameters.get(k).and_then(|p| p.half_width_pct);
-            (d.hours, half.unwrap_or(f64::NAN))
-        };
-        let name = format!("{} recordings", designs[0].recordings);
-        let points = designs.iter().map(point).collect();
-        series.extend(Series::dotted_line(&name, Colour::Hue(hue), points));
-        let last = designs.last()?;
-        let floor = last
-            .parameters
-            .get(k)
-            .and_then(|p| p.endless_half_width_pct);
-        floors.extend(floor.map(|floor| {
-            let ends = [designs[0].hours, last.hours].map(|hours| (hours, floor));
-            Series::dashed("", Colour::Hue(hue), ends.to_vec())
-        }));
-    }
-    series.extend(floors);
-    let panel = Panel::new(Axis::log("half width (%)"), series);
-    Some(Chart::new(&name, Axis::log("hours"), vec![panel]).small())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nav_sim_document::Mark;
 
     fn designed(
         recordings: usize,
@@ -528,22 +496,5 @@ mod tests {
         for (floor, count) in [(None, 0), (Some(31.9), 0), (Some(32.1), 1)] {
             assert_eq!(designed(4, 1.0, 40.0, floor).lengths_do_not_help(), count);
         }
-    }
-
-    #[test]
-    fn a_curve_has_the_designs_of_its_number_of_recordings() {
-        let designs = [(4, 1.0, 40.0), (4, 2.0, 30.0), (6, 1.0, 35.0)]
-            .map(|(n, h, w)| designed(n, h, w, None));
-        let mut chart = against_hours(&designs, 0).unwrap();
-        let drawn = chart.panels.remove(0).series;
-        let line = |series: Series| {
-            if let Mark::Line(points, _) = series.mark {
-                Some(points)
-            } else {
-                None
-            }
-        };
-        let lines: Vec<_> = drawn.into_iter().filter_map(line).collect();
-        assert_eq!(lines, [vec![(1.0, 40.0), (2.0, 30.0)], vec![(1.0, 35.0)]]);
     }
 }

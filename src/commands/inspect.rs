@@ -2,7 +2,7 @@
 
 use crate::app::inputs::files;
 use crate::app::reading::LogRequest;
-use crate::app::{Answer, Command, Context, Result};
+use crate::app::{Answer, Command, Context, Inputs, Result};
 use crate::io::logs;
 use nav_sim_document::{Document, Importance, Table, Tone, six_digits};
 use nav_sim_logs::{Channel, Content, Error, Log, Stamp};
@@ -25,10 +25,10 @@ Examples:
 pub struct Inspect {
     /// Log
     #[arg(value_name = "FILE")]
-    pub file: PathBuf,
+    file: PathBuf,
     /// How it is read.
     #[command(flatten)]
-    pub log: LogRequest,
+    log: LogRequest,
 }
 
 impl Command for Inspect {
@@ -36,7 +36,7 @@ impl Command for Inspect {
     const NAME: &'static str = "inspect";
     const PLOT: bool = false;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(files("log", [&self.file]).collect())
     }
 
@@ -117,20 +117,28 @@ pub fn inspect(path: &Path, stamp: Stamp) -> Result<Inspection> {
 fn inspected(log: &Log, channel: &Channel, stamp: Stamp) -> Result<InspectedChannel, Error> {
     let (content, units, stamps) = match channel.content {
         _ if channel.messages == 0 => ("other", None, Vec::new()),
-        Content::Imu => {
-            let samples = log.imu(channel, stamp)?;
-            let stamps = samples.iter().map(|sample| sample.stamp_ns).collect();
-            ("imu", Some("m/s², rad/s"), stamps)
-        }
-        Content::Fix => {
-            let fixes = log.fixes(channel, stamp)?;
-            let stamps = fixes.iter().map(|fix| fix.stamp_ns).collect();
-            ("fix", Some("deg, m"), stamps)
-        }
+        Content::Imu => (
+            "imu",
+            Some("m/s², rad/s"),
+            log.imu(channel, stamp)?
+                .iter()
+                .map(|sample| sample.stamp_ns)
+                .collect(),
+        ),
+        Content::Fix => (
+            "fix",
+            Some("deg, m"),
+            log.fixes(channel, stamp)?
+                .iter()
+                .map(|fix| fix.stamp_ns)
+                .collect(),
+        ),
         Content::Other => ("other", None, Vec::new()),
     };
-    let ends = channel.first_ns.zip(channel.last_ns);
-    let span_ns = ends.map_or(0, |(first, last)| last.saturating_sub(first));
+    let span_ns = channel
+        .first_ns
+        .zip(channel.last_ns)
+        .map_or(0, |(first, last)| last.saturating_sub(first));
     let span_s = span_ns as f64 * 1e-9;
     let by_span = (span_s > 0.0).then(|| channel.messages.saturating_sub(1) as f64 / span_s);
     let steps = steps(&stamps);
@@ -158,10 +166,9 @@ fn steps(stamps_ns: &[i64]) -> Option<(f64, u64, f64, f64)> {
     let median_s = *steps.get(steps.len() / 2).filter(|step| **step > 0.0)?;
     let mut off: Vec<f64> = steps.iter().map(|step| (step - median_s).abs()).collect();
     off.sort_by(f64::total_cmp);
-    let gaps = steps.iter().filter(|step| **step > GAP * median_s).count() as u64;
     Some((
         median_s,
-        gaps,
+        steps.iter().filter(|step| **step > GAP * median_s).count() as u64,
         *steps.last()?,
         off[(off.len() * 95).div_ceil(100) - 1],
     ))
@@ -170,11 +177,16 @@ fn steps(stamps_ns: &[i64]) -> Option<(f64, u64, f64, f64)> {
 impl Answer for Inspection {
     fn document(&self) -> Document {
         let named = |content: &str| {
-            let own = self.channels.iter().filter(|c| c.content == content);
-            let topics: Vec<&str> = own.map(|c| c.topic.as_str()).collect();
-            match topics.is_empty() {
-                true => "none".to_owned(),
-                false => topics.join(", "),
+            let topics: Vec<&str> = self
+                .channels
+                .iter()
+                .filter(|c| c.content == content)
+                .map(|c| c.topic.as_str())
+                .collect();
+            if topics.is_empty() {
+                "none".to_owned()
+            } else {
+                topics.join(", ")
             }
         };
         let (imu, fix) = (named("imu"), named("fix"));

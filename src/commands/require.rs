@@ -1,17 +1,16 @@
 //! The IMU that a limit needs, what a given one makes of it, and a ranking of several.
 
 use crate::app::inputs::{self, ScenarioArgs, files};
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Refuse, Result};
+use crate::app::{
+    Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, refused,
+};
 use crate::io::datasheet::{self, CATALOGUE, Datasheet};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::input::listed;
-use crate::io::model_file::{self, ModelFile, PROGRAM, TurnOn};
+use crate::io::model_file::{self, ModelFile, PROGRAM, TurnOn, known};
 use crate::io::scenario_file;
 use crate::parse;
-use nav_sim_document::{
-    Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone, readable, seconds,
-    window,
-};
+use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds, window};
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
     Answer as Bound, Course, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need, Quantity,
@@ -20,7 +19,7 @@ use nav_sim_navigation::require::{
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::aiding::AidingSettings;
 use nav_sim_navigation::sensors::imu::Truth;
-use nav_sim_navigation::sensors::outage::{NotAnOutage, Outage};
+use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::ExperimentError;
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::Sensor;
@@ -51,29 +50,29 @@ pub struct Require {
     /// Trajectory: motion profile (.toml) or table (.csv)
     pub trajectory: PathBuf,
     /// Noise model of an IMU
-    pub model: Option<PathBuf>,
+    model: Option<PathBuf>,
     /// Outage: a length in seconds (tried from every second on), START:END, or "longest" (needs MODEL)
     #[arg(long, value_name = "SECONDS")]
-    pub outage: Ask,
+    outage: Ask,
     /// Earliest start of the outage in seconds [default: 300, less if the trajectory is short]
     #[arg(long, value_name = "SECONDS", value_parser = parse::non_negative)]
-    pub start: Option<f64>,
+    start: Option<f64>,
     /// Limit at the end of the outage, as NAME<=LIMIT (repeatable): p50_m, p95_m, rmse_m (horizontal), roll_deg, pitch_deg,
     /// yaw_deg
     #[arg(id = "require", long = "require", value_name = "NAME<=LIMIT")]
-    pub limits: Vec<Limit>,
+    limits: Vec<Limit>,
     /// Scenario file whose section gnss is used
     #[arg(long, value_name = "FILE")]
-    pub gnss: Option<PathBuf>,
+    gnss: Option<PathBuf>,
     /// Receiver, start, IMU rate, aiding.
     #[command(flatten)]
-    pub settings: ScenarioArgs,
+    settings: ScenarioArgs,
     /// What the vehicle knows of its own motion: a car moves neither sideways nor up; with MODEL, a table with and without
     #[arg(long, value_name = "KIND", value_parser = ["car"])]
-    pub vehicle: Option<String>,
+    vehicle: Option<String>,
     /// Rank the catalogued IMUs (`nav-sim datasheet --list`), or those of a directory of entries and model files
     #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = BUILT_IN, conflicts_with = "model")]
-    pub catalogue: Option<PathBuf>,
+    catalogue: Option<PathBuf>,
 }
 
 /// Stands for the units that are known by name.
@@ -85,10 +84,9 @@ impl FromStr for Ask {
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         match text {
             "longest" => Ok(Self::Longest),
-            window if window.contains(':') => window
-                .parse()
-                .map(Self::Window)
-                .map_err(|e: NotAnOutage| e.to_string()),
+            window if window.contains(':') => {
+                window.parse().map(Self::Window).map_err(|e| e.to_string())
+            }
             length => parse::positive(length)
                 .map(Self::Length)
                 .map_err(|_| "expected a length in seconds, START:END or longest".to_owned()),
@@ -96,25 +94,16 @@ impl FromStr for Ask {
     }
 }
 
-/// What is found.
+/// What a limit needs, or what one or several IMUs make of it.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
-enum Found {
+pub enum RequireAnswer {
     /// The IMU that is needed.
     Needed(Box<NeededImu>),
     /// What a given one makes of the limits.
     Given(Box<GivenImu>),
     /// Several of them, the best first.
     Ranked(Ranking),
-}
-
-/// What a limit needs, or what one or several IMUs make of it.
-#[derive(Debug, Serialize)]
-#[serde(transparent)]
-pub struct RequireAnswer {
-    found: Found,
-    #[serde(skip)]
-    file: Option<ModelFile>,
 }
 
 impl Command for Require {
@@ -129,24 +118,28 @@ impl Command for Require {
         if self.model.is_none() && self.catalogue.is_none() {
             return Ok(());
         }
-        let message = "--out is for the required IMU: it cannot be used with MODEL or --catalogue";
-        Err(Failure::input(message).hint("--plot FILE.html writes the page"))
+        refused(
+            "--out is for the required IMU: it cannot be used with MODEL or --catalogue",
+            "--plot FILE.html writes the page",
+        )
     }
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         if let (Ask::Window(outage), Some(start_s)) = (self.outage, self.start) {
             let Outage {
                 start_s: from,
                 end_s: to,
             } = outage;
-            let message = format!("--start {start_s} beside --outage {from}:{to}");
-            return Err(
-                Failure::input(message).hint("an outage of a length alone has an earliest start")
+            return refused(
+                format!("--start {start_s} beside --outage {from}:{to}"),
+                "an outage of a length alone has an earliest start",
             );
         }
         if self.model.is_none() && self.outage == Ask::Longest {
-            return Err(Failure::input("--outage longest needs a MODEL")
-                .hint("without one, give a length in seconds"));
+            return refused(
+                "--outage longest needs a MODEL",
+                "without one, give a length in seconds",
+            );
         }
         Ok(files("trajectory", [&self.trajectory])
             .chain(files("model", &self.model))
@@ -157,67 +150,72 @@ impl Command for Require {
 
     fn run(&self, context: &Context<'_>) -> Result<RequireAnswer> {
         let asked = self.requirements(context)?;
-        let of_others = |found| RequireAnswer { found, file: None };
-        match (&self.model, &self.catalogue) {
-            (Some(path), _) => given(path, &asked, self.vehicle.is_some(), context).map(of_others),
+        Ok(match (&self.model, &self.catalogue) {
+            (Some(path), _) => {
+                RequireAnswer::Given(Box::new(asked.given(path, self.vehicle.is_some(), context)?))
+            }
             (None, Some(directory)) => {
-                let units = match directory.as_os_str() == BUILT_IN {
-                    true => catalogue(&asked)?,
-                    false => units_of(directory, &asked, context)?,
+                let units = if directory.as_os_str() == BUILT_IN { asked.catalogue()? } else { asked.units_of(directory, context)? };
+                RequireAnswer::Ranked(asked.ranked(&units)?)
+            }
+            (None, None) => RequireAnswer::Needed(Box::new(asked.needed().map_err(|e| {
+                let hint = match e {
+                    RequireError::Loose { .. } => "a smaller limit, or a longer outage",
+                    _ => "a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)",
                 };
-                Ok(of_others(Found::Ranked(asked.ranked(&units)?)))
-            }
-            (None, None) => {
-                let needed = sought(&asked)?;
-                let file = Some(asked.model_file(&needed));
-                let found = Found::Needed(Box::new(needed));
-                Ok(RequireAnswer { found, file })
-            }
-        }
+                Failure::input(e).hint(hint)
+            })?)),
+        })
     }
 }
 
 impl Answer for RequireAnswer {
     fn document(&self) -> Document {
-        match &self.found {
-            Found::Needed(needed) => needed.document(),
-            Found::Given(given) => given.document(),
-            Found::Ranked(ranking) => ranking.document(),
+        match self {
+            Self::Needed(needed) => needed.document(),
+            Self::Given(given) => given.document(),
+            Self::Ranked(ranking) => ranking.document(),
         }
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {
-        let file = self.file.as_ref().map(model_file::to_toml);
-        file.map(|text| OutputFile::whole("", text))
-            .into_iter()
-            .collect()
+        match self {
+            Self::Needed(needed) => {
+                vec![OutputFile::whole("", model_file::to_toml(&needed.file))]
+            }
+            _ => Vec::new(),
+        }
     }
 
     /// The limits that are not kept.
     fn unmet(&self) -> Option<Failure> {
-        match &self.found {
-            Found::Needed(_) => None,
-            Found::Given(judged) => {
-                let missed = judged.judged.as_ref().filter(|judged| !judged.met)?;
-                let Worst { limit, value, .. } = missed.worst;
+        match self {
+            Self::Needed(_) => None,
+            Self::Given(given) => {
+                let Worst { limit, value, .. } =
+                    given.judgement.margins.as_ref().filter(|m| !m.met)?.worst;
                 let [value, most] = [value, limit.most].map(|x| limit.quantity.shown(x));
                 Some(Failure::bound(format!(
                     "{} is {value}, the limit is {most}",
                     limit.quantity
                 )))
             }
-            Found::Ranked(ranking) => (!ranking.is_met())
-                .then(|| Failure::bound("no unit keeps the limits by figures that are all stated")),
+            Self::Ranked(ranking) => ranking.best().is_none().then(|| Failure::bound(NONE)),
         }
     }
 }
+
+/// Verdict on units of which none keeps the limits.
+const NONE: &str = "no unit keeps the limits by figures that are all stated";
 
 impl Require {
     /// What is asked, with the files read.
     fn requirements(&self, context: &Context<'_>) -> Result<Requirements> {
         if self.limits.is_empty() {
-            let hint = "give one, such as --require 'p95_m<=5' or --require 'yaw_deg<=1'";
-            return Err(Failure::input("no limit is given").hint(hint));
+            return refused(
+                "no limit is given",
+                "give one, such as --require 'p95_m<=5' or --require 'yaw_deg<=1'",
+            );
         }
         let mut scenario = self.settings.read()?;
         if let Some(path) = &self.gnss {
@@ -225,109 +223,113 @@ impl Require {
         }
         if self.vehicle.is_some() {
             if !scenario.aiding.is_none() {
-                return Err(
-                    Failure::input("--vehicle car beside [aiding] of --scenario")
-                        .hint("give one of them"),
+                return refused(
+                    "--vehicle car beside [aiding] of --scenario",
+                    "give one of them",
                 );
             }
             scenario.aiding = AidingSettings::car();
         }
         scenario.validate().map_err(Failure::input)?;
-        let trajectory = inputs::trajectory(&self.trajectory, context)?;
-        let limits = self.limits.clone();
-        Requirements::new(scenario, trajectory, limits, self.outage, self.start)
+        Requirements::new(
+            scenario,
+            inputs::trajectory(&self.trajectory, context)?,
+            self.limits.clone(),
+            self.outage,
+            self.start,
+        )
     }
 }
 
-/// The IMU that is needed.
-fn sought(requirements: &Requirements) -> Result<NeededImu> {
-    requirements.needed().map_err(|e| {
-        let hint = match e {
-            RequireError::Loose { .. } => "a smaller limit, or a longer outage",
-            _ => "a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)",
-        };
-        Failure::input(e).hint(hint)
-    })
-}
-
-/// What a given IMU makes of the limits.
-fn given(
-    path: &Path,
-    requirements: &Requirements,
-    has_vehicle: bool,
-    context: &Context<'_>,
-) -> Result<Found> {
-    let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
-    let file = inputs::model(path, context)?;
-    let mut scenario = requirements.scenario.clone();
-    inputs::expect_turn_on(&mut scenario.initial, &file, path, context);
-    inputs::make_turn_on(&mut scenario.imu, &file, path, context);
-    let not_stated = stated_in_words(&file.not_stated());
-    if !not_stated.is_empty() {
-        let text = format!(
-            "{}: what is not stated counts as none: {not_stated}",
-            path.display()
-        );
-        context.warn(text);
-    }
-    let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
-    let mut judged = requirements.judged(&scenario, &model).map_err(unusable)?;
-    if has_vehicle {
-        judged.aidings = requirements.aidings(&scenario, &model).map_err(unusable)?;
-    }
-    Ok(Found::Given(Box::new(judged)))
-}
-
-/// The units that are known by name.
-fn catalogue(requirements: &Requirements) -> Result<Vec<CatalogueUnit>> {
-    let unit = |(name, _): &(&str, &str)| {
-        let sheet = datasheet::catalogued(name).expect("a name of the catalogue")?;
-        of_sheet((*name).to_owned(), &sheet, requirements)
-    };
-    CATALOGUE.iter().map(unit).collect()
-}
-
-/// The model files and catalogue entries of a directory.
-fn units_of(
-    directory: &Path,
-    asked: &Requirements,
-    context: &Context<'_>,
-) -> Result<Vec<CatalogueUnit>> {
-    if !directory.exists() {
-        let message = format!(
-            "--catalogue {}: there is no such directory",
-            directory.display()
-        );
-        return Err(Failure::input(message)
-            .hint("without a directory, --catalogue ranks the catalogued IMUs"));
-    }
-    let mut paths = listed(&[directory.to_owned()])?;
-    paths.retain(|p| p.extension().is_some_and(|e| e == "toml"));
-    if paths.is_empty() {
-        let message = format!("{}: no model file (.toml)", directory.display());
-        return Err(Failure::input(message)
-            .hint("make them with `nav-sim calibrate` or `nav-sim datasheet`"));
-    }
-    let unit = |path: &PathBuf| {
-        let name = path
-            .file_stem()
-            .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        if file_kind::of(path)? == FileKind::CatalogueEntry {
-            return of_sheet(name, &datasheet::read(path)?, asked);
-        }
+impl Requirements {
+    /// What a given IMU makes of the limits.
+    fn given(&self, path: &Path, has_vehicle: bool, context: &Context<'_>) -> Result<GivenImu> {
+        let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
         let file = inputs::model(path, context)?;
-        let model = inputs::at_rate(path, &file.model, asked.scenario.imu.rate_hz, context)?;
-        Ok(asked.unit(name, &file, model))
-    };
-    paths.iter().map(unit).collect()
-}
+        let mut scenario = self.scenario.clone();
+        inputs::expect_turn_on(&mut scenario.initial, &file, path, context);
+        inputs::make_turn_on(&mut scenario.imu, &file, path, context);
+        let missing = missing(&file.not_stated());
+        if !missing.is_empty() {
+            context.warn(format!(
+                "{}: what is not stated counts as none: {missing}",
+                path.display()
+            ));
+        }
+        let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
+        let aidings = if has_vehicle {
+            self.aidings(&scenario, &model).map_err(unusable)?
+        } else {
+            Vec::new()
+        };
+        let outages = match self.ask {
+            Ask::Longest => self.long_outages(),
+            _ => self.outages(),
+        };
+        Ok(GivenImu {
+            schema_version: 1,
+            question: self.question(outages),
+            judgement: self.judged(&scenario, &model).map_err(unusable)?,
+            aidings,
+        })
+    }
 
-fn of_sheet(name: String, sheet: &Datasheet, requirements: &Requirements) -> Result<CatalogueUnit> {
-    let made = sheet.model_file(requirements.scenario.imu.rate_hz);
-    let file = made
-        .map_err(|e| Failure::input(format!("{name}: {e}")))?
-        .file;
-    Ok(requirements.unit(name, &file, file.model.clone()))
+    /// The units that are known by name.
+    fn catalogue(&self) -> Result<Vec<CatalogueUnit>> {
+        let unit = |(name, _): &(&str, &str)| {
+            self.of_sheet(
+                (*name).to_owned(),
+                &datasheet::catalogued(name).expect("a name of the catalogue")?,
+            )
+        };
+        CATALOGUE.iter().map(unit).collect()
+    }
+
+    /// The model files and catalogue entries of a directory.
+    fn units_of(&self, directory: &Path, context: &Context<'_>) -> Result<Vec<CatalogueUnit>> {
+        if !directory.exists() {
+            return refused(
+                format!(
+                    "--catalogue {}: there is no such directory",
+                    directory.display()
+                ),
+                "without a directory, --catalogue ranks the catalogued IMUs",
+            );
+        }
+        let mut paths = listed(&[directory.to_owned()])?;
+        paths.retain(|p| p.extension().is_some_and(|e| e == "toml"));
+        if paths.is_empty() {
+            return refused(
+                format!("{}: no model file (.toml)", directory.display()),
+                "make them with `nav-sim calibrate` or `nav-sim datasheet`",
+            );
+        }
+        let unit = |path: &PathBuf| {
+            let name = path
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
+            if file_kind::of(path)? == FileKind::CatalogueEntry {
+                return self.of_sheet(name, &datasheet::read(path)?);
+            }
+            let file = inputs::model(path, context)?;
+            Ok(self.unit(
+                name,
+                &file,
+                inputs::at_rate(path, &file.model, self.scenario.imu.rate_hz, context)?,
+            ))
+        };
+        paths.iter().map(unit).collect()
+    }
+
+    fn of_sheet(&self, name: String, sheet: &Datasheet) -> Result<CatalogueUnit> {
+        let file = sheet
+            .model_file(self.scenario.imu.rate_hz)
+            .refuse_within(&name)?
+            .file;
+        Ok(self.unit(name, &file, file.model.clone()))
+    }
 }
 
 // Limits, the places of an outage, and what all answers share: curves of drift, doubts.
@@ -340,23 +342,15 @@ const LONGEST_S: f64 = 600.0;
 const CONFIRM: &str = "confirm with nav-sim run --method both";
 /// Last line of each page.
 const CHECKED: &str = "covariance analysis against sampled runs: docs/validation.md.";
-/// Caption of drift curves.
-const DRIFT: &str =
-    "The error at the end of an outage against its length, at the worst of the places.";
-
-/// The error after an outage; none where the trajectory is too short.
-#[derive(Debug, Clone, Serialize)]
-struct DriftPoint {
-    outage_s: u32,
-    value: Option<f64>,
-}
 
 /// Warns of an outage in which errors are beyond linear theory.
 fn note_beyond(beyond: Option<Outage>, document: &mut Document) {
     if let Some(Outage { start_s, end_s }) = beyond {
         let place = window(start_s, end_s);
-        let text = format!("beyond linear theory in outage {place}: {CONFIRM}");
-        document.note(Importance::Warning, text);
+        document.note(
+            Importance::Warning,
+            format!("beyond linear theory in outage {place}: {CONFIRM}"),
+        );
     }
 }
 
@@ -403,8 +397,11 @@ impl Question {
     }
 
     fn limits_in_words(&self) -> String {
-        let limit = |l: &Limit| format!("{} ≤ {}", l.quantity, readable(l.most));
-        self.limits.iter().map(limit).collect::<Vec<_>>().join(", ")
+        self.limits
+            .iter()
+            .map(|l| format!("{} ≤ {}", l.quantity, readable(l.most)))
+            .collect::<Vec<_>>()
+            .join(", ")
     }
 
     /// `p95_m 4.87 at the end of outage 300–360 s`
@@ -431,28 +428,11 @@ const fn quantity_in_words(quantity: Quantity) -> &'static str {
     }
 }
 
-fn drift_chart(quantity: Quantity, series: Vec<Series>) -> Chart {
-    let panel = Panel {
-        height: 1.3,
-        ..Panel::new(Axis::log(quantity_in_words(quantity)), series)
-    };
-    Chart::new(
-        "Drift without fixes",
-        Axis::log("length of the outage (s)"),
-        vec![panel],
-    )
-}
-
-fn points(curve: &[DriftPoint]) -> Vec<(f64, f64)> {
-    let point = |p: &DriftPoint| (f64::from(p.outage_s), p.value.unwrap_or(f64::NAN));
-    curve.iter().map(point).collect()
-}
-
 // The IMU that a limit needs.
 
 /// The IMU that a limit needs.
 #[derive(Debug, Serialize)]
-struct NeededImu {
+pub struct NeededImu {
     schema_version: u32,
     question: Question,
     t_corr_s: f64,
@@ -466,6 +446,8 @@ struct NeededImu {
     /// With equal shares.
     #[serde(skip)]
     imu: ImuParameters,
+    #[serde(skip)]
+    file: ModelFile,
 }
 
 /// Turn-on biases that it has.
@@ -609,11 +591,13 @@ impl Requirements {
             _ => first_s,
         };
         if begins_s < span_s.0 || begins_s + length_s > span_s.1 {
-            let message = format!(
-                "an outage of {length_s} s from {begins_s} s on is not on the trajectory, which lasts from {} to {} s",
-                span_s.0, span_s.1
+            return refused(
+                format!(
+                    "an outage of {length_s} s from {begins_s} s on is not on the trajectory, which lasts from {} to {} s",
+                    span_s.0, span_s.1
+                ),
+                format!("a shorter --outage{earlier}"),
             );
-            return Err(Failure::input(message).hint(format!("a shorter --outage{earlier}")));
         }
         Ok(Self {
             scenario,
@@ -640,8 +624,8 @@ impl Requirements {
         };
         let imu = need.allocated()?;
         let model = imu.model(self.scenario.imu.rate_hz);
-        let ends = course.drifts(scenario, &model)?;
-        let worst = Worst::of(&self.limits, &ends).expect("at least one limit and one place");
+        let worst = Worst::of(&self.limits, &course.drifts(scenario, &model)?)
+            .expect("at least one limit and one place");
         let figure = |i: usize| {
             Ok::<_, RequireError>(NeededFigure {
                 figure: ImuParameters::NAMES[i],
@@ -651,7 +635,7 @@ impl Requirements {
             })
         };
         let turn_on = |sensor| scenario.imu.turn_on_bias(sensor).unwrap_or(0.0);
-        Ok(NeededImu {
+        let mut needed = NeededImu {
             schema_version: 1,
             t_corr_s: imu.t_corr_s,
             turn_on_bias: TurnOnBias {
@@ -663,7 +647,25 @@ impl Requirements {
             question: self.question(outages),
             worst,
             imu,
-        })
+            file: ModelFile::new(model),
+        };
+        let mut provenance = known(json!({
+            "program": PROGRAM,
+            "made_by": "require",
+            "label": "what a limit needs: not a calibration",
+            "question": needed.question.in_words(),
+            "turn_on_bias": needed.turn_on_in_words(),
+        }));
+        provenance.extend(
+            needed
+                .figures
+                .iter()
+                .map(|f| (f.figure.to_owned(), f.allocated.into())),
+        );
+        needed.file.provenance = Some(provenance);
+        let stated = self.stated_turn_on();
+        needed.file.turn_on = (stated != TurnOn::default()).then_some(stated);
+        Ok(needed)
     }
 
     /// The scenario with a filter that expects the turn-on biases that `[imu]` states, as it expects those of a model file.
@@ -686,44 +688,53 @@ impl Requirements {
         }
     }
 
-    /// What a model makes of the limits, and the longest outage that it bridges within them: at the places that the outage
-    /// asked for has, each as far as the trajectory goes. `scenario` is that of the unit, with its turn-on biases.
+    /// Errors after outages of growing length, at the places that the outage asked for has, each as far as the trajectory
+    /// goes; the longest outage within the limits; the hardest limit after the outage asked for, none where no place has one
+    /// of that length.
+    fn bridged(&self, scenario: &Scenario, model: &Model) -> Result<Bridged, RequireError> {
+        let long = self.long_outages();
+        let curves = Course::new(scenario, &self.trajectory, &long)?.curves(scenario, model)?;
+        let longest = self.longest_of(&curves);
+        let length_s = match self.ask {
+            Ask::Longest => longest.length_s(),
+            ask => ask.length_s(),
+        };
+        let worst = Worst::of(&self.limits, &after(&curves, length_s));
+        Ok((curves, longest, worst))
+    }
+
+    /// What a model makes of the limits. `scenario` is that of the unit, with its turn-on biases.
     ///
     /// # Errors
     /// When the model has no filter.
-    fn judged(&self, scenario: &Scenario, model: &Model) -> Result<GivenImu, RequireError> {
-        let long = self.long_outages();
-        let course = self.course(&long)?;
-        let curves = course.curves(scenario, model)?;
-        let longest = self.longest_of(&curves);
-        let of_limit = |limit: &Limit| LimitCurve {
-            quantity: limit.quantity,
-            points: drift_curve(&curves, limit.quantity),
+    fn judged(&self, scenario: &Scenario, model: &Model) -> Result<Judgement, RequireError> {
+        let (curves, outage, worst) = self.bridged(scenario, model)?;
+        let of_limit = |Limit { quantity, .. }: &Limit| {
+            let point = |outage_s: u32| {
+                let largest = Drift::largest(&after(&curves, f64::from(outage_s)), *quantity);
+                json!({ "outage_s": outage_s, "value": largest.map(|(_, x)| x) })
+            };
+            json!({ "quantity": quantity, "points": CURVE_S.map(point) })
         };
-        let curve_of_limit = self.limits.iter().map(of_limit).collect();
-        let (judged, outages, shown) = if self.ask == Ask::Longest {
-            let length_s = longest.length_s();
-            let worst = Worst::of(&self.limits, &after(&curves, length_s));
-            let shown = worst.map(|worst| Outage {
-                end_s: long[worst.place].start_s + length_s,
-                ..long[worst.place]
+        let (margins, shown) = if self.ask == Ask::Longest {
+            let shown = worst.map(|worst| {
+                let Outage { start_s, .. } = self.long_outages()[worst.place];
+                let end_s = start_s + outage.length_s();
+                Outage { start_s, end_s }
             });
-            (None, long, shown)
+            (None, shown)
         } else {
             let outages = self.outages();
             let margins = Margins::of(&self.course(&outages)?, scenario, model, &self.limits)?;
             let shown = outages[margins.worst.place];
-            (Some(margins), outages, Some(shown))
+            (Some(margins), Some(shown))
         };
         let beyond_linear = shown.map(|outage| self.beyond_linear(scenario, model, outage));
-        Ok(GivenImu {
-            schema_version: 1,
-            question: self.question(outages),
-            outage: longest,
-            curves: curve_of_limit,
+        Ok(Judgement {
+            curves: self.limits.iter().map(of_limit).collect(),
+            outage,
             beyond_linear: beyond_linear.transpose()?.flatten(),
-            aidings: Vec::new(),
-            judged,
+            margins,
         })
     }
 
@@ -742,19 +753,11 @@ impl Requirements {
                 aiding,
                 ..scenario.clone()
             };
-            let long = self.long_outages();
-            let course = Course::new(&scenario, &self.trajectory, &long)?;
-            let curves = course.curves(&scenario, model)?;
-            let longest = self.longest_of(&curves);
-            let length_s = if self.ask == Ask::Longest {
-                longest.length_s()
-            } else {
-                self.ask.length_s()
-            };
+            let (_, outage, worst) = self.bridged(&scenario, model)?;
             Ok(Aided {
                 aiding: name,
-                worst: Worst::of(&self.limits, &after(&curves, length_s)),
-                outage: longest,
+                worst,
+                outage,
             })
         };
         all.into_par_iter().map(aided).collect()
@@ -770,67 +773,64 @@ impl Requirements {
     ) -> Result<Option<Outage>, RequireError> {
         let (scenario, outages) = (scenario.with_full_noise(), [outage]);
         let track = scenario.track(&self.trajectory, model, &outages)?;
-        let belief = scenario.belief(model, &outages, &track)?;
-        let experiment =
-            scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0);
-        let expected = Expected::along(&track, &experiment, &belief, model);
-        let is_beyond = expected.is_some_and(|expected| expected.summary.outages[0].beyond_linear);
-        Ok(is_beyond.then_some(outage))
+        let expected = Expected::along(
+            &track,
+            &scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0),
+            &scenario.belief(model, &outages, &track)?,
+            model,
+        );
+        Ok(expected
+            .is_some_and(|expected| expected.summary.outages[0].beyond_linear)
+            .then_some(outage))
     }
 
-    /// Units after the outage and after those of `CURVE_S`: those whose figures are all stated, the best first, then the others
-    /// by name.
+    /// Units whose figures are all stated, the best first, then the others by name.
     ///
     /// # Errors
-    /// When a model has no filter, with its name, or the length is not a whole number of seconds.
+    /// When a model has no filter, with its name, or the longest outage is asked for.
     fn ranked(&self, units: &[CatalogueUnit]) -> Result<Ranking, Failure> {
-        let outages = self.long_outages();
-        let course = self.course(&outages)?;
         let ranked = |unit: &CatalogueUnit| {
-            let ranked = self.rank(&course, unit);
-            ranked.map_err(|e| e.within(&unit.name))
+            let CatalogueUnit {
+                name,
+                model,
+                scenario,
+                not_stated,
+            } = unit;
+            let mut judgement = self.judged(scenario, model).refuse_within(name)?;
+            let is_complete = not_stated.is_empty();
+            let margins = judgement.margins.as_mut();
+            let is_met = margins.is_some_and(|margins| {
+                let is_met = margins.met;
+                margins.met &= is_complete;
+                is_met
+            });
+            Ok(RankedUnit {
+                unit: name.clone(),
+                kept: match (is_met, is_complete) {
+                    (true, true) => "met",
+                    (true, false) => "open",
+                    (false, _) => "not met",
+                },
+                missing: missing(not_stated),
+                not_stated: not_stated.clone(),
+                judgement,
+            })
         };
         let ranked: Vec<Result<RankedUnit, Failure>> = units.par_iter().map(ranked).collect();
         let mut units = ranked.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let margin = |unit: &RankedUnit| {
+            let margins = unit.judgement.margins.as_ref();
+            margins.map_or(0.0, |margins| margins.worst.margin())
+        };
         units.sort_by(|a, b| match [a, b].map(|unit| unit.not_stated.is_empty()) {
-            [true, true] => b.worst.margin().total_cmp(&a.worst.margin()),
+            [true, true] => margin(b).total_cmp(&margin(a)),
             [false, false] => a.unit.cmp(&b.unit),
             [a, b] => b.cmp(&a),
         });
         Ok(Ranking {
             schema_version: 1,
             question: self.question(self.outages()),
-            curve_quantity: self.limits[0].quantity,
             units,
-        })
-    }
-
-    fn rank(&self, course: &Course<'_>, unit: &CatalogueUnit) -> Result<RankedUnit, Failure> {
-        let curves = course.curves(&unit.scenario, &unit.model).refuse()?;
-        let length_s = self.ask.length_s();
-        let worst = Worst::of(&self.limits, &after(&curves, length_s));
-        let worst = worst.ok_or_else(|| {
-            Failure::input(format!("{length_s} s is not a whole number of seconds"))
-        })?;
-        let is_complete = unit.not_stated.is_empty();
-        let kept = match worst.margin() >= 0.0 {
-            true if is_complete => "met",
-            true => "open",
-            false => "not met",
-        };
-        let outage = self.outages()[worst.place];
-        Ok(RankedUnit {
-            unit: unit.name.clone(),
-            met: kept == "met",
-            kept,
-            missing: stated_in_words(&unit.not_stated),
-            not_stated: unit.not_stated.clone(),
-            worst,
-            curve: drift_curve(&curves, self.limits[0].quantity),
-            outage: self.longest_of(&curves),
-            beyond_linear: self
-                .beyond_linear(&unit.scenario, &unit.model, outage)
-                .refuse()?,
         })
     }
 
@@ -843,14 +843,24 @@ impl Requirements {
                 .iter()
                 .any(|drift| self.limits.iter().any(|l| drift.exceeds(l)))
         };
-        let missed = lengths.iter().position(is_missed);
-        let longest_s = missed.map(|first| first.checked_sub(1).map_or(0.0, |last| lengths[last]));
+        let longest_s = lengths
+            .iter()
+            .position(is_missed)
+            .map(|first| first.checked_sub(1).map_or(0.0, |last| lengths[last]));
         let at_least_s = lengths.last().copied().unwrap_or(0.0);
+        let at_least = || {
+            let rest = if at_least_s < LONGEST_S {
+                "to the end of the trajectory"
+            } else {
+                "longer ones are not looked at"
+            };
+            format!("≥ {} s, {rest}", seconds(at_least_s))
+        };
         let text = match longest_s {
             // curves begin with the first second: what is not kept then may be kept for a part of it
             Some(s) if s < 1.0 => "less than 1 s".to_owned(),
             Some(s) => format!("{} s", seconds(s)),
-            None => format!("≥ {} s", seconds(at_least_s)),
+            None => at_least(),
         };
         Longest {
             longest_s,
@@ -860,7 +870,6 @@ impl Requirements {
     }
 
     /// A unit whose turn-on biases are there and expected; `model` is at the rate of the IMU.
-    #[must_use]
     fn unit(&self, name: String, file: &ModelFile, model: Model) -> CatalogueUnit {
         let mut scenario = self.scenario.clone();
         let stated = file.turn_on.unwrap_or_default();
@@ -871,30 +880,6 @@ impl Requirements {
             model,
             scenario,
             not_stated: file.not_stated(),
-        }
-    }
-
-    /// The model file of an IMU that is needed.
-    #[must_use]
-    fn model_file(&self, needed: &NeededImu) -> ModelFile {
-        let imu = &needed.imu;
-        let mut provenance = toml::Table::new();
-        let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
-        put("program", PROGRAM.into());
-        put("made_by", "require".into());
-        put("label", "what a limit needs: not a calibration".into());
-        put("question", needed.question.in_words().into());
-        put("turn_on_bias", needed.turn_on_in_words().into());
-        for (i, name) in ImuParameters::NAMES.iter().enumerate() {
-            put(name, ImuParameters::in_datasheets(i, imu.values[i]).into());
-        }
-        let stated = self.stated_turn_on();
-        let turn_on = (stated != TurnOn::default()).then_some(stated);
-        let model = imu.model(self.scenario.imu.rate_hz);
-        ModelFile {
-            provenance: Some(provenance),
-            turn_on,
-            ..ModelFile::new(model)
         }
     }
 
@@ -967,22 +952,12 @@ fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
     // Times come from samples: within a millisecond they are the same.
     const SAME_S: f64 = 1e-3;
     let drift_of_curve = |curve: &Vec<Drift>| {
-        let first = curve.partition_point(|d| d.after_s < length_s - SAME_S);
         curve
-            .get(first)
+            .get(curve.partition_point(|d| d.after_s < length_s - SAME_S))
             .filter(|d| d.after_s < length_s + SAME_S)
             .copied()
     };
     curves.iter().filter_map(drift_of_curve).collect()
-}
-
-/// The largest value of a quantity after each of [`CURVE_S`] without fixes.
-fn drift_curve(curves: &[Vec<Drift>], quantity: Quantity) -> Vec<DriftPoint> {
-    let point = |outage_s: u32| DriftPoint {
-        outage_s,
-        value: Drift::largest(&after(curves, f64::from(outage_s)), quantity).map(|(_, x)| x),
-    };
-    CURVE_S.map(point).to_vec()
 }
 
 // A given IMU against its limits.
@@ -1004,39 +979,34 @@ impl Longest {
     fn length_s(&self) -> f64 {
         self.longest_s.or(self.at_least_s).unwrap_or_default()
     }
-
-    fn in_words(&self) -> String {
-        let text = &self.text;
-        match self.at_least_s {
-            Some(s) if s < LONGEST_S => format!("{text}, to the end of the trajectory"),
-            Some(_) => format!("{text}, longer ones are not looked at"),
-            None => text.clone(),
-        }
-    }
 }
 
 /// A model against its limits.
 #[derive(Debug, Serialize)]
-struct GivenImu {
+pub struct GivenImu {
     schema_version: u32,
     question: Question,
-    outage: Longest,
-    /// The quantity of each limit, at its worst place, after outages of growing length.
-    curves: Vec<LimitCurve>,
-    /// The outage of the answer, where it is beyond linear theory.
-    beyond_linear: Option<Outage>,
+    #[serde(flatten)]
+    judgement: Judgement,
     /// With and without what the vehicle knows of its own motion; empty where that is not asked.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     aidings: Vec<Aided>,
-    /// After the outage that was asked for; none where the longest is sought.
-    #[serde(flatten)]
-    judged: Option<Margins>,
 }
 
+/// Curves of errors, the longest outage within the limits, and the hardest limit.
+type Bridged = (Vec<Vec<Drift>>, Longest, Option<Worst>);
+
+/// What a model makes of its limits.
 #[derive(Debug, Serialize)]
-struct LimitCurve {
-    quantity: Quantity,
-    points: Vec<DriftPoint>,
+struct Judgement {
+    outage: Longest,
+    /// The quantity of each limit, at its worst place, after outages of growing length.
+    curves: Vec<Value>,
+    /// The outage of the answer, where it is beyond linear theory.
+    beyond_linear: Option<Outage>,
+    /// After the outage that was asked for; none where the longest is sought.
+    #[serde(flatten)]
+    margins: Option<Margins>,
 }
 
 /// Limits where the vehicle measures something of its own motion.
@@ -1051,8 +1021,8 @@ struct Aided {
 
 impl GivenImu {
     fn verdict(&self) -> Vec<String> {
-        let (question, longest) = (&self.question, self.outage.in_words());
-        let Some(judged) = &self.judged else {
+        let (question, longest) = (&self.question, &self.judgement.outage.text);
+        let Some(judged) = &self.judgement.margins else {
             let (limits, starts) = (question.limits_in_words(), question.starts());
             return vec![format!(
                 "longest outage within {limits}: {longest} ({starts})"
@@ -1069,27 +1039,26 @@ impl GivenImu {
             ),
             format!("asked: {}", question.in_words()),
             format!("longest outage within the limits, from the same starts: {longest}"),
-            match without.margin() >= 0.0 {
-                true => format!("an IMU without errors would leave {name} {left}"),
-                false => {
-                    format!("no IMU keeps the limit: GNSS and start alone leave {name} {left}")
-                }
+            if without.margin() >= 0.0 {
+                format!("an IMU without errors would leave {name} {left}")
+            } else {
+                format!("no IMU keeps the limit: GNSS and start alone leave {name} {left}")
             },
         ]
     }
 
     /// Verdict, tables and charts.
     fn document(&self) -> Document {
-        let is_good = match &self.judged {
+        let is_good = match &self.judgement.margins {
             Some(judged) => judged.met,
-            None => self.outage.length_s() > 0.0,
+            None => self.judgement.outage.length_s() > 0.0,
         };
         let mut document = Document::new(
             "An IMU against its limits",
             Tone::from(is_good),
             self.verdict(),
         );
-        note_beyond(self.beyond_linear, &mut document);
+        note_beyond(self.judgement.beyond_linear, &mut document);
         if !self.aidings.is_empty() {
             document.section("What the car knows of its own motion");
             let columns = [
@@ -1102,24 +1071,20 @@ impl GivenImu {
             document.lead(Table::of(self, "/aidings/*", &columns));
         }
         document.section("Error against the length of an outage");
-        for (k, (limit, curve)) in self.question.limits.iter().zip(&self.curves).enumerate() {
-            let mut series = vec![Series::new("limit", Colour::RIGHT, Mark::Level(limit.most))];
-            let points = points(&curve.points);
-            series.extend(Series::dotted_line("this IMU", Colour::REAL, points));
-            document.chart(&drift_chart(limit.quantity, series), DRIFT);
-            let columns = [
-                ("outage (s)", "outage_s"),
-                (quantity_in_words(limit.quantity), "value"),
-            ];
-            let rows = format!("/curves/{k}/points/*");
-            document.table(&Table::of(self, &rows, &columns));
-        }
+        document.table(&Table::of(
+            self,
+            "/curves/*",
+            &[("limit on", "quantity"), AFTER],
+        ));
         document.checked(CHECKED);
         document
     }
 }
 
 // Units of a catalogue against a limit.
+
+/// A column for each length of a curve.
+const AFTER: (&str, &str) = ("{outage_s} s", "points/*/value");
 
 /// What a ranking takes for granted.
 const RULE: &str = "A figure that is missing counts as none: open means that the limit would be kept then. Turn-on bias is the repeatability from one switching-on to the next; an initial tolerance of the zero offset counts as removed before use. Figures named without a sensor are missing for both.";
@@ -1128,88 +1093,66 @@ const RULE: &str = "A figure that is missing counts as none: open means that the
 #[derive(Debug, Serialize)]
 struct RankedUnit {
     unit: String,
-    /// True if the limits are kept by figures that are all stated.
-    met: bool,
     /// `met`, `not met`, or `open` where figures are missing.
     kept: &'static str,
     /// Figures that its datasheet does not state: they count as zero.
     not_stated: Vec<String>,
     /// The same in words.
     missing: String,
-    /// The hardest limit for the outage asked for.
+    /// True of `met` if the limits are kept by figures that are all stated.
     #[serde(flatten)]
-    worst: Worst,
-    outage: Longest,
-    /// The quantity of the first limit, at its worst place, after outages of growing length.
-    curve: Vec<DriftPoint>,
-    /// The outage asked for, where it is beyond linear theory.
-    beyond_linear: Option<Outage>,
+    judgement: Judgement,
 }
 
 /// Units against limits: those whose figures are all stated, the best first, then the others by name.
 #[derive(Debug, Serialize)]
-struct Ranking {
+pub struct Ranking {
     schema_version: u32,
     question: Question,
-    curve_quantity: Quantity,
     units: Vec<RankedUnit>,
 }
 
 impl Ranking {
-    /// True if a unit keeps the limits, by figures that are all stated.
-    fn is_met(&self) -> bool {
-        self.units.iter().any(|unit| unit.met)
+    /// The best of the units that keep the limits by figures that are all stated.
+    fn best(&self) -> Option<&RankedUnit> {
+        self.units.iter().find(|unit| unit.kept == "met")
     }
 
-    fn verdict(&self) -> Vec<String> {
-        let count = self.units.iter().filter(|u| u.met).count();
-        let answer = match self.units.iter().find(|u| u.met) {
-            None => "no unit keeps the limit by figures that are all stated".to_owned(),
-            Some(best) => format!(
-                "{} is the best of {count} units that keep the limit",
+    /// Verdict and tables.
+    fn document(&self) -> Document {
+        let count = |is: fn(&RankedUnit) -> bool| self.units.iter().filter(|u| is(u)).count();
+        let answer = self.best().map_or(NONE.to_owned(), |best| {
+            let met = count(|unit| unit.kept == "met");
+            format!(
+                "{} is the best of {met} units that keep the limit",
                 best.unit
-            ),
-        };
+            )
+        });
         let mut lines = vec![answer, format!("asked: {}", self.question.in_words())];
-        let missing = self
-            .units
-            .iter()
-            .filter(|u| !u.not_stated.is_empty())
-            .count();
-        if missing > 0 {
+        let open = count(|unit| !unit.not_stated.is_empty());
+        if open > 0 {
             lines.push(format!(
-                "{missing} units are not ranked: their data sheets leave figures out (--verbose lists them)"
+                "{open} units are not ranked: their data sheets leave figures out (--verbose lists them)"
             ));
         }
-        lines
-    }
-
-    fn curves(&self) -> Vec<Series> {
-        // more hues cannot be told apart
-        const COLOURED: usize = 6;
-        let curve =
-            |(k, unit): (usize, &RankedUnit)| match k < COLOURED && unit.not_stated.is_empty() {
-                true => Series::line(&unit.unit, Colour::Hue(k), points(&unit.curve)),
-                false => Series::thin("others", Colour::Soft, points(&unit.curve)),
-            };
-        let most = Mark::Level(self.question.limits[0].most);
-        // what stands behind is drawn first
-        std::iter::once(Series::new("limit", Colour::Ink, most))
-            .chain(self.units.iter().enumerate().rev().map(curve))
-            .collect()
-    }
-
-    /// Verdict, tables and charts.
-    fn document(&self) -> Document {
-        let tone = Tone::from(self.is_met());
-        let mut document = Document::new("IMUs against a limit", tone, self.verdict());
-        let beyond = self.units.iter().filter(|u| u.beyond_linear.is_some());
-        let names: Vec<&str> = beyond.map(|u| u.unit.as_str()).collect();
+        let mut document = Document::new(
+            "IMUs against a limit",
+            Tone::from(self.best().is_some()),
+            lines,
+        );
+        let names: Vec<&str> = self
+            .units
+            .iter()
+            .filter(|u| u.judgement.beyond_linear.is_some())
+            .map(|u| u.unit.as_str())
+            .collect();
         if !names.is_empty() {
-            let text = format!("beyond linear theory: {}: {CONFIRM}", names.join(", "));
-            document.note(Importance::Warning, text);
+            document.note(
+                Importance::Warning,
+                format!("beyond linear theory: {}: {CONFIRM}", names.join(", ")),
+            );
         }
-        let quantity = quantity_in_words(self.curve_quantity);
+        let quantity = quantity_in_words(self.question.limits[0].quantity);
         let columns = format!(
             "1 s … 300 s: {quantity} after such an outage; bridges: longest outage within the limits"
         );
@@ -1219,13 +1162,15 @@ impl Ranking {
             ("unit", "unit"),
             ("limit", "kept"),
             ("bridges", "outage/text"),
-            ("{outage_s} s", "curve/*/value"),
+            ("{outage_s} s", "curves/0/points/*/value"),
         ];
         document.lead(Table::of(self, "/units/*", &columns));
-        document.chart(&drift_chart(self.curve_quantity, self.curves()), DRIFT);
         document.section("Figures that are missing");
-        let columns = [("unit", "unit"), ("not stated", "missing")];
-        document.table(&Table::of(self, "/units/*", &columns));
+        document.table(&Table::of(
+            self,
+            "/units/*",
+            &[("unit", "unit"), ("not stated", "missing")],
+        ));
         document.text(RULE);
         document.checked(CHECKED);
         document
@@ -1233,7 +1178,7 @@ impl Ranking {
 }
 
 /// `bias, accel turn-on`: figures that both sensors lack are named once.
-fn stated_in_words(not_stated: &[String]) -> String {
+fn missing(not_stated: &[String]) -> String {
     let mut words = not_stated.join(", ").replace('_', "-");
     for figure in ["noise", "bias", "turn-on"] {
         words = words.replace(&format!("accel {figure}, gyro {figure}"), figure);

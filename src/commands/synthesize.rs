@@ -1,14 +1,14 @@
 //! `nav-sim synthesize`: replicate recordings of a noise model.
 
 use crate::app::reading::{ChannelSet, channel_set};
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Failure, Inputs, Out, OutputFile, Result, refused};
 use crate::io::model_file::{self, ModelFile};
 use crate::io::{contamination_file, recordings};
 use crate::parse;
 use nav_sim_document::{Document, Tone};
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::contamination::{Contamination, Rule};
-use nav_sim_signal::noise::{Model, Process, ReplicateError, VirtualImu};
+use nav_sim_signal::noise::{Model, ReplicateError, VirtualImu};
 use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -31,22 +31,22 @@ Examples:
 pub struct Synthesize {
     /// Noise model (TOML)
     #[arg(value_name = "MODEL")]
-    pub model: PathBuf,
+    model: PathBuf,
     /// Recordings to make
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
-    pub replicates: u64,
+    replicates: u64,
     /// Samples of each [default: 524284, as in the paper]
     #[arg(long, value_name = "T", conflicts_with = "duration", value_parser = clap::value_parser!(u64).range(2..))]
-    pub samples: Option<u64>,
+    samples: Option<u64>,
     /// Length of each in seconds, instead of --samples
     #[arg(long, value_name = "S", value_parser = parse::positive)]
-    pub duration: Option<f64>,
+    duration: Option<f64>,
     /// Draw each replicate's parameters from the spread that the model states
     #[arg(long)]
-    pub spread: bool,
+    spread: bool,
     /// Corrupt the replicates: a scenario of the paper (section4-II, section4-III, section5-II, section5-III) or a file
     #[arg(long, value_name = "NAME|FILE")]
-    pub contaminate: Option<String>,
+    contaminate: Option<String>,
     /// Signals to make: all, accel, gyro, x, accel.x, … (comma-separated)
     #[arg(
         long,
@@ -54,7 +54,7 @@ pub struct Synthesize {
         value_delimiter = ',',
         default_value = "all"
     , value_parser = channel_set)]
-    pub axes: Vec<ChannelSet>,
+    axes: Vec<ChannelSet>,
 }
 
 /// Recordings whose models are drawn; their noise is drawn as they are written.
@@ -81,14 +81,7 @@ struct Drawn {
     spread: bool,
     axes: Vec<String>,
     contamination: Option<String>,
-    replicates: Vec<Replicate>,
-}
-
-#[derive(Debug, Serialize)]
-struct Replicate {
-    file: String,
-    contaminated: bool,
-    axes: BTreeMap<String, Vec<Process>>,
+    replicates: Vec<Value>,
 }
 
 impl Command for Synthesize {
@@ -101,11 +94,15 @@ impl Command for Synthesize {
     const PLOT: bool = false;
     const PAGE: bool = false;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        let contamination = self.contaminate.iter().map(PathBuf::from);
-        let contamination = contamination.filter(|path| path.exists());
-        let files = contamination.map(|path| ("contamination", path));
-        Ok(files.chain([("model", self.model.clone())]).collect())
+    fn inputs(&self) -> Result<Inputs> {
+        Ok(self
+            .contaminate
+            .iter()
+            .map(PathBuf::from)
+            .filter(|path| path.exists())
+            .map(|path| ("contamination", path))
+            .chain([("model", self.model.clone())])
+            .collect())
     }
 
     fn output_names(&self) -> Vec<Cow<'static, str>> {
@@ -116,17 +113,21 @@ impl Command for Synthesize {
         let file = model_file::read(&self.model)?;
         let (shown, rate_hz) = (self.model.display(), file.model.rate_hz);
         if self.spread && file.spread.is_none() {
-            let hint = "see the head of calib_data/consumer_mems.toml, or leave --spread out";
-            let message = format!("{shown}: no [spread] to draw parameters from");
-            return Err(Failure::input(message).hint(hint));
+            return refused(
+                format!("{shown}: no [spread] to draw parameters from"),
+                "see the head of calib_data/consumer_mems.toml, or leave --spread out",
+            );
         }
         if file.turn_on.is_some() {
             context.remark(format!(
                 "{shown}: its turn-on biases are not drawn: recordings are of noise about their mean"
             ));
         }
-        let contamination = self.contaminate.as_deref();
-        let contamination = contamination.map(|name| find(name, rate_hz)).transpose()?;
+        let contamination = self
+            .contaminate
+            .as_deref()
+            .map(|name| find(name, rate_hz))
+            .transpose()?;
         let channels = self.wanted(&file, context)?;
         reaches(contamination.as_ref(), self.replicates, &channels, context)?;
         let samples = match self.duration {
@@ -134,15 +135,17 @@ impl Command for Synthesize {
             None => self.samples.unwrap_or(524_284) as f64,
         };
         if samples < 2.0 {
-            let message = format!("a recording needs at least 2 samples; these are {samples}");
-            return Err(Failure::input(message));
+            return Err(Failure::input(format!(
+                "a recording needs at least 2 samples; these are {samples}"
+            )));
         }
         let bytes = samples * channels.len() as f64 * 8.0;
         if bytes >= isize::MAX as f64 || Vec::<u8>::new().try_reserve_exact(bytes as usize).is_err()
         {
             let gigabytes = bytes / 1e9;
-            let message = format!("{samples} samples need {gigabytes:.0} GB of memory");
-            return Err(Failure::could_not(message));
+            return Err(Failure::could_not(format!(
+                "{samples} samples need {gigabytes:.0} GB of memory"
+            )));
         }
         let mut synthesis = Synthesis {
             schema_version: 1,
@@ -162,13 +165,15 @@ impl Command for Synthesize {
         };
         for k in 1..=self.replicates {
             let model = synthesis.model(k)?;
-            let axes = synthesis.channels.iter();
-            let axes = axes.map(|c| (c.to_string(), model.axis(*c).processes.clone()));
-            let replicate = Replicate {
-                file: name(k),
-                contaminated: synthesis.is_contaminated(k),
-                axes: axes.collect(),
-            };
+            let axes = synthesis
+                .channels
+                .iter()
+                .map(|c| (c.to_string(), model.axis(*c).processes.clone()));
+            let replicate = json!({
+                "file": name(k),
+                "contaminated": synthesis.is_contaminated(k),
+                "axes": axes.collect::<BTreeMap<_, _>>(),
+            });
             synthesis.drawn.replicates.push(replicate);
             synthesis.models.push(model);
         }
@@ -179,15 +184,15 @@ impl Command for Synthesize {
 impl Synthesize {
     /// The channels to make: those asked for that the model has.
     fn wanted(&self, file: &ModelFile, context: &Context<'_>) -> Result<Vec<Channel>> {
-        let asked = |c: &Channel| self.axes.iter().any(|set| set.contains(c));
         let (missing, present): (Vec<Channel>, Vec<Channel>) = Channel::ALL
             .into_iter()
-            .filter(asked)
+            .filter(|c| self.axes.iter().any(|set| set.contains(c)))
             .partition(|c| file.missing.contains(c));
         let shown = self.model.display();
         if present.is_empty() {
-            let message = format!("{shown} has no noise model for the axes asked for");
-            return Err(Failure::input(message));
+            return Err(Failure::input(format!(
+                "{shown} has no noise model for the axes asked for"
+            )));
         }
         for channel in missing {
             context.warn(format!(
@@ -213,8 +218,9 @@ impl Synthesis {
     }
 
     fn is_contaminated(&self, replicate: u64) -> bool {
-        let contamination = self.contamination.as_ref();
-        contamination.is_some_and(|c| c.touches(replicate))
+        self.contamination
+            .as_ref()
+            .is_some_and(|c| c.touches(replicate))
     }
 
     /// The model of a replicate, whose contamination is tried on silence.
@@ -234,10 +240,12 @@ impl Synthesis {
 
     fn text(&self, replicate: u64, model: &Model) -> String {
         let signal = |channel: &Channel| {
-            let signal = self
-                .imu()
-                .signal(model, replicate, *channel, self.drawn.samples);
-            (*channel, signal.expect("its contamination was tried"))
+            (
+                *channel,
+                self.imu()
+                    .signal(model, replicate, *channel, self.drawn.samples)
+                    .expect("its contamination was tried"),
+            )
         };
         let signals: Vec<_> = self.channels.par_iter().map(signal).collect();
         recordings::csv(model.rate_hz, &signals)
@@ -285,10 +293,10 @@ fn reaches(
     };
     let Contamination { name, rules } = contamination;
     if !(1..=replicates).any(|replicate| contamination.touches(replicate)) {
-        let message =
-            format!("--contaminate {name}: it touches none of the replicates 1 to {replicates}");
-        return Err(Failure::input(message)
-            .hint("replicates are counted from 1; more of them with --replicates"));
+        return refused(
+            format!("--contaminate {name}: it touches none of the replicates 1 to {replicates}"),
+            "replicates are counted from 1; more of them with --replicates",
+        );
     }
     let made = |rule: &Rule| channels.iter().any(|c| c.sensor == rule.sensor);
     let Some(Rule { sensor, place, .. }) = rules.iter().find(|rule| !made(rule)) else {
@@ -299,7 +307,7 @@ fn reaches(
         context.detail(message);
         return Ok(());
     }
-    Err(Failure::input(message).hint("another contamination, or --axes with that sensor"))
+    refused(message, "another contamination, or --axes with that sensor")
 }
 
 fn find(name: &str, rate_hz: f64) -> Result<Contamination> {

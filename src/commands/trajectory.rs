@@ -1,6 +1,8 @@
 //! `nav-sim trajectory`: reference trajectories.
 
-use crate::app::{Answer, Asked, Command, Context, Failure, Out, OutputFile, Result, inputs};
+use crate::app::{
+    Answer, Asked, Command, Context, Failure, Inputs, Out, OutputFile, Result, inputs,
+};
 use crate::io::scenario_file;
 use crate::io::trajectory_file::{self, Instants, Options, parse_origin};
 use crate::parse;
@@ -16,6 +18,7 @@ use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::plausibility::{LIMITS, examine};
 use nav_sim_signal::noise::continuous;
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// Make, check and convert reference trajectories
@@ -72,8 +75,9 @@ struct Source {
 struct Origin([f64; 3]);
 
 fn origin(text: &str) -> Result<Origin, String> {
-    let expected = || "not LAT_DEG,LON_DEG,H_M with a latitude within ±89.9".to_owned();
-    parse_origin(text).map(Origin).ok_or_else(expected)
+    parse_origin(text)
+        .map(Origin)
+        .ok_or_else(|| "not LAT_DEG,LON_DEG,H_M with a latitude within ±89.9".to_owned())
 }
 
 impl Source {
@@ -81,7 +85,7 @@ impl Source {
     fn read(&self, context: &Context<'_>) -> Result<(Trajectory, Vec<String>)> {
         let origin = self.origin.map(|o| o.0);
         let read = trajectory_file::load(&self.path, &Options { origin })?;
-        read.1.iter().for_each(|doubt| context.warn(doubt));
+        context.warn_each(&read.1);
         Ok(read)
     }
 
@@ -131,7 +135,7 @@ impl Command for Convert {
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(vec![self.source.input()])
     }
 
@@ -181,7 +185,7 @@ impl Command for CheckTrajectory {
     const NAME: &'static str = "trajectory check";
     const PLOT: bool = false;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(vec![self.source.input()])
     }
 
@@ -206,11 +210,13 @@ impl Command for CheckTrajectory {
         }
         let closure = Closure::new(&trajectory, self.rate_hz, GravityModel::default())
             .map_err(|e| Failure::input(format!("{name}: {e}")).hint("give another --rate-hz"))?;
-        let motion = |[speed_m_s, acceleration_m_s2, jerk_m_s3, rate_deg_s]: [f64; 4]| Motion {
-            speed_m_s,
-            acceleration_m_s2,
-            jerk_m_s3,
-            rate_deg_s,
+        let motion = |[speed_m_s, acceleration_m_s2, jerk_m_s3, rate_deg_s]: [f64; 4]| {
+            json!({
+                "speed_m_s": speed_m_s,
+                "acceleration_m_s2": acceleration_m_s2,
+                "jerk_m_s3": jerk_m_s3,
+                "rate_deg_s": rate_deg_s,
+            })
         };
         let places = trajectory.knots().iter();
         let places: Vec<_> = places.map(|t| trajectory.kinematics(*t).r_e).collect();
@@ -242,20 +248,12 @@ pub struct TrajectoryCheck {
     points: usize,
     /// Length of the path: chords between the points.
     path_m: f64,
-    largest: Motion,
-    limits: Motion,
+    largest: Value,
+    limits: Value,
     beyond_limits: Vec<String>,
     warnings: Vec<String>,
     closure: Closed,
     bounds: Bounds,
-}
-
-#[derive(Serialize)]
-struct Motion {
-    speed_m_s: f64,
-    acceleration_m_s2: f64,
-    jerk_m_s3: f64,
-    rate_deg_s: f64,
 }
 
 #[derive(Serialize)]
@@ -267,10 +265,6 @@ struct Closed {
 
 impl Answer for TrajectoryCheck {
     fn document(&self) -> Document {
-        Document::new("Trajectory", Tone::Good, self.text())
-    }
-
-    fn text(&self) -> Option<String> {
         let rows = [
             ("path (m)", "path_m -"),
             ("speed (m/s)", "largest/speed_m_s limits/speed_m_s"),
@@ -295,7 +289,7 @@ impl Answer for TrajectoryCheck {
             ("attitude (rad)", "closure/attitude_rad bounds/attitude_rad"),
         ];
         let c = &self.closure.closure;
-        Some(format!(
+        let text = format!(
             "{}: {} s from {} s, {} points\nclosure at {} Hz over {} s: {}\n{}",
             self.file,
             self.end_s - self.start_s,
@@ -309,7 +303,8 @@ impl Answer for TrajectoryCheck {
                 "BEYOND A BOUND"
             },
             Table::of_keys(self, &["", "largest", "limit"], &rows).columns(usize::MAX)
-        ))
+        );
+        Document::new("Trajectory", Tone::Good, [text])
     }
 
     fn unmet(&self) -> Option<Failure> {
@@ -386,18 +381,20 @@ impl Command for Record {
     const PLOT: bool = false;
     const PAGE: bool = false;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        let scenario = inputs::files("scenario", &self.scenario);
-        let model = ("model", self.model.clone());
-        Ok([self.source.input(), model]
+    fn inputs(&self) -> Result<Inputs> {
+        Ok([self.source.input(), ("model", self.model.clone())]
             .into_iter()
-            .chain(scenario)
+            .chain(inputs::files("scenario", &self.scenario))
             .collect())
     }
 
     fn run(&self, context: &Context<'_>) -> Result<RecordedDrive> {
-        let scenario = self.scenario.as_deref().map(scenario_file::read);
-        let mut scenario = scenario.transpose()?.unwrap_or_default();
+        let mut scenario = self
+            .scenario
+            .as_deref()
+            .map(scenario_file::read)
+            .transpose()?
+            .unwrap_or_default();
         let (trajectory, _) = self.source.read(context)?;
         let file = inputs::model(&self.model, context)?;
         let model = continuous::at_rate(&file.model, scenario.imu.rate_hz)
@@ -432,8 +429,9 @@ impl Answer for RecordedDrive {
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {
-        let files = self.files.into_iter().zip(self.texts.clone());
-        files
+        self.files
+            .into_iter()
+            .zip(self.texts.clone())
             .map(|(name, text)| OutputFile::whole(name, text))
             .collect()
     }

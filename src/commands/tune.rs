@@ -1,11 +1,13 @@
 //! `nav-sim tune`: the smallest factors on the variances of a noise model that make its filter consistent with other truths.
 
 use crate::app::inputs::{self, SettingsArgs, files};
-use crate::app::{Answer, Command, Context, Failure, Input, Out, OutputFile, Result};
+use crate::app::{
+    Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Result, refused,
+};
 use crate::io::draws_file::{self, Draws};
-use crate::io::model_file::{self, ModelFile, PROGRAM};
+use crate::io::model_file::{self, ModelFile, PROGRAM, known};
 use crate::parse;
-use crate::report::unexpected_line;
+use crate::report::{in_order, unexpected_line};
 use nav_sim_calibration::derived_interval;
 use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds, short_names};
 use nav_sim_navigation::ekf::{BeliefError, FilterStates};
@@ -39,26 +41,26 @@ Examples:
       --truth calib_data/consumer_mems.toml")]
 pub struct Tune {
     /// Noise model to be tuned
-    pub model: PathBuf,
+    model: PathBuf,
     /// Noise models that may make the errors, such as those of single recordings [default: MODEL, with the errors in SCENARIO]
     #[arg(id = "truth", long = "truth", value_name = "MODEL2", num_args = 1..)]
-    pub truths: Vec<PathBuf>,
+    truths: Vec<PathBuf>,
     /// Truths are MODEL itself and the draws of its calibration (MODEL.draws.json, which `calibrate` writes), each with the
     /// parameters of a recording of its own where MODEL states a spread: errors count up to the upper end of their 95 % interval
     #[arg(long, conflicts_with = "truth")]
-    pub intervals: bool,
+    intervals: bool,
     /// Trajectory: motion profile (.toml) or table (.csv) [default: a built-in drive with outages of that length]
     #[arg(long, value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
     /// Outages, receiver, start, IMU rate.
     #[command(flatten)]
-    pub settings: SettingsArgs,
+    settings: SettingsArgs,
     /// Meaning of consistent: worst, no error of any truth exceeds what the filter states; mean, the NEES is right on average
     #[arg(id = "for", long = "for", value_name = "AIM", value_parser = parse::one_of::<Aim>(&Aim::NAMES), default_value_t)]
-    pub aim: Aim,
+    aim: Aim,
     /// Filter to tune: full, 15 or 21 (these take longer); the filter that `run` makes by default is assessed too
     #[arg(long, value_name = "STATES", default_value = "full")]
-    pub filter: FilterStates,
+    filter: FilterStates,
 }
 
 /// Help where fixes are too rare to reduce a model.
@@ -76,7 +78,7 @@ impl Command for Tune {
         help: "Model file to write",
     };
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         self.refuse_recordings()?;
         let draws = draws_file::beside(&self.model);
         let draws = (self.intervals && draws.exists()).then_some(draws);
@@ -91,8 +93,10 @@ impl Command for Tune {
     fn run(&self, context: &Context<'_>) -> Result<TuneAnswer> {
         let mut scenario = self.settings.checked()?;
         if self.truths.is_empty() && !self.intervals && scenario.has_no_errors() {
-            return Err(Failure::input("no truth to be consistent with: neither --truth nor --intervals is given")
-                .hint("give models (--truth OTHER.toml, one a recording), --intervals for a MODEL of `nav-sim calibrate`, or a scenario with errors"));
+            return refused(
+                "no truth to be consistent with: neither --truth nor --intervals is given",
+                "give models (--truth OTHER.toml, one a recording), --intervals for a MODEL of `nav-sim calibrate`, or a scenario with errors",
+            );
         }
         let file = inputs::model(&self.model, context)?;
         let model = inputs::at_rate(&self.model, &file.model, scenario.imu.rate_hz, context)?;
@@ -126,11 +130,10 @@ impl Tune {
         };
         match self.truths.iter().find(is_samples) {
             None => Ok(()),
-            Some(path) => Err(Failure::input(format!(
-                "--truth {}: recordings, not a model",
-                path.display()
-            ))
-            .hint("make a model of each: nav-sim calibrate FILE --estimator gmwm -o FILE.toml")),
+            Some(path) => refused(
+                format!("--truth {}: recordings, not a model", path.display()),
+                "make a model of each: nav-sim calibrate FILE --estimator gmwm -o FILE.toml",
+            ),
         }
     }
 
@@ -196,22 +199,17 @@ impl Tune {
                 stretch: None,
             }
         };
-        let mut doubts = Vec::new();
-        for truth in &truths.errors {
-            for doubt in (Scenario {
-                imu: truth.imu.clone(),
+        let unexpected = |truth: &TrueErrors| {
+            let imu = truth.imu.clone();
+            let scenario = Scenario {
+                imu,
                 ..scenario.clone()
-            })
-            .unexpected()
-            {
-                if !doubts.contains(&doubt) {
-                    doubts.push(doubt);
-                }
-            }
-        }
-        doubts
-            .into_iter()
-            .for_each(|doubt| context.warn(unexpected_line(&doubt)));
+            };
+            scenario.unexpected()
+        };
+        let doubts = truths.errors.iter().flat_map(unexpected);
+        let doubts: Vec<String> = doubts.map(|doubt| unexpected_line(&doubt)).collect();
+        context.warn_each(in_order(doubts.iter().map(String::as_str)));
         Ok(truths)
     }
 
@@ -228,10 +226,10 @@ impl Tune {
                 || scenario.baro.is_some()
                 || scenario.imu.temperature.is_some()
             {
-                return Err(Failure::input(
+                return refused(
                     "aiding, a barometer and a temperature profile belong to a trajectory",
-                )
-                .hint("give it with --trajectory"));
+                    "give it with --trajectory",
+                );
             }
             let outages = scenario.outages_on((0.0, DAY_S), seed)?.windows;
             let lengths: Vec<f64> = outages.iter().map(|o| o.end_s - o.start_s).collect();
@@ -401,17 +399,13 @@ fn knowing(scenario: &Scenario, imu: &ImuSettings) -> Scenario {
 
 /// The tuned model, and where it came from; `goal`: the aim and what was taken for true.
 fn tuned(file: &ModelFile, factors: &[Factor], goal: &str, inputs: &[Input]) -> ModelFile {
-    let mut provenance = toml::Table::new();
-    let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
-    put("program", PROGRAM.into());
-    put("made_by", "tune".into());
-    put("honest_for", goal.into());
-    let value = "texts and numbers are always TOML";
-    put(
-        "factors",
-        toml::Value::try_from(entries(factors)).expect(value),
-    );
-    put("inputs", toml::Value::try_from(inputs).expect(value));
+    let provenance = known(json!({
+        "program": PROGRAM,
+        "made_by": "tune",
+        "honest_for": goal,
+        "factors": entries(factors),
+        "inputs": inputs,
+    }));
     let (missing, turn_on) = (file.missing.clone(), file.turn_on);
     ModelFile {
         missing,
@@ -482,9 +476,10 @@ impl TuneAnswer {
             )],
             changed => {
                 let cost = self.cost(&self.after);
-                let cost = match cost.is_finite() {
-                    true => format!("; cost {:.1} % of horizontal RMSE", 100.0 * cost),
-                    false => String::new(),
+                let cost = if cost.is_finite() {
+                    format!("; cost {:.1} % of horizontal RMSE", 100.0 * cost)
+                } else {
+                    String::new()
                 };
                 let [before, after] = [&self.before, &self.after].map(|found| readable(found.nees));
                 let factors = factors_in_words(changed);
@@ -508,13 +503,13 @@ impl TuneAnswer {
     /// What covers the errors of the vehicle's own measurements.
     fn of_aiding(&self) -> Option<String> {
         let factor = self.aiding_sigmas.filter(|factor| *factor != 1.0)?;
-        Some(match factor.is_nan() {
-            true => "no sigma of the aiding covers its errors: give the filter states of them"
-                .to_owned(),
-            false => format!(
+        Some(if factor.is_nan() {
+            "no sigma of the aiding covers its errors: give the filter states of them".to_owned()
+        } else {
+            format!(
                 "every sigma of [aiding] × {}, and then of the model:",
                 readable(factor)
-            ),
+            )
         })
     }
 

@@ -2,20 +2,22 @@
 
 use crate::app::inputs::listed;
 use crate::app::reading::{RecordingRequest, VarianceRequest};
-use crate::app::{Answer, Command, Context, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Inputs, Out, OutputFile, Result};
 use crate::commands::calibrate::{visit, without_warm_up};
 use crate::io::recordings::ReadOptions;
 use crate::parse;
-use crate::report::curves::{Band, CONFIDENCE, SignalCurves, SignalsFile, recording_names};
-use crate::report::curves::{band, curve, scale_axis, sensor_name, variance_axis};
+use crate::report::csv::{csv, flat};
+use crate::report::curves::{
+    Band, CONFIDENCE, SignalCurves, SignalsFile, band, curve, recording_names, scale_axis,
+    sensor_name, variance_axis,
+};
 use crate::report::in_order;
-use crate::report::json;
-use nav_sim_calibration::{Replicate, replicates};
-use nav_sim_calibration::{duration, median};
-use nav_sim_document::{Cell, Chart, Colour, Document, Panel, Series, Table, Tone, shortest};
+use nav_sim_calibration::{Replicate, duration, median, replicates};
+use nav_sim_document::{Cell, Chart, Colour, Document, Panel, Series, Table, Tone};
 use nav_sim_signal::imu::{Channel, Recording};
 use nav_sim_signal::wavelet::{WaveletError, haar, interval};
 use rayon::prelude::*;
+use serde_json::json;
 use std::path::PathBuf;
 
 /// Compute wavelet variances (classical, robust) and Allan deviations of static recordings
@@ -28,28 +30,18 @@ Examples:
 pub struct Wv {
     /// Recordings, or directories of recordings
     #[arg(required = true, value_name = "FILE")]
-    pub files: Vec<PathBuf>,
+    files: Vec<PathBuf>,
     /// How they are read.
     #[command(flatten)]
     pub recordings: RecordingRequest,
     /// Scales and robustness.
     #[command(flatten)]
-    pub tuning: VarianceRequest,
-    /// Where the degrees of freedom of the intervals come from
-    #[arg(long, value_parser = parse::words::<Intervals>(&INTERVALS), default_value_t, help_heading = "Wavelet variance")]
-    pub intervals: Intervals,
+    tuning: VarianceRequest,
+    /// Where the degrees of freedom of the intervals come from: eta3, the field's usual ones, conservative beyond the
+    /// first scale; large-sample, the autocovariance of the coefficients: with the stated coverage
+    #[arg(long, value_parser = parse::one_of::<Intervals>(&Intervals::NAMES), default_value_t, help_heading = "Wavelet variance")]
+    intervals: Intervals,
 }
-
-const INTERVALS: [(&str, &str); 2] = [
-    (
-        Intervals::Eta3.name(),
-        "The field's usual ones, conservative beyond the first scale",
-    ),
-    (
-        Intervals::LargeSample.name(),
-        "From the autocovariance of the coefficients: with the stated coverage",
-    ),
-];
 
 impl Command for Wv {
     type Answer = SignalsFile;
@@ -59,7 +51,7 @@ impl Command for Wv {
         help: "Write the curves as JSON",
     };
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         listed("recording", &self.files)
     }
 
@@ -72,9 +64,10 @@ impl Command for Wv {
             ..self.recordings.options()
         };
         let look = |recording: Recording| -> Result<Vec<SignalCurves>> {
-            let recording = match skips_warm_up {
-                true => without_warm_up(recording, true).0,
-                false => recording,
+            let recording = if skips_warm_up {
+                without_warm_up(recording, true).0
+            } else {
+                recording
             };
             let measured = replicates(&recording, scales, &tuning)?;
             let curves = |(channel, replicate): &(Channel, Replicate)| {
@@ -84,8 +77,10 @@ impl Command for Wv {
                     *channel, replicate, rate_hz, edof, efficiency,
                 ))
             };
-            let curves = measured.par_iter().map(curves);
-            Ok(curves.collect::<Result<_, WaveletError>>()?)
+            Ok(measured
+                .par_iter()
+                .map(curves)
+                .collect::<Result<_, WaveletError>>()?)
         };
         let (looks, report) = visit(&self.files, &reading, &look, context)?;
         let signals: Vec<Vec<SignalCurves>> = looks.into_iter().collect::<Result<_>>()?;
@@ -110,13 +105,14 @@ impl Wv {
         let levels = 1..=replicate.classical.len() as u32;
         match (self.intervals, recording.signal(channel)) {
             // Of a signal with holes eta3 of what is there.
-            (Intervals::LargeSample, Some(signal)) if replicate.coverage.is_empty() => {
-                let edof = levels.map(|level| {
-                    let coefficients = haar::coefficients(&signal.samples, level)?;
-                    Ok(interval::edof_large_sample(&coefficients, level))
-                });
-                edof.collect()
-            }
+            (Intervals::LargeSample, Some(signal)) if replicate.coverage.is_empty() => levels
+                .map(|level| {
+                    Ok(interval::edof_large_sample(
+                        &haar::coefficients(&signal.samples, level)?,
+                        level,
+                    ))
+                })
+                .collect(),
             _ => Ok(levels.map(|level| replicate.edof_eta3(level)).collect()),
         }
     }
@@ -145,14 +141,16 @@ impl Answer for SignalsFile {
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {
-        vec![OutputFile::whole("", json(self))]
+        vec![OutputFile::whole("", crate::report::json(self))]
     }
 
     fn document(&self) -> Document {
-        let all = self.signals.iter();
-        let ratios = all.flat_map(|s| ratios(s, self.efficiency).map(move |r| (s, r)));
-        let lowest = ratios.min_by(|a, b| a.1.ratio.total_cmp(&b.1.ratio));
-        let (tone, verdict) = match lowest {
+        let (tone, verdict) = match self
+            .signals
+            .iter()
+            .flat_map(|s| ratios(s, self.efficiency).map(move |r| (s, r)))
+            .min_by(|a, b| a.1.ratio.total_cmp(&b.1.ratio))
+        {
             Some((s, Ratio { ratio, tau_s, .. })) if ratio < 1.0 / OUTLIERS => {
                 let (name, ratio) = (recording_names([s.file.as_str()]).concat(), 1.0 / ratio);
                 let (channel, at) = (s.channel(), duration(tau_s));
@@ -161,17 +159,20 @@ impl Answer for SignalsFile {
                 );
                 (Tone::Doubtful, verdict)
             }
-            _ => {
-                let verdict = "classical and robust wavelet variances agree".to_owned();
-                (Tone::Good, verdict)
-            }
+            _ => (
+                Tone::Good,
+                "classical and robust wavelet variances agree".to_owned(),
+            ),
         };
         let count = recordings(self).len();
         let head = format!(
             "Allan deviation over averages, median of recordings ({count}); ratio: robust/classical, * less than by chance"
         );
-        let title = "Wavelet variance of static recordings";
-        let mut document = Document::new(title, tone, [verdict, head]);
+        let mut document = Document::new(
+            "Wavelet variance of static recordings",
+            tone,
+            [verdict, head],
+        );
         document.lead(digest(self));
         let charts: Vec<Chart> = channels(self).map(|channel| chart(self, channel)).collect();
         document.charts(&charts, "Robust wavelet variance; dashed: classical, which outliers raise. τ is twice the averaging time.");
@@ -191,8 +192,11 @@ fn chart(file: &SignalsFile, channel: Channel) -> Chart {
         let k = files.iter().position(|name| *name == s.file).unwrap_or(0);
         let colour = Colour::Hue(k);
         if files.len() == 1 {
-            let band = band(&s.tau_s, &s.robust.ci_low, &s.robust.ci_high);
-            series.push(Series::new("95 %", colour, band));
+            series.push(Series::new(
+                "95 %",
+                colour,
+                band(&s.tau_s, &s.robust.ci_low, &s.robust.ci_high),
+            ));
         }
         series.push(Series::dashed("", colour, curve(&s.tau_s, &s.classical.wv)));
         series.push(Series::line(
@@ -201,11 +205,13 @@ fn chart(file: &SignalsFile, channel: Channel) -> Chart {
             curve(&s.tau_s, &s.robust.wv),
         ));
     }
-    let title = format!("{} {}", sensor_name(channel.sensor), channel.axis);
-    let panel = Panel::new(variance_axis(channel.sensor), series);
-    Chart::new(&title, scale_axis(), vec![panel])
-        .small()
-        .in_group("scales")
+    Chart::new(
+        &format!("{} {}", sensor_name(channel.sensor), channel.axis),
+        scale_axis(),
+        vec![Panel::new(variance_axis(channel.sensor), series)],
+    )
+    .small()
+    .in_group("scales")
 }
 
 /// The recordings, each once.
@@ -218,8 +224,12 @@ fn recordings(file: &SignalsFile) -> Vec<&str> {
 /// classical one.
 fn digest(file: &SignalsFile) -> Table {
     let (times, decades) = (times(file), decades(file));
-    let head = decades.iter().map(|i| duration(times[*i]));
-    let mut table = Table::new(["axis"]).and(head.chain(["lowest", "ratio"].map(str::to_owned)));
+    let mut table = Table::new(["axis"]).and(
+        decades
+            .iter()
+            .map(|i| duration(times[*i]))
+            .chain(["lowest", "ratio"].map(str::to_owned)),
+    );
     for channel in channels(file) {
         let signals = signals_of(file, channel);
         let medians: Vec<f64> = (0..times.len())
@@ -235,65 +245,51 @@ fn digest(file: &SignalsFile) -> Table {
                 }
             })
             .collect();
-        let lowest = medians.iter().zip(&times).min_by(|a, b| a.0.total_cmp(b.0));
-        let lowest =
-            lowest.map(|(deviation, time)| format!("{deviation:.2e} at {}", duration(*time)));
+        let lowest = medians
+            .iter()
+            .zip(&times)
+            .min_by(|a, b| a.0.total_cmp(b.0))
+            .map(|(deviation, time)| format!("{deviation:.2e} at {}", duration(*time)));
         let ratios: Vec<Ratio> = signals
             .iter()
             .flat_map(|s| ratios(s, file.efficiency))
             .collect();
         let ratio = least_ratio(&ratios).map(|(r, mark)| format!("{r:.2}{mark}"));
-        let cells = decades.iter().map(|i| Some(format!("{:.2e}", medians[*i])));
-        let figures = cells
+        let figures = decades
+            .iter()
+            .map(|i| Some(format!("{:.2e}", medians[*i])))
             .chain([lowest, ratio])
             .map(|text| Cell::figures(text.unwrap_or_default()));
-        let name = format!("{channel} ({})", channel.sensor.unit());
-        table.row(std::iter::once(Cell::from(name)).chain(figures));
+        table.row(
+            std::iter::once(Cell::from(format!("{channel} ({})", channel.sensor.unit())))
+                .chain(figures),
+        );
     }
     table
 }
 
 /// All scales of all signals as CSV.
 fn signals_csv(file: &SignalsFile) -> String {
-    let mut table = Table::new([
-        "file",
-        "sensor",
-        "axis",
-        "tau_s",
-        "edof",
-        "classical_wv",
-        "classical_ci_low",
-        "classical_ci_high",
-        "robust_wv",
-        "robust_ci_low",
-        "robust_ci_high",
-        "robust_status",
-        "allan_tau_s",
-        "allan_deviation",
-    ]);
-    for s in &file.signals {
-        for (i, deviation) in (0..).map_while(|i| Some((i, s.allan_deviation(i)?))) {
-            let band = |b: &Band| {
-                [b.wv[i], b.ci_low[i], b.ci_high[i]]
-                    .map(shortest)
-                    .map(Cell::from)
-            };
-            let cells = [s.file.as_str(), s.sensor.name(), s.axis.name()].map(Cell::from);
-            let scale = [s.tau_s[i], s.edof[i]].map(shortest).map(Cell::from);
-            let allan = [0.5 * s.tau_s[i], deviation].map(shortest).map(Cell::from);
-            let status = Cell::from(s.robust.status[i].as_str());
-            let bands = band(&s.classical).into_iter().chain(band(&s.robust));
-            table.row(
-                cells
-                    .into_iter()
-                    .chain(scale)
-                    .chain(bands)
-                    .chain([status])
-                    .chain(allan),
-            );
-        }
-    }
-    table.csv()
+    let of_signal = |s: &SignalCurves| {
+        let row = |i: usize| {
+            let band =
+                |b: &Band| json!({ "wv": b.wv[i], "ci_low": b.ci_low[i], "ci_high": b.ci_high[i] });
+            flat(&json!({
+                "file": s.file,
+                "sensor": s.sensor,
+                "axis": s.axis,
+                "tau_s": s.tau_s[i],
+                "edof": s.edof[i],
+                "classical": band(&s.classical),
+                "robust": band(&s.robust),
+                "robust_status": s.robust.status[i],
+                "allan_tau_s": 0.5 * s.tau_s[i],
+                "allan_deviation": s.allan_deviation(i),
+            }))
+        };
+        (0..s.tau_s.len()).map(row).collect::<Vec<_>>()
+    };
+    csv(&file.signals.iter().flat_map(of_signal).collect::<Vec<_>>())
 }
 
 fn signals_of(file: &SignalsFile, channel: Channel) -> Vec<&SignalCurves> {
@@ -311,10 +307,12 @@ fn channels(file: &SignalsFile) -> impl Iterator<Item = Channel> {
 
 /// The averaging times (s) of the signal with the most scales: a scale is two averages long.
 fn times(file: &SignalsFile) -> Vec<f64> {
-    let longest = file.signals.iter().max_by_key(|s| s.tau_s.len());
-    longest.map_or(Vec::new(), |s| {
-        s.tau_s.iter().map(|tau_s| 0.5 * tau_s).collect()
-    })
+    file.signals
+        .iter()
+        .max_by_key(|s| s.tau_s.len())
+        .map_or(Vec::new(), |s| {
+            s.tau_s.iter().map(|tau_s| 0.5 * tau_s).collect()
+        })
 }
 
 /// The scales whose averaging times are nearest to powers of ten (s), each once.
@@ -323,8 +321,9 @@ fn decades(file: &SignalsFile) -> Vec<usize> {
     let (first, last) = (logs[0].floor() as i32, logs[logs.len() - 1].ceil() as i32);
     let nearest = |decade: i32| {
         let distance = |i: &usize| (logs[*i] - f64::from(decade)).abs();
-        let nearest = (0..logs.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        nearest.unwrap_or(0)
+        (0..logs.len())
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .unwrap_or(0)
     };
     let mut found: Vec<usize> = (first..=last).map(nearest).collect();
     found.dedup();
@@ -341,12 +340,13 @@ struct Ratio {
 /// At the scales that are well known. Of Gaussian coefficients the classical variance is efficient, so that the variance of
 /// the robust one is 1/e times its, their covariance is its, and that of their ratio 1/e − 1 times its, 2/edof.
 fn ratios(s: &SignalCurves, efficiency: f64) -> impl Iterator<Item = Ratio> {
-    let known = (0..s.tau_s.len()).filter(|i| s.edof[*i] >= LEAST && s.robust.status[*i] == "ok");
-    known.map(move |i| Ratio {
-        tau_s: s.tau_s[i],
-        ratio: s.robust.wv[i] / s.classical.wv[i],
-        deviation: ((1.0 / efficiency - 1.0) * 2.0 / s.edof[i]).sqrt(),
-    })
+    (0..s.tau_s.len())
+        .filter(|i| s.edof[*i] >= LEAST && s.robust.status[*i] == "ok")
+        .map(move |i| Ratio {
+            tau_s: s.tau_s[i],
+            ratio: s.robust.wv[i] / s.classical.wv[i],
+            deviation: ((1.0 / efficiency - 1.0) * 2.0 / s.edof[i]).sqrt(),
+        })
 }
 
 /// How often a row without outliers is marked, at most.
@@ -357,8 +357,10 @@ const FALSE_ALARMS: f64 = 0.025;
 fn least_ratio(ratios: &[Ratio]) -> Option<(f64, &'static str)> {
     let z = (2.0 * (ratios.len() as f64 / FALSE_ALARMS).ln()).sqrt();
     let is_marked = ratios.iter().any(|r| r.ratio.ln() < -z * r.deviation);
-    let least = ratios.iter().map(|r| r.ratio).min_by(f64::total_cmp)?;
-    Some((least, if is_marked { " *" } else { "" }))
+    Some((
+        ratios.iter().map(|r| r.ratio).min_by(f64::total_cmp)?,
+        if is_marked { " *" } else { "" },
+    ))
 }
 
 #[cfg(test)]

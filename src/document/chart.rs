@@ -184,15 +184,6 @@ impl Series {
         Self::new(name, colour, Mark::Line(points, Stroke::Thin))
     }
 
-    /// A line with a point at each of its ends and bends.
-    pub fn dotted_line(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> [Self; 2] {
-        let dots = points.clone().into_iter().map(|(x, y)| (x, y, f64::NAN));
-        [
-            Self::line(name, colour, points),
-            Self::points(name, colour, dots),
-        ]
-    }
-
     /// Points (x, y, half of the interval; NaN: none).
     pub fn points(
         name: &str,

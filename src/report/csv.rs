@@ -4,6 +4,19 @@ use nav_sim_document::shortest;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+/// Results beside one another in one JSON object.
+pub(crate) fn merged<const N: usize>(results: [Value; N]) -> Value {
+    Value::Object(
+        results
+            .into_iter()
+            .flat_map(|result| match result {
+                Value::Object(fields) => fields,
+                _ => Map::new(),
+            })
+            .collect(),
+    )
+}
+
 /// A row without nesting: keys of an object follow its own after `_`, and an interval `ci95_pct` becomes `ci95_low_pct` and
 /// `ci95_high_pct`.
 pub(crate) fn flat(row: &impl Serialize) -> Map<String, Value> {
@@ -28,8 +41,10 @@ fn put(key: String, value: Value, into: &mut Map<String, Value>) {
         }),
         ends if key.contains("ci95_") => {
             for (k, end) in ["ci95_low_", "ci95_high_"].into_iter().enumerate() {
-                let value = ends.get(k).cloned().unwrap_or_default();
-                into.insert(key.replace("ci95_", end), value);
+                into.insert(
+                    key.replace("ci95_", end),
+                    ends.get(k).cloned().unwrap_or_default(),
+                );
             }
         }
         value => _ = into.insert(key, value),

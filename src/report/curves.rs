@@ -1,7 +1,7 @@
 //! Wavelet-variance curves as JSON: of signals (`wv`), and of fits (`<model>.wv.json`).
 
 use nav_sim_calibration::{Estimator, Group, Outcome, Replicate, Settings, implied, tau_s};
-use nav_sim_document::{Axis as ChartAxis, Chart, Colour, Mark, Panel, Series, short_names};
+use nav_sim_document::{Axis as ChartAxis, Mark, short_names};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::wavelet::interval;
 use serde::{Deserialize, Serialize};
@@ -27,8 +27,11 @@ pub struct Band {
 
 impl Band {
     fn new(wv: Vec<f64>, edof: &[f64], status: Vec<String>) -> Self {
-        let ends = |(nu, edof): (&f64, &f64)| interval::interval(*nu, *edof, CONFIDENCE);
-        let (ci_low, ci_high) = wv.iter().zip(edof).map(ends).unzip();
+        let (ci_low, ci_high) = wv
+            .iter()
+            .zip(edof)
+            .map(|(nu, edof)| interval::interval(*nu, *edof, CONFIDENCE))
+            .unzip();
         Self {
             wv,
             ci_low,
@@ -223,8 +226,10 @@ impl CurvesFile {
                 .find(|g| g.scope == o.scope)
                 .map_or(&[][..], |g| &g.replicates)
         };
-        let curve = |o: &&Outcome| fitted(o, replicates(o), settings);
-        let curves = outcomes.iter().map(curve).collect();
+        let curves = outcomes
+            .iter()
+            .map(|o| fitted(o, replicates(o), settings))
+            .collect();
         Self {
             schema_version: 1,
             rate_hz: settings.rate_hz,
@@ -322,58 +327,4 @@ pub(crate) fn band(tau_s: &[f64], low: &[f64], high: &[f64]) -> Mark {
             .map(|((t, a), b)| (*t, *a, *b))
             .collect(),
     )
-}
-
-// Dot plots that lie: a name a row, which a phone has room for.
-
-/// Values of one kind, one a row: value and interval; NaN: none.
-pub(crate) struct Dots<'a> {
-    pub name: &'a str,
-    pub colour: Colour,
-    pub points: Vec<[f64; 3]>,
-}
-
-/// A chart with a row for each name, from top to bottom; `level`: a value to compare with, and its name.
-pub(crate) fn dot_chart(
-    title: &str,
-    axis: ChartAxis,
-    names: impl IntoIterator<Item = String>,
-    level: Option<(&str, f64)>,
-    dots: &[Dots<'_>],
-) -> Chart {
-    let mut names: Vec<String> = names.into_iter().collect();
-    names.reverse();
-    let rows = names.len() as f64;
-    let mut series: Vec<Series> = Vec::new();
-    if let Some((name, value)) = level {
-        series.push(Series::dashed(
-            name,
-            Colour::RIGHT,
-            vec![(value, -0.5), (value, rows - 0.5)],
-        ));
-    }
-    for (k, kind) in dots.iter().enumerate() {
-        let beside = 0.3 * ((k as f64 + 0.5) / dots.len() as f64 - 0.5);
-        let height = |row: usize| rows - 1.0 - row as f64 - beside;
-        let interval = |(row, [_, low, high]): (usize, &[f64; 3])| {
-            [
-                (*low, height(row)),
-                (*high, height(row)),
-                (f64::NAN, f64::NAN),
-            ]
-        };
-        let point = |(row, [value, ..]): (usize, &[f64; 3])| (*value, height(row), f64::NAN);
-        let intervals = kind.points.iter().enumerate().flat_map(interval).collect();
-        series.push(Series::line("", kind.colour, intervals));
-        series.push(Series::points(
-            kind.name,
-            kind.colour,
-            kind.points.iter().enumerate().map(point),
-        ));
-    }
-    let panel = Panel {
-        height: 0.1 * (rows + 1.0),
-        ..Panel::new(ChartAxis::names(names), series)
-    };
-    Chart::new(title, axis, vec![panel])
 }

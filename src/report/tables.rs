@@ -1,24 +1,15 @@
 //! `epochs.csv` and `runs.csv` of a run directory.
 
 use super::csv::{csv, flat};
-use nav_sim_document::shortest;
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
 use nav_sim_navigation::gnss::GnssFix;
 use nav_sim_navigation::metrics::{EpochMetrics, Estimate, PerState};
-use nav_sim_navigation::simulation::{
-    BIAS_NAMES, OutageRecord, REPORTED, REPORTED_NAMES, RunResult,
-};
+use nav_sim_navigation::simulation::{BIAS_NAMES, RunRecord, RunResult};
 use nav_sim_signal::imu::{ImuIncrement, Sensor};
 use nav_sim_signal::units::DEG;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fmt::Write as _;
-
-fn named(prefix: &str) -> impl Iterator<Item = String> {
-    REPORTED_NAMES
-        .iter()
-        .map(move |name| format!("{prefix}{name}"))
-}
 
 /// `epochs.csv`: one row a reporting epoch (1 Hz), means over runs.
 pub(crate) fn epochs_csv(epochs: &[EpochMetrics]) -> String {
@@ -35,84 +26,56 @@ pub(crate) fn epochs_csv(epochs: &[EpochMetrics]) -> String {
             "nees": e.nees.value,
             "coverage": e.coverage,
         }));
-        let biases = BIAS_NAMES.iter().zip(e.bias_asee);
-        row.extend(biases.map(|(name, asee)| (format!("asee_{name}"), asee.into())));
+        row.extend(
+            BIAS_NAMES
+                .iter()
+                .zip(e.bias_asee)
+                .map(|(name, asee)| (format!("asee_{name}"), asee.into())),
+        );
         row
     };
     csv(&epochs.iter().map(row).collect::<Vec<_>>())
 }
 
-/// Columns of `runs.csv`.
-fn run_columns() -> Vec<String> {
-    let start = [
-        "run",
-        "diverged",
-        "nis_mean",
-        "fixes",
-        "nees_mean",
-        "coverage",
-    ]
-    .map(str::to_owned);
-    let whole = start
-        .into_iter()
-        .chain(named("normalised_sq_"))
-        .chain(["outage".to_owned()]);
-    let ends = [
-        "nees_end",
-        "log_density_end",
-        "horizontal_error_end_m",
-        "reconvergence_s",
-    ]
-    .map(str::to_owned);
-    let states = ["see_mean_", "see_end_", "error_end_"]
-        .into_iter()
-        .flat_map(named);
-    whole.chain(states).chain(ends).collect()
-}
-
-/// `runs.csv`, line by line: one row a run and outage (one row a run, outage empty, when there is none).
+/// `runs.csv`, run by run: one row a run and outage (one row a run, outage empty, when there is none).
 pub(crate) fn runs_csv(result: &RunResult) -> impl Iterator<Item = String> {
-    let columns = run_columns();
-    let of_an_outage = columns.len() - 6 - REPORTED;
-    let rows = result.runs.iter().flat_map(move |run| {
-        let counts = format!(
-            "{},{},{},{}",
-            run.run,
-            u8::from(run.diverged),
-            shortest(run.nis.0),
-            run.nis.1
-        );
-        let whole = [run.nees_mean, run.covered]
-            .into_iter()
-            .chain(run.normalised_sq)
-            .map(shortest);
-        let start = format!("{counts},{}", whole.collect::<Vec<_>>().join(","));
-        let empty = run
-            .outages
-            .is_empty()
-            .then(|| format!("{start}{}\n", ",".repeat(of_an_outage)));
-        let of_outage =
-            move |(i, outage)| format!("{start},{i},{}\n", outage_cells(outage).join(","));
-        empty
-            .into_iter()
-            .chain(run.outages.iter().enumerate().map(of_outage))
-    });
-    std::iter::once(columns.join(",") + "\n").chain(rows)
-}
-
-fn outage_cells(outage: &OutageRecord) -> Vec<String> {
-    let states = outage
-        .see_mean
-        .iter()
-        .chain(&outage.see_end)
-        .chain(&outage.error_end);
-    let ends = [
-        outage.nees_end,
-        outage.log_density_end,
-        outage.horizontal_error_end_m,
-        outage.reconvergence_s,
-    ];
-    states.chain(&ends).copied().map(shortest).collect()
+    let rows = |(k, run): (usize, &RunRecord)| {
+        let row = |outage: Option<usize>| {
+            let end = outage.map(|i| run.outages[i].clone()).unwrap_or_default();
+            let mut row = flat(&json!({
+                "run": run.run,
+                "diverged": u8::from(run.diverged),
+                "nis_mean": run.nis.0,
+                "fixes": run.nis.1,
+                "nees_mean": run.nees_mean,
+                "coverage": run.covered,
+                "normalised_sq": PerState(run.normalised_sq),
+                "outage": outage,
+                "see_mean": PerState(end.see_mean),
+                "see_end": PerState(end.see_end),
+                "error_end": PerState(end.error_end),
+                "nees_end": end.nees_end,
+                "log_density_end": end.log_density_end,
+                "horizontal_error_end_m": end.horizontal_error_end_m,
+                "reconvergence_s": end.reconvergence_s,
+            }));
+            let of_outage = row.iter_mut().skip_while(|(key, _)| *key != "outage");
+            if outage.is_none() {
+                of_outage.for_each(|(_, value)| *value = Value::Null);
+            }
+            row
+        };
+        let rows: Vec<_> = match run.outages.len() {
+            0 => vec![row(None)],
+            outages => (0..outages).map(Some).map(row).collect(),
+        };
+        let text = csv(&rows);
+        match text.split_once('\n') {
+            Some((_, rows)) if k > 0 => rows.to_owned(),
+            _ => text,
+        }
+    };
+    result.runs.iter().enumerate().map(rows)
 }
 
 // A simulated recording as the files that `fuse` reads.
@@ -172,14 +135,15 @@ pub(crate) fn initial_toml(t_s: f64, state: &NavState, sigma: &InitialSettings) 
     let v = state.v_n;
     let list = |x: [f64; 3]| format!("[{:?}, {:?}, {:?}]", x[0], x[1], x[2]);
     let beside = |sensor: Sensor| {
-        let bias = (InitialSettings::bias_key(sensor), sigma.bias_sigma(sensor));
-        let scale = (
-            InitialSettings::scale_key(sensor),
-            sigma.scale_sigma_ppm(sensor),
-        );
-        let said = [bias, scale]
-            .into_iter()
-            .filter_map(|(key, sigma)| Some((key, sigma?)));
+        let said = [
+            (InitialSettings::bias_key(sensor), sigma.bias_sigma(sensor)),
+            (
+                InitialSettings::scale_key(sensor),
+                sigma.scale_sigma_ppm(sensor),
+            ),
+        ]
+        .into_iter()
+        .filter_map(|(key, sigma)| Some((key, sigma?)));
         said.map(|(key, sigma)| format!("{key} = {sigma:?}\n"))
             .collect::<String>()
     };

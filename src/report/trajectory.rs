@@ -21,22 +21,39 @@ pub(crate) fn track(trajectory: &Trajectory) -> Vec<(f64, [f64; 2])> {
 }
 
 /// A track on a map: outages marked, start and end named.
-pub(crate) fn track_map(track: &[(f64, [f64; 2])], title: &str, outages: &[(f64, f64)]) -> Chart {
+pub(crate) fn track_map(
+    name: &str,
+    track: &[(f64, [f64; 2])],
+    title: &str,
+    outages: &[(f64, f64)],
+) -> Chart {
     let way = |from_s: f64, to_s: f64| {
-        let within = track.iter().filter(|(t, _)| (from_s..to_s).contains(t));
-        within.map(|(_, place)| (*place).into()).collect()
+        track
+            .iter()
+            .filter(|(t, _)| (from_s..to_s).contains(t))
+            .map(|(_, place)| (*place).into())
+            .collect()
     };
-    let all = way(f64::NEG_INFINITY, f64::INFINITY);
-    let mut series = vec![Series::line("reference", Colour::BELIEVED, all)];
+    let mut series = vec![Series::line(
+        name,
+        Colour::BELIEVED,
+        way(f64::NEG_INFINITY, f64::INFINITY),
+    )];
     series.extend(outages.iter().map(|(start_s, end_s)| {
-        let line = Mark::Line(way(*start_s, *end_s), nav_sim_document::Stroke::Bold);
-        Series::new("outage", Colour::REAL, line)
+        Series::new(
+            "outage",
+            Colour::REAL,
+            Mark::Line(way(*start_s, *end_s), nav_sim_document::Stroke::Bold),
+        )
     }));
-    let ends = [("start", track.first()), ("end", track.last())];
-    series.extend(ends.into_iter().filter_map(|(name, end)| {
-        let (_, [east, north]) = *end?;
-        Some(Series::new(name, Colour::RIGHT, Mark::Place(east, north)))
-    }));
+    series.extend(
+        [("start", track.first()), ("end", track.last())]
+            .into_iter()
+            .filter_map(|(name, end)| {
+                let (_, [east, north]) = *end?;
+                Some(Series::new(name, Colour::RIGHT, Mark::Place(east, north)))
+            }),
+    );
     Chart::map(title, series)
 }
 
@@ -50,7 +67,7 @@ mod trajectory_tests {
         let track: Vec<_> = (0..11)
             .map(|k| (f64::from(k), [0.0, 100.0 * f64::from(k)]))
             .collect();
-        let svg = svg("a<b", &[track_map(&track, "a<b", &[(3.0, 6.0)])]);
+        let svg = svg("a<b", &[track_map("b", &track, "a<b", &[(3.0, 6.0)])]);
         assert!(svg.starts_with("<svg xmlns=") && svg.ends_with("</svg>\n"));
         assert_eq!(svg.matches("data-name=\"outage\"").count(), 1);
         assert!(

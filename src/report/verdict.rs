@@ -39,13 +39,18 @@ pub(crate) fn verdict_lines(summary: &Summary) -> Vec<String> {
     lines
 }
 
-fn words(summary: &Summary) -> String {
-    let (verdict, runs, diverged) = (&summary.verdict, summary.runs, summary.diverged);
-    let windows: Vec<(f64, f64)> = summary
+/// The outages (start, end) (s).
+pub(crate) fn windows(summary: &Summary) -> Vec<(f64, f64)> {
+    summary
         .outages
         .iter()
         .map(|o| (o.start_s, o.end_s))
-        .collect();
+        .collect()
+}
+
+fn words(summary: &Summary) -> String {
+    let (verdict, runs, diverged) = (&summary.verdict, summary.runs, summary.diverged);
+    let windows = windows(summary);
     let nees = format!(
         "NEES {} (9 if right)",
         with_error(verdict.nees, verdict.nees_std_error)
@@ -93,9 +98,10 @@ fn words(summary: &Summary) -> String {
             )
         }
         VerdictKind::Consistent | VerdictKind::NotMet => {
-            let rest = match verdict.is_expected() {
-                true => "by covariance analysis".to_owned(),
-                false => independent(verdict.independent_runs),
+            let rest = if verdict.is_expected() {
+                "by covariance analysis".to_owned()
+            } else {
+                independent(verdict.independent_runs)
             };
             format!("{kind}: {nees}, coverage {:.3}; {rest}", verdict.coverage)
         }
@@ -104,10 +110,12 @@ fn words(summary: &Summary) -> String {
 
 /// Until where covariance analysis holds, and what decides then.
 fn beyond(verdict: &Verdict, outages: &[(f64, f64)]) -> String {
-    let outage = verdict.beyond_linear.and_then(|k| outages.get(k));
-    let place = outage.map_or_else(String::new, |(start_s, end_s)| {
-        format!(" in outage {}", window(*start_s, *end_s))
-    });
+    let place = verdict
+        .beyond_linear
+        .and_then(|k| outages.get(k))
+        .map_or_else(String::new, |(start_s, end_s)| {
+            format!(" in outage {}", window(*start_s, *end_s))
+        });
     format!("beyond linear theory{place}: confirm with --method both")
 }
 
@@ -156,8 +164,10 @@ pub(crate) fn verdict_counts(verdicts: &[(&str, &Value)]) -> (VerdictKind, Vec<S
     let names = short_names(&runs);
     let mut kinds: BTreeMap<VerdictKind, Vec<(&String, &Value)>> = BTreeMap::new();
     for (name, (_, verdict)) in names.iter().zip(verdicts) {
-        let kind = VerdictKind::deserialize(&verdict["kind"]).unwrap_or_default();
-        kinds.entry(kind).or_default().push((name, verdict));
+        kinds
+            .entry(VerdictKind::deserialize(&verdict["kind"]).unwrap_or_default())
+            .or_default()
+            .push((name, verdict));
     }
     let number = |verdict: &Value, key: &str| verdict[key].as_f64().unwrap_or(f64::NAN);
     let line = |(kind, of_kind): (&VerdictKind, &Vec<(&String, &Value)>)| {
@@ -166,14 +176,17 @@ pub(crate) fn verdict_counts(verdicts: &[(&str, &Value)]) -> (VerdictKind, Vec<S
         let (count, all) = (of_kind.len(), verdicts.len());
         let [nees, ratio] = ["nees", "ratio"].map(|key| readable(number(worst, key)));
         let state = state_in_words(worst["worst_state"].as_str().unwrap_or_default());
-        let decide = worst["runs_to_decide"].as_u64();
-        let decide = decide.map_or_else(String::new, |runs| format!(", {runs} runs would decide"));
+        let decide = worst["runs_to_decide"]
+            .as_u64()
+            .map_or_else(String::new, |runs| format!(", {runs} runs would decide"));
         Some(format!(
             "{count} of {all} filters {kind}, most: {name} (NEES {nees}, {ratio} × in {state}{decide})"
         ))
     };
-    let gravest = kinds.keys().last().copied().unwrap_or_default();
-    (gravest, kinds.iter().rev().filter_map(line).collect())
+    (
+        kinds.keys().last().copied().unwrap_or_default(),
+        kinds.iter().rev().filter_map(line).collect(),
+    )
 }
 
 // Limits that errors must keep, in words.
@@ -219,8 +232,7 @@ pub(crate) fn requirement_line(met: &Met, summary: &Summary) -> String {
 
 /// The unit that the name of a figure ends with.
 fn unit(name: &str) -> &'static str {
-    let units = [("_m_s", "m/s"), ("_deg", "°"), ("_m", "m")];
-    units
+    [("_m_s", "m/s"), ("_deg", "°"), ("_m", "m")]
         .iter()
         .find(|(end, _)| name.ends_with(end))
         .map_or("", |(_, unit)| unit)
@@ -316,9 +328,10 @@ pub(crate) fn unexpected_line(unexpected: &Unexpected) -> String {
         ),
         Unexpected::Aiding { source, key } => (
             format!("the truth has {source}, of which the filter expects less"),
-            match key.ends_with("sigma_m_s") || *key == "aiding.heading.sigma_deg" {
-                true => format!("a larger {key} (nav-sim tune --scenario FILE finds how much)"),
-                false => format!("{key} gives it states"),
+            if key.ends_with("sigma_m_s") || *key == "aiding.heading.sigma_deg" {
+                format!("a larger {key} (nav-sim tune --scenario FILE finds how much)")
+            } else {
+                format!("{key} gives it states")
             },
         ),
         Unexpected::Integration {
@@ -341,9 +354,10 @@ pub(crate) fn reduction_line(quality: &ReductionQuality) -> String {
     let cost = quality
         .cost()
         .map_or(String::new(), |(horizontal, (state, most))| {
-            let largest = match most > horizontal {
-                true => format!(", {} {}", REPORTED_NAMES[state], more(most)),
-                false => String::new(),
+            let largest = if most > horizontal {
+                format!(", {} {}", REPORTED_NAMES[state], more(most))
+            } else {
+                String::new()
             };
             format!(
                 "; RMSE over --filter full at outages: horizontal {}{largest}",

@@ -28,7 +28,7 @@ SMALLEST_PX = 11.0
 # a window at least so wide holds every table
 DESK_PX = 1280
 # pages of tables alone
-WITHOUT_FIGURE = {"tuned.html", "needed.html"}
+WITHOUT_FIGURE = {"tuned.html", "needed.html", "given.html", "ranked.html", "designs.html", "design.html"}
 
 # Runs in the page's frame once it is loaded; its results are the text of the frame's parent.
 MEASURE = """

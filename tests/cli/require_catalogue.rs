@@ -133,10 +133,14 @@ fn the_curves_of_a_ranking_are_of_one_quantity() {
         ranked(&["--require", "p95_m<=100", "--require", "yaw_deg<=0.01"]),
     );
     assert_eq!(
-        (&both["curve_quantity"], &both["units"][0]["quantity"]),
+        (
+            &both["question"]["limits"][0]["quantity"],
+            &both["units"][0]["quantity"],
+        ),
         (&"p95_m".into(), &"yaw_deg".into())
     );
-    assert_eq!(alone["units"][0]["curve"], both["units"][0]["curve"]);
+    let [alone, both] = [&alone, &both].map(|found| &found["units"][0]["curves"][0]);
+    assert_eq!((alone, &alone["quantity"]), (both, &"p95_m".into()));
 }
 
 /// A catalogue entry of hardly any noise, with more figures of accelerometer and gyroscope.

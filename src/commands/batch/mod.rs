@@ -10,12 +10,13 @@ pub use results::StudyAnswer;
 use crate::app::inputs::merge;
 use crate::app::{
     Answer, Asked, Command, Context, Failure, Front, Input, Manifest, Refuse, Result, argument,
-    is_path, is_repeated,
+    is_path, is_repeated, refused,
 };
 use crate::commands::run::{PreparedRun, Run, block_of, columns};
 use crate::io::{atomic, input, source};
 use crate::report::in_order;
 use clap::Args;
+use indexmap::IndexMap;
 use nav_sim_document::{Importance, Note};
 use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::simulation::RunResult;
@@ -24,7 +25,7 @@ use results::{first_of, withdraw};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Map;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -94,10 +95,10 @@ pub enum Outcome {
 
 impl BatchRequest {
     /// Directory of the study.
-    #[must_use]
     pub fn directory(&self) -> PathBuf {
-        let stem = || Path::new("out").join(self.study.file_stem().unwrap_or_default());
-        self.out.clone().unwrap_or_else(stem)
+        self.out
+            .clone()
+            .unwrap_or_else(|| Path::new("out").join(self.study.file_stem().unwrap_or_default()))
     }
 
     /// Computes the cells that are missing, and merges when none is.
@@ -110,12 +111,11 @@ impl BatchRequest {
         variable: &dyn Fn(&str) -> Option<String>,
         context: &Context<'_>,
     ) -> Result<Outcome> {
-        let study = Study::read(&self.study, &self.set)?;
-        let outcome = self.run_study(&study, variable, context);
-        outcome.map_err(|e| match e.code() {
-            2 if e.file().is_none() => e.within(&self.study.display().to_string()),
-            _ => e,
-        })
+        self.run_study(&Study::read(&self.study, &self.set)?, variable, context)
+            .map_err(|e| match e.code() {
+                2 if e.file().is_none() => e.within(&self.study.display().to_string()),
+                _ => e,
+            })
     }
 
     fn run_study(
@@ -142,14 +142,14 @@ impl BatchRequest {
         }
         let changed = adopt(&place, &cells, self.dry_run, context);
         if let (Some((name, what)), false) = (changed.first(), self.force || self.dry_run) {
-            let message = format!("cell {name} is of another study: {what}");
-            return Err(Failure::input(message)
-                .hint("choose another directory with --out, or compute it again with --force"));
+            return refused(
+                format!("cell {name} is of another study: {what}"),
+                "choose another directory with --out, or compute it again with --force",
+            );
         }
         let units = units(&cells, context)?;
         if self.dry_run {
-            let changed = changed.len();
-            return estimate(&cells, &units, &place, changed, context).map(Outcome::Estimate);
+            return estimate(&cells, &units, &place, changed.len(), context).map(Outcome::Estimate);
         }
         if cells.iter().any(|cell| !place.is_done(cell)) {
             withdraw(&place);
@@ -163,9 +163,11 @@ impl BatchRequest {
         };
         let worked = work(&place, &own, context)?;
         for cell in &cells {
-            let has_cell = |unit: &&Unit<'_>| unit.cells.iter().any(|own| own.name == cell.name);
-            let of_cell = units.iter().filter(has_cell);
-            let firsts: Vec<u64> = of_cell.map(|unit| unit.first).collect();
+            let firsts: Vec<u64> = units
+                .iter()
+                .filter(|unit| unit.cells.iter().any(|own| own.name == cell.name))
+                .map(|unit| unit.first)
+                .collect();
             if firsts.len() > 1 {
                 assemble(&place, cell, &firsts, context)?;
             }
@@ -176,9 +178,8 @@ impl BatchRequest {
                 0 => String::new(),
                 n => format!(" (and {n} more cells)"),
             };
-            let hint = failure.advice();
-            let failed = Failure::could_not(format!("cell {name}: {failure}{more}"));
-            return Err(failed.or_hint_if(hint));
+            return Err(Failure::could_not(format!("cell {name}: {failure}{more}"))
+                .or_hint_if(failure.advice()));
         }
         let left = own.iter().filter(|unit| !place.has_unit(unit)).count();
         if left > 0 && !context.go_on() {
@@ -208,10 +209,11 @@ fn adopt(
     is_dry: bool,
     context: &Context<'_>,
 ) -> Vec<(String, String)> {
-    let entries = fs::read_dir(place.0.join("cells")).into_iter();
-    let names = entries.flatten().flatten();
-    let names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
-    let keyed = names
+    let keyed = fs::read_dir(place.0.join("cells"))
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
         .filter(|name| !name.ends_with(".damaged"))
         .filter_map(|name| Some((place.manifest(&name)?.key, name)));
     let there: HashMap<String, String> = keyed.collect();
@@ -224,8 +226,9 @@ fn adopt(
             drop(fs::rename(place.cell(name), place.cell(&cell.name)));
         }
     }
-    let others = there.values();
-    let others = others.filter(|name| place.cell(name).exists() && named(name).is_none());
+    let others = there
+        .values()
+        .filter(|name| place.cell(name).exists() && named(name).is_none());
     let mut others: Vec<&String> = others.collect();
     others.sort();
     if !others.is_empty() {
@@ -274,7 +277,6 @@ fn estimate(
     changed: usize,
     context: &Context<'_>,
 ) -> Result<String> {
-    const BYTES: f64 = 1.2e6;
     let done = cells.iter().filter(|cell| place.is_done(cell)).count();
     let left: Vec<&Unit<'_>> = units.iter().filter(|unit| !place.has_unit(unit)).collect();
     let passes = units.iter().filter(|unit| unit.first == 0).count();
@@ -293,11 +295,8 @@ fn estimate(
         quiet.end();
         let per_run = quiet.runs_s() / runs as f64 * quiet.threads() as f64;
         let cost: u64 = left.iter().map(|unit| unit.cost()).sum();
-        text += &format!(
-            "\n{} of processor time, {:.0} MB",
-            nav_sim_calibration::duration(per_run * cost as f64),
-            BYTES * (cells.len() - done) as f64 / 1e6
-        );
+        let time = nav_sim_calibration::duration(per_run * cost as f64);
+        text += &format!("\n{time} of processor time");
     }
     for cell in cells {
         context.detail(&cell.name);
@@ -319,10 +318,12 @@ impl Outcome {
                     .hint("the same command goes on where this one stopped"),
             ),
             // the same command would end the same way: no code for "to be resumed"
-            Self::Stopped { left, .. } => {
-                let message = format!("stopped before a single unit was done; {left} units left");
-                Some(Failure::could_not(message).hint("a longer --time-limit"))
-            }
+            Self::Stopped { left, .. } => Some(
+                Failure::could_not(format!(
+                    "stopped before a single unit was done; {left} units left"
+                ))
+                .hint("a longer --time-limit"),
+            ),
         }
     }
 }
@@ -373,18 +374,20 @@ impl Study {
     /// Reads a study; `set` are keys of `[run]` over its own, as `KEY=VALUE`.
     pub(crate) fn read(path: &Path, set: &[String]) -> Result<Self> {
         let text = source::text(path).map_err(|e| crate::io::Failure::io(path, e))?;
-        let is_json = path.extension().is_some_and(|ending| ending == "json");
-        let mut study: Self = match is_json {
-            true => serde_json::from_str(&text).refuse_within(path.display())?,
-            false => toml::from_str(&text).refuse_within(path.display())?,
+        let mut study: Self = if path.extension().is_some_and(|ending| ending == "json") {
+            serde_json::from_str(&text).refuse_within(path.display())?
+        } else {
+            toml::from_str(&text).refuse_within(path.display())?
         };
         for assignment in set {
             let (key, value) = assignment.split_once('=').unwrap_or((assignment, ""));
             // a word without quotes is a text
             let parsed = format!("{key} = {value}").parse::<Table>();
             let quoted = || format!("{key} = {}", Value::from(value)).parse::<Table>();
-            let over = parsed.or_else(|_| quoted()).refuse_within("--set")?;
-            merge(&mut study.run, over);
+            merge(
+                &mut study.run,
+                parsed.or_else(|_| quoted()).refuse_within("--set")?,
+            );
         }
         Ok(study)
     }
@@ -417,8 +420,10 @@ impl Study {
         let cells = all.into_iter().map(|(labels, run)| {
             let name = name_of(&labels);
             if !names.insert(name.to_lowercase()) {
-                return Err(Failure::input(format!("two cells have the name {name}"))
-                    .hint("name the values under [vary], a table of keys each"));
+                return refused(
+                    format!("two cells have the name {name}"),
+                    "name the values under [vary], a table of keys each",
+                );
             }
             door.cell(name.clone(), labels, run)
                 .map_err(|e| e.within(&format!("cell {name}")))
@@ -427,28 +432,35 @@ impl Study {
     }
 
     /// The labels that references have: those of the study, else the first model.
-    fn fixed(&self, cells: &[Cell]) -> Labels {
+    fn fixed(&self, cells: &[Cell]) -> HashMap<String, String> {
         let given = self.reference.iter();
-        let given: Labels = given
-            .map(|(axis, label)| (axis.clone(), text(label)))
-            .collect();
-        if !given.is_empty() {
-            return given;
+        if self.reference.is_empty() {
+            let mut labels = cells.iter().flat_map(|cell| &cell.labels);
+            return labels
+                .find(|(axis, _)| axis == "model")
+                .cloned()
+                .into_iter()
+                .collect();
         }
-        let mut labels = cells.iter().flat_map(|cell| &cell.labels);
-        let model = labels.find(|(axis, _)| axis == "model");
-        model.cloned().into_iter().collect()
+        given
+            .map(|(axis, label)| (axis.clone(), text(label)))
+            .collect()
     }
 
     fn check_reference(&self, all: &[(Labels, Table)]) -> Result<()> {
         for (axis, label) in &self.reference {
             let label = text(label);
-            let labels = all.iter().flat_map(|(labels, _)| labels);
-            let on_axis = labels.filter(|(other, _)| other == axis);
-            let known = in_order(on_axis.map(|(_, label)| label.as_str()));
+            let known = in_order(
+                all.iter()
+                    .flat_map(|(labels, _)| labels)
+                    .filter(|(other, _)| other == axis)
+                    .map(|(_, label)| label.as_str()),
+            );
             if !known.contains(&label.as_str()) {
-                let message = format!("\"reference.{axis}\" = \"{label}\" is no label of an axis");
-                return Err(Failure::input(message).hint(format!("labels: {}", known.join(", "))));
+                return refused(
+                    format!("\"reference.{axis}\" = \"{label}\" is no label of an axis"),
+                    format!("labels: {}", known.join(", ")),
+                );
             }
         }
         Ok(())
@@ -535,11 +547,14 @@ impl Door {
 
     /// Label of a list's value: the stem of a file, else its text.
     fn label(&self, path: &str, value: &Value) -> Result<String> {
-        let stem = |text: String| match self.is_path(path) {
-            true => Path::new(&text)
-                .file_stem()
-                .map_or(text.clone(), |stem| stem.to_string_lossy().into_owned()),
-            false => text,
+        let stem = |text: String| {
+            if self.is_path(path) {
+                Path::new(&text)
+                    .file_stem()
+                    .map_or(text.clone(), |stem| stem.to_string_lossy().into_owned())
+            } else {
+                text
+            }
         };
         match value {
             Value::Array(list) => Ok(list
@@ -547,9 +562,9 @@ impl Door {
                 .map(|one| stem(text(one)))
                 .collect::<Vec<_>>()
                 .join("+")),
-            Value::Table(_) => Err(
-                Failure::input(format!("\"run.{path}\" is a list of tables"))
-                    .hint(format!("name them: [vary.{path}] LABEL = {{ {path} = … }}")),
+            Value::Table(_) => refused(
+                format!("\"run.{path}\" is a list of tables"),
+                format!("name them: [vary.{path}] LABEL = {{ {path} = … }}"),
             ),
             one => Ok(stem(text(one))),
         }
@@ -559,10 +574,10 @@ impl Door {
     fn cell(&mut self, name: String, labels: Labels, mut run: Table) -> Result<Cell> {
         for key in ["out", "plot"] {
             if run.contains_key(key) {
-                return Err(Failure::input(format!(
-                    "\"run.{key}\": a study has its own directory"
-                ))
-                .hint("name it with -o"));
+                return refused(
+                    format!("\"run.{key}\": a study has its own directory"),
+                    "name it with -o",
+                );
             }
         }
         let seed = match run.remove("seed") {
@@ -592,9 +607,11 @@ impl Door {
         let mut inputs = Vec::new();
         for (role, path) in asked.request.inputs()? {
             if !self.inputs.contains_key(&path) {
-                let read = input::input(role, &path)
-                    .map_err(|e| e.hint("paths are relative to the study's file"))?;
-                self.inputs.insert(path.clone(), read);
+                self.inputs.insert(
+                    path.clone(),
+                    input::input(role, &path)
+                        .map_err(|e| e.hint("paths are relative to the study's file"))?,
+                );
             }
             inputs.push(Input {
                 role: role.to_owned(),
@@ -640,10 +657,12 @@ fn named(axis: &str, values: &Value) -> Result<Vec<(String, Table)>> {
             .collect(),
         Value::Table(labels) => {
             let keys = |(label, keys): (&String, &Value)| {
-                let keys = keys
-                    .as_table()
-                    .ok_or_else(|| refused("has a label without keys"))?;
-                Ok((label.clone(), keys.clone()))
+                Ok((
+                    label.clone(),
+                    keys.as_table()
+                        .ok_or_else(|| refused("has a label without keys"))?
+                        .clone(),
+                ))
             };
             labels.iter().map(keys).collect::<Result<_>>()?
         }
@@ -667,10 +686,10 @@ fn fill(value: &mut Value, labels: &Labels) -> Result<()> {
                 .split_once('{')
                 .and_then(|(_, rest)| rest.split_once('}'))
             {
-                Some((unknown, _)) => Err(Failure::input(format!(
-                    "\"{text}\": there is no axis {unknown}"
-                ))
-                .hint("name it under [vary]")),
+                Some((unknown, _)) => refused(
+                    format!("\"{text}\": there is no axis {unknown}"),
+                    "name it under [vary]",
+                ),
                 None => Ok(()),
             }
         }
@@ -703,8 +722,11 @@ fn named_request(run: &Table) -> Result<Map<String, serde_json::Value>> {
 }
 
 fn plus(labels: &Labels, axis: &str, label: &str) -> Labels {
-    let own = [(axis.to_owned(), label.to_owned())];
-    labels.iter().cloned().chain(own).collect()
+    labels
+        .iter()
+        .cloned()
+        .chain([(axis.to_owned(), label.to_owned())])
+        .collect()
 }
 
 /// A label as text.
@@ -765,8 +787,7 @@ impl Place<'_> {
 
     /// The manifest of a cell that is there.
     fn manifest(&self, name: &str) -> Option<Manifest> {
-        let text = fs::read_to_string(self.cell(name).join("manifest.json")).ok()?;
-        serde_json::from_str(&text).ok()
+        serde_json::from_str(&fs::read_to_string(self.cell(name).join("manifest.json")).ok()?).ok()
     }
 
     fn is_done(&self, cell: &Cell) -> bool {
@@ -795,8 +816,9 @@ impl Place<'_> {
     fn lock(&self, unit: &Unit<'_>) -> Result<Option<File>> {
         let locks = self.0.join("locks");
         let path = locks.join(format!("{}-{}", &unit.cells[0].noise[..32], unit.first));
-        let made = fs::create_dir_all(&locks).and_then(|()| File::create(&path));
-        let file = made.map_err(|e| Failure::io(&path, e))?;
+        let file = fs::create_dir_all(&locks)
+            .and_then(|()| File::create(&path))
+            .map_err(|e| Failure::io(&path, e))?;
         Ok(match file.try_lock() {
             Err(fs::TryLockError::WouldBlock) => None,
             _ => Some(file),
@@ -806,24 +828,19 @@ impl Place<'_> {
 
 /// All units, passes in the order of their first cells.
 fn units<'a>(cells: &'a [Cell], context: &Context<'_>) -> Result<Vec<Unit<'a>>> {
-    let mut passes: Vec<Vec<&Cell>> = Vec::new();
-    let mut places: HashMap<&str, usize> = HashMap::new();
+    let mut passes: IndexMap<&str, Vec<&Cell>> = IndexMap::new();
     for cell in cells {
-        let place = *places.entry(&cell.noise).or_insert(passes.len());
-        if place == passes.len() {
-            passes.push(Vec::new());
-        }
-        passes[place].push(cell);
+        passes.entry(&cell.noise).or_default().push(cell);
     }
-    let mut blocks: BTreeMap<PathBuf, u64> = BTreeMap::new();
+    let mut blocks: HashMap<&Path, u64> = HashMap::new();
     let mut units = Vec::new();
-    for pass in passes {
+    for pass in passes.into_values() {
         let (request, runs) = (&pass[0].asked.request, pass[0].runs);
-        let block = match blocks.get(&request.trajectory) {
+        let block = match blocks.get(&*request.trajectory) {
             Some(block) => *block,
             None => block_of(request, context)?,
         };
-        blocks.insert(request.trajectory.clone(), block);
+        blocks.insert(&request.trajectory, block);
         let unit = |first| Unit {
             cells: pass.clone(),
             first,
@@ -841,8 +858,7 @@ fn shard<'a, 'b>(units: &'b [Unit<'a>], (index, count): (u64, u64)) -> Vec<&'b U
     let mut before = 0;
     let mut own = Vec::new();
     for unit in units {
-        let middle = 2 * before + unit.cost();
-        if u128::from(middle) * u128::from(count) / u128::from(2 * total.max(1))
+        if u128::from(2 * before + unit.cost()) * u128::from(count) / u128::from(2 * total.max(1))
             == u128::from(index)
         {
             own.push(unit);
@@ -1014,8 +1030,7 @@ fn assemble(place: &Place<'_>, cell: &Cell, firsts: &[u64], context: &Context<'_
 /// The runs of a part: postcard of the result, BLAKE3 of that.
 fn write_part(path: &Path, result: &RunResult) -> Result<()> {
     let mut bytes = postcard::to_allocvec(result).map_err(Failure::could_not)?;
-    let hash = blake3::hash(&bytes);
-    bytes.extend(hash.as_bytes());
+    bytes.extend(blake3::hash(&bytes).as_bytes());
     match atomic::write(path, bytes) {
         Err(_) if read_part(path).is_some() => Ok(()),
         written => Ok(written?),
@@ -1040,11 +1055,10 @@ pub(crate) fn part_of(bytes: &[u8]) -> Option<RunResult> {
 
 /// `i/n`, i from 0.
 fn parse_shard(text: &str) -> Result<(u64, u64), String> {
-    let numbers = text
-        .split_once('/')
-        .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
-    let shard = numbers.filter(|(index, count): &(u64, u64)| index < count);
-    shard.ok_or_else(|| "expected i/n with i from 0 to n − 1, such as 0/4".to_owned())
+    text.split_once('/')
+        .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)))
+        .filter(|(index, count)| index < count)
+        .ok_or_else(|| "expected i/n with i from 0 to n − 1, such as 0/4".to_owned())
 }
 
 /// Variables that give an index, and those that give the first one, the step and how many there are.
@@ -1072,50 +1086,53 @@ fn find_shard(
     if flag.is_some() {
         return Ok((flag, "--shard".to_owned()));
     }
-    let set = SCHEDULERS
-        .iter()
-        .find_map(|(name, more)| Some((*name, *more, variable(name)?)));
-    let Some((name, more, text)) = set else {
+    let number = |name: &str| -> Result<Option<u64>> {
+        let text = variable(name);
+        text.map(|text| {
+            text.trim()
+                .parse()
+                .map_err(|_| Failure::input(format!("{name}={text} is not a number")))
+        })
+        .transpose()
+    };
+    let Some((name, more, id)) = SCHEDULERS
+        .into_iter()
+        .find_map(|(name, more)| {
+            let id = number(name).transpose()?;
+            Some(id.map(|id| (name, more, id)))
+        })
+        .transpose()?
+    else {
         return match shards {
             None | Some(1) => Ok((None, "no scheduler".to_owned())),
-            Some(n) => {
-                let failure = Failure::input(format!(
-                    "--shards {n}: no scheduler says which of them this is"
-                ));
-                Err(failure.hint("give --shard i/n"))
-            }
+            Some(n) => refused(
+                format!("--shards {n}: no scheduler says which of them this is"),
+                "give --shard i/n",
+            ),
         };
     };
-    let number = |name: &str, text: &str| {
-        text.trim()
-            .parse::<u64>()
-            .map_err(|_| Failure::input(format!("{name}={text} is not a number")))
-    };
-    let number_of = |name: &str| variable(name).map(|text| number(name, &text)).transpose();
     // With --shards, tasks count from 0 whatever part of an array was submitted; without, the array says.
     let [first, step, count] = match more.filter(|_| shards.is_none()) {
-        Some([min, step, count]) => [number_of(min)?, number_of(step)?, number_of(count)?],
+        Some([min, step, count]) => [number(min)?, number(step)?, number(count)?],
         None => [None; 3],
     };
-    let id = number(name, &text)?;
     let index = id
         .checked_sub(first.unwrap_or(0))
         .map(|i| i / step.unwrap_or(1).max(1));
     let Some(count) = shards.or(count) else {
-        let failure = Failure::input(format!(
-            "{name}={id} says which shard this is, but not of how many"
-        ));
-        return Err(failure.hint("add --shards n (indices from 0 to n − 1)"));
+        return refused(
+            format!("{name}={id} says which shard this is, but not of how many"),
+            "add --shards n (indices from 0 to n − 1)",
+        );
     };
     match index.filter(|index| *index < count) {
         Some(index) => Ok((Some((index, count)), format!("{name}={id}"))),
-        None => {
-            let failure = Failure::input(format!("{name}={id} is not one of {count} shards"));
-            Err(failure.hint(format!(
+        None => Err(
+            Failure::input(format!("{name}={id} is not one of {count} shards")).hint(format!(
                 "number the tasks from 0 to {}",
                 count.saturating_sub(1)
-            )))
-        }
+            )),
+        ),
     }
 }
 

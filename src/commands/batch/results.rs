@@ -8,9 +8,8 @@ use crate::io::atomic::AtomicDir;
 use crate::report::csv::{csv, flat};
 use crate::report::json;
 use crate::report::verdict::{tone, verdict_counts};
-use nav_sim_document::{
-    Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke, Table, Tone,
-};
+use indexmap::IndexMap;
+use nav_sim_document::{Axis, Chart, Colour, Document, Importance, Panel, Series, Table, Tone};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -20,7 +19,7 @@ use std::fs;
 const FILES: [&str; 3] = ["results.csv", "summary.json", "report.html"];
 
 /// The cells that are there, against their references.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct StudyAnswer {
     schema_version: u32,
     complete: bool,
@@ -61,65 +60,51 @@ pub(super) fn merge(
         cells.iter().map(|cell| (&cell.labels, cell)).collect();
     let reference_of = |cell: &Cell| {
         let label = |(axis, label): &(String, String)| {
-            let fixed = fixed.iter().find(|(fixed, _)| fixed == axis);
-            (
-                axis.clone(),
-                fixed.map_or(label, |(_, label)| label).clone(),
-            )
+            (axis.clone(), fixed.get(axis).unwrap_or(label).clone())
         };
         let labels: Labels = cell.labels.iter().map(label).collect();
-        let found = by_labels.get(&labels).copied();
-        found.filter(|cell| !fixed.is_empty() && place.is_done(cell))
+        by_labels
+            .get(&labels)
+            .copied()
+            .filter(|cell| !fixed.is_empty() && place.is_done(cell))
     };
+    let axes = cells.iter().take(1).flat_map(|cell| &cell.labels);
     let mut answer = StudyAnswer {
         schema_version: 1,
-        complete: true,
-        missing: Vec::new(),
-        cells: Vec::new(),
-        rows: Vec::new(),
-        versions: BTreeSet::new(),
-        axes: cells.first().map_or(Vec::new(), |cell| {
-            cell.labels.iter().map(|(axis, _)| axis.clone()).collect()
-        }),
-        comparisons: Vec::new(),
-        unmet: None,
+        axes: axes.map(|(axis, _)| axis.clone()).collect(),
+        ..StudyAnswer::default()
     };
     // of each reference its cells: one setting of the other axes
-    let mut settings: Vec<(Option<&Cell>, Vec<&Cell>)> = Vec::new();
-    let mut at = HashMap::new();
+    let mut settings: IndexMap<&str, Vec<&Cell>> = IndexMap::new();
     for cell in cells {
-        let reference = reference_of(cell);
-        let name = &reference.unwrap_or(cell).name;
-        let index = *at.entry(name).or_insert(settings.len());
-        if index == settings.len() {
-            settings.push((reference, Vec::new()));
-        }
-        settings[index].1.push(cell);
+        settings
+            .entry(&reference_of(cell).unwrap_or(cell).name)
+            .or_default()
+            .push(cell);
     }
     for (reference, members) in settings {
         let mut read = Vec::new();
         for cell in members {
-            match place
-                .is_done(cell)
-                .then(|| run_directory::read(&place.cell(&cell.name)))
-            {
-                Some(Ok(found)) => read.push((cell, found)),
-                Some(Err(e)) if e.code() == 1 => return Err(e),
-                damaged => {
-                    if let Some(Err(e)) = damaged {
-                        context.warn(format!("{e}; {} is set aside", cell.name));
-                        let (path, aside) = (
-                            place.cell(&cell.name),
-                            place.cell(&format!("{}.damaged", cell.name)),
-                        );
-                        drop(fs::rename(path, aside));
-                    }
-                    answer.missing.push(cell.name.clone());
+            let (path, name) = (place.cell(&cell.name), &cell.name);
+            match place.is_done(cell).then(|| run_directory::read(&path)) {
+                Some(Ok(found)) => {
+                    read.push((cell, found));
+                    continue;
                 }
+                Some(Err(e)) if e.code() == 1 => return Err(e),
+                Some(Err(e)) => {
+                    context.warn(format!("{e}; {name} is set aside"));
+                    drop(fs::rename(path, place.cell(&format!("{name}.damaged"))));
+                }
+                None => {}
             }
+            answer.missing.push(name.clone());
         }
-        let of = reference.and_then(|r| read.iter().position(|(cell, _)| cell.name == r.name));
-        answer.add(&read, of, states)?;
+        answer.add(
+            &read,
+            read.iter().position(|(cell, _)| cell.name == reference),
+            states,
+        )?;
     }
     answer.complete = answer.missing.is_empty();
     Ok(answer)
@@ -138,8 +123,10 @@ impl StudyAnswer {
             let mut alone = read.iter().map(std::slice::from_ref);
             return alone.try_for_each(|one| self.add(one, Some(0), states));
         };
-        let runs = read.iter().enumerate();
-        let runs = runs.map(|(k, (cell, found))| (cell.name.as_str(), found, k == i));
+        let runs = read
+            .iter()
+            .enumerate()
+            .map(|(k, (cell, found))| (cell.name.as_str(), found, k == i));
         let (cell, found) = &read[i];
         let comparison = between(runs, (&cell.name, found), states.to_vec())?;
         let is_compared = read.len() > 1;
@@ -149,10 +136,11 @@ impl StudyAnswer {
             let mut ends = Vec::new();
             for (i, (outage, own)) in outages.zip(&candidate.outages).enumerate() {
                 let horizontal = &outage["horizontal_error_end_m"];
-                let time = |key: &str| outage[key].as_f64().unwrap_or(f64::NAN);
+                let [start_s, end_s] = [&outage["start_s"], &outage["end_s"]];
+                let duration_s = end_s.as_f64().zip(start_s.as_f64()).map(|(b, a)| b - a);
                 ends.push(json!({
-                    "start_s": outage["start_s"],
-                    "end_s": outage["end_s"],
+                    "start_s": start_s,
+                    "end_s": end_s,
                     "p50_m": horizontal["p50"],
                     "p95_m": horizontal["p95"],
                     "nees": outage["nees_end"],
@@ -164,9 +152,9 @@ impl StudyAnswer {
                         "runs": summary["runs"],
                         "diverged": summary["diverged"],
                         "outage": i,
-                        "start_s": outage["start_s"],
-                        "end_s": outage["end_s"],
-                        "duration_s": time("end_s") - time("start_s"),
+                        "start_s": start_s,
+                        "end_s": end_s,
+                        "duration_s": duration_s,
                         "state": state,
                         "asee_mean": outage["asee_mean"][*state],
                         "asee_end": outage["asee_end"][*state],
@@ -185,27 +173,34 @@ impl StudyAnswer {
                         "log_density_end": outage["log_density_end"],
                         "verdict": outage["verdict"]["kind"],
                     });
-                    let mut row = Map::from_iter([("cell".to_owned(), cell.name.clone().into())]);
+                    let mut row = flat(&json!({ "cell": cell.name }));
                     row.extend(
                         cell.labels
                             .iter()
-                            .map(|(axis, label)| (axis.clone(), label.as_str().into())),
+                            .cloned()
+                            .map(|(axis, label)| (axis, label.into())),
                     );
-                    let ratio = (!candidate.is_reference).then(|| flat(ratio));
-                    for (key, value) in flat(&own).into_iter().chain(ratio.into_iter().flatten()) {
+                    for (key, value) in flat(&own).into_iter().chain(
+                        (!candidate.is_reference)
+                            .then(|| flat(ratio))
+                            .into_iter()
+                            .flatten(),
+                    ) {
                         row.entry(key).or_insert(value);
                     }
                     self.rows.push(row);
                 }
             }
             self.versions.insert(found.manifest.version.clone());
-            let missed = |required: &Value| required["met"] == Value::Bool(false);
-            if summary["require"]
-                .as_array()
-                .is_some_and(|all| all.iter().any(missed))
+            let required = summary["require"].as_array().into_iter().flatten();
+            if required
+                .into_iter()
+                .any(|required| required["met"] == false)
             {
-                let message = format!("{}: a required limit is not kept", cell.name);
-                self.unmet.get_or_insert(Failure::bound(message));
+                self.unmet.get_or_insert(Failure::bound(format!(
+                    "{}: a required limit is not kept",
+                    cell.name
+                )));
             }
             self.cells.push(CellSummary {
                 name: cell.name.clone(),
@@ -259,19 +254,26 @@ impl Answer for StudyAnswer {
             .collect();
         let (gravest, mut lines) = verdict_counts(&verdicts);
         lines.extend(self.incomplete().map(|failure| failure.to_string()));
-        let tone = match self.complete {
-            true => tone(gravest),
-            false => Tone::Undecided,
+        let tone = if self.complete {
+            tone(gravest)
+        } else {
+            Tone::Undecided
         };
         let mut document = Document::new("Study", tone, lines);
-        let diverged = self.cells.iter().filter(|c| c.diverged > 0);
-        let names: Vec<String> = diverged.map(|c| c.name.clone()).collect();
+        let names: Vec<String> = self
+            .cells
+            .iter()
+            .filter(|c| c.diverged > 0)
+            .map(|c| c.name.clone())
+            .collect();
         if !names.is_empty() {
-            let text = format!(
-                "runs diverged in {}; they are in no number",
-                first_of(&names)
+            document.note(
+                Importance::Warning,
+                format!(
+                    "runs diverged in {}; they are in no number",
+                    first_of(&names)
+                ),
             );
-            document.note(Importance::Warning, text);
         }
         let columns = [
             ("cell", "../../name"),
@@ -284,7 +286,7 @@ impl Answer for StudyAnswer {
         document.lead(Table::of(self, "/cells/*/outages/*", &columns).with_keys(2));
         document.charts(
             &self.charts(),
-            "Horizontal error at the end of the first outage: p95 and, thin, the median.",
+            "95 % quantile of the horizontal error at the end of the first outage.",
         );
         for comparison in &self.comparisons {
             document.section(&format!("ASEE relative to {}", comparison.reference));
@@ -312,41 +314,29 @@ impl StudyAnswer {
     fn charts(&self) -> Vec<Chart> {
         const LINES: usize = 12;
         let chart = |axis: &String| {
-            let mut lines: BTreeMap<String, Vec<(f64, f64, f64)>> = BTreeMap::new();
+            let mut lines: BTreeMap<Vec<&str>, Vec<(f64, f64)>> = BTreeMap::new();
             for cell in &self.cells {
                 let x: f64 = cell.labels[axis].parse().ok()?;
-                let others = cell
+                let name = cell
                     .labels
                     .iter()
                     .filter(|(other, _)| *other != axis)
-                    .map(|(_, label)| label.as_str());
-                let name = others.collect::<Vec<_>>().join(" ");
-                let outage = cell.outages.first()?;
-                if let (Some(p50), Some(p95)) = (outage["p50_m"].as_f64(), outage["p95_m"].as_f64())
-                {
-                    lines.entry(name).or_default().push((x, p50, p95));
-                }
-            }
-            let series =
+                    .map(|(_, label)| label.as_str())
+                    .collect();
                 lines
-                    .iter_mut()
-                    .take(LINES)
-                    .enumerate()
-                    .flat_map(|(hue, (name, points))| {
-                        points.sort_by(|a, b| a.0.total_cmp(&b.0));
-                        let p50 = points.iter().map(|(x, p50, _)| (*x, *p50)).collect();
-                        let p95 = points.iter().map(|(x, _, p95)| (*x, *p95)).collect();
-                        [
-                            Series::new(name, Colour::Hue(hue), Mark::Line(p95, Stroke::Bold)),
-                            Series::new("", Colour::Hue(hue), Mark::Line(p50, Stroke::Thin)),
-                        ]
-                    });
-            let series: Vec<Series> = series.collect();
-            let panel = Panel::new(Axis::log("horizontal error (m)"), series);
+                    .entry(name)
+                    .or_default()
+                    .extend(cell.outages.first()?["p95_m"].as_f64().map(|y| (x, y)));
+            }
+            let mut series = Vec::new();
+            for (hue, (name, mut points)) in lines.into_iter().take(LINES).enumerate() {
+                points.sort_by(|a, b| a.0.total_cmp(&b.0));
+                series.push(Series::line(&name.join(" "), Colour::Hue(hue), points));
+            }
             Some(Chart::new(
                 &format!("Error against {axis}"),
                 Axis::linear(axis),
-                vec![panel],
+                vec![Panel::new(Axis::log("horizontal error, p95 (m)"), series)],
             ))
         };
         self.axes.iter().filter_map(chart).collect()

@@ -1,22 +1,27 @@
 //! The document of a calibration.
 
-use super::fits::{interval_of, intervals};
+use crate::app::Input;
 use crate::commands::export::Quantity;
-use crate::report::curves::{CurvesFile, FittedCurve, recording_names};
-use crate::report::curves::{band, curve, scale_axis, sensor_name, variance_axis};
+use crate::io::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn, known};
+use crate::report::csv::merged;
+use crate::report::curves::{CurvesFile, FittedCurve, band, curve, recording_names, sensor_name};
 use crate::report::in_order;
 use nav_sim_calibration::{
-    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE,
-    Outcome, ParameterInterval, Ranking, Settings, TurnOnFinding, TurnOnSpread, Undetermined,
-    Verdict, WIDEST, duration, percent, tau_s,
+    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Miss,
+    Outcome, ParameterInterval, ParameterSpread, Practical, Ranking, Settings, TURN_ON_LEVEL,
+    TurnOnFinding, TurnOnSpread, Undetermined, Verdict, WIDEST, duration, model_of, percent, tau_s,
 };
 use nav_sim_document::{
     Axis as ChartAxis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone,
     readable,
 };
-use nav_sim_signal::imu::{Axis, Sensor};
+use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::practical::Horizon;
-use serde_json::Value;
+use nav_sim_signal::noise::{
+    Composite, Law, LognormalIntervals, Parameter, ParameterRef, Process, Spread, Variation,
+};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 /// The fits of a calibration, all of them or those of one estimator, and the findings about the recordings.
 pub(crate) struct ShownCalibration<'a> {
@@ -34,8 +39,10 @@ pub(crate) struct ShownCalibration<'a> {
 impl ShownCalibration<'_> {
     pub(crate) fn document(&self) -> Document {
         let json = &self.json;
-        let estimators = in_order(self.outcomes.iter().map(|o| o.estimator.name()));
-        let title = format!("Stochastic calibration, {}", estimators.join(", "));
+        let title = format!(
+            "Stochastic calibration, {}",
+            in_order(self.outcomes.iter().map(|o| o.estimator.name())).join(", ")
+        );
         let mut document = Document::new(&title, self.tone(), self.verdict());
         let of_one = self.outcomes.iter().all(|o| o.recordings == 1);
         let interval = if of_one {
@@ -74,12 +81,10 @@ impl ShownCalibration<'_> {
         for (index, (outcome, fitted)) in self.outcomes.iter().zip(&self.curves.curves).enumerate()
         {
             document.section(&format!("{} · {}", group_name(fitted), outcome.spec));
-            let diagnoses = self.diagnoses;
             document.chart(
-                &allan(fitted, outcome, diagnoses, self.settings.rate_hz),
-                &format!("Allan deviation: recordings, model, and what is exported: {policy}. N is read at 1 s, K at 3 s, 0.664 B at the floor."),
+                &chart(fitted, outcome, self.diagnoses, self.settings.rate_hz),
+                CAPTION,
             );
-            document.chart(&variance(fitted, diagnoses), CAPTION);
             document.table(&parameters(outcome));
             if outcome.ranking.is_some() {
                 document.heading("Candidate models");
@@ -134,22 +139,28 @@ impl ShownCalibration<'_> {
     }
 
     fn tone(&self) -> Tone {
-        let is_rejected = |o: &&Outcome| o.goodness().is_some_and(|g| g.is_rejected());
-        if self.outcomes.iter().any(is_rejected) {
+        if self
+            .outcomes
+            .iter()
+            .any(|o| o.goodness().is_some_and(|g| g.is_rejected()))
+        {
             return Tone::Bad;
         }
-        let is_misfit = |o: &&Outcome| o.departure().misfit.is_some();
-        match self.outcomes.iter().any(is_misfit) || self.diagnoses.iter().any(is_abnormal) {
-            true => Tone::Doubtful,
-            false => Tone::Good,
+        if self.outcomes.iter().any(|o| o.departure().misfit.is_some())
+            || self.diagnoses.iter().any(is_abnormal)
+        {
+            Tone::Doubtful
+        } else {
+            Tone::Good
         }
     }
 
     /// A line for each model, and one for the recordings.
     fn verdict(&self) -> Vec<String> {
-        let fits = self.outcomes.iter();
-        let fits = fits.map(|o| fit_line(o, &fit_name(o, &self.outcomes), self.settings.rate_hz));
-        fits.chain(recordings_line(&self.outcomes, self.diagnoses))
+        self.outcomes
+            .iter()
+            .map(|o| fit_line(o, &fit_name(o, &self.outcomes), self.settings.rate_hz))
+            .chain(recordings_line(&self.outcomes, self.diagnoses))
             .collect()
     }
 
@@ -210,8 +221,8 @@ fn is_abnormal(diagnosis: &Diagnosis) -> bool {
 /// radians.
 fn too_loud(outcome: &Outcome, rate_hz: f64) -> Option<f64> {
     const MOST_DEG_SQRT_H: f64 = 5.0;
-    let practical = outcome.practical(rate_hz)?;
-    let n = practical.parameters.walk.density * Quantity::Density.sheet(Sensor::Gyro).1;
+    let n = outcome.practical(rate_hz)?.parameters.walk.density
+        * Quantity::Density.sheet(Sensor::Gyro).1;
     (outcome.scope.sensor == Sensor::Gyro && n > MOST_DEG_SQRT_H).then_some(n)
 }
 
@@ -237,24 +248,30 @@ fn parameters(outcome: &Outcome) -> Table {
     let mut table = Table::new(["parameter (SI, of a sample)", "value", "95 % interval"]);
     for (of, value) in model.parameters() {
         // phi is told by its distance from 1
-        let digits = |x: f64| match of.parameter.is_shape() {
-            true => format!("{x:.6}"),
-            false => readable(x),
+        let digits = |x: f64| {
+            if of.parameter.is_shape() {
+                format!("{x:.6}")
+            } else {
+                readable(x)
+            }
         };
         let interval = interval_of(intervals(outcome), of).map(|i| match i.absent {
             None => [i.low, i.high].map(digits).join(" … "),
             Some(_) => "not determined".to_owned(),
         });
-        let figures = [digits(value), interval.unwrap_or_default()].map(Cell::figures);
-        table.row(std::iter::once(model.name_of(of).into()).chain(figures));
+        table.row(
+            std::iter::once(model.name_of(of).into())
+                .chain([digits(value), interval.unwrap_or_default()].map(Cell::figures)),
+        );
     }
     table
 }
 
 // The charts of a calibration: wavelet variance and model, and what is exported on the Allan deviation.
 
-/// Caption of [`variance`].
-const CAPTION: &str = "Wavelet variance with its 95 % band, the recordings, the model and its processes; below: data over model.";
+/// Caption of [`chart`].
+const CAPTION: &str = "Allan deviation with its 95 % band, the recordings, the model and its processes, and what is exported: N is \
+     read at 1 s, K at 3 s, 0.664 B at the floor; below: wavelet variance, data over model.";
 
 /// `Accelerometer x`, or `Gyroscope, all axes`.
 fn group_name(fitted: &FittedCurve) -> String {
@@ -265,8 +282,8 @@ fn group_name(fitted: &FittedCurve) -> String {
     }
 }
 
-/// The wavelet variance, and its ratio to that of the model.
-fn variance(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
+/// The Allan deviation, with N, B and K where they are read off it, and the ratio of the wavelet variance to that of the model.
+fn chart(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_hz: f64) -> Chart {
     let FittedCurve {
         tau_s,
         wv,
@@ -275,107 +292,73 @@ fn variance(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
         implied,
         ..
     } = fitted;
-    let ratio = |values: &[f64]| -> Vec<f64> {
-        values
-            .iter()
+    // a scale is two averages long, the wavelet variance half the Allan variance
+    let averages_s: Vec<f64> = tau_s.iter().map(|tau_s| 0.5 * tau_s).collect();
+    let allan = |wv: &[f64]| wv.iter().map(|nu| (2.0 * nu).sqrt()).collect::<Vec<f64>>();
+    let ratio = |wv: &[f64]| -> Vec<f64> {
+        wv.iter()
             .zip(implied)
             .map(|(nu, model)| nu / model)
             .collect()
     };
-    let data = |wv: &[f64], low: &[f64], high: &[f64]| {
+    let data = |[mid, low, high]: [Vec<f64>; 3]| {
         [
-            Series::new("data, 95 %", Colour::Ink, band(tau_s, low, high)),
-            Series::line("data, 95 %", Colour::Ink, curve(tau_s, wv)),
+            Series::new("data, 95 %", Colour::Ink, band(&averages_s, &low, &high)),
+            Series::line("data, 95 %", Colour::Ink, curve(&averages_s, &mid)),
         ]
     };
-    let mut upper = recordings(fitted, diagnoses, |tau, nu| (tau, nu));
-    let parts = fitted
-        .processes
-        .iter()
-        .filter(|(_, wv)| wv.iter().any(|nu| *nu > 0.0));
+    let line = |wv: &[f64]| curve(&averages_s, &allan(wv));
+    let mut upper = recordings(fitted, diagnoses, line);
     upper.extend(
-        parts
-            .zip(PROCESSES.into_iter().cycle())
-            .map(|((name, wv), hue)| Series::dashed(name, Colour::Hue(hue), curve(tau_s, wv))),
-    );
-    upper.extend(data(wv, ci_low, ci_high));
-    upper.push(Series::line("model", Colour::REAL, curve(tau_s, implied)));
-    let mut lower = data(&ratio(wv), &ratio(ci_low), &ratio(ci_high)).to_vec();
-    lower.push(Series::new("model", Colour::REAL, Mark::Level(1.0)));
-    let ratios = ChartAxis::log("data / model").including(0.8, 1.25);
-    let panels = vec![
-        Panel {
-            height: 1.4,
-            ..Panel::new(variance_axis(fitted.sensor), upper)
-        },
-        Panel {
-            height: 0.5,
-            ..Panel::new(ratios, lower)
-        },
-    ];
-    let (group, estimator) = (group_name(fitted), fitted.estimator.to_uppercase());
-    let title = format!("Wavelet variance: {group}, {estimator}");
-    Chart::new(&title, scale_axis(), panels).in_group("scales")
-}
-
-/// Allan deviation at a scale: of averages half as long, √(2 nu).
-fn deviation(tau_s: f64, nu: f64) -> (f64, f64) {
-    (0.5 * tau_s, (2.0 * nu).sqrt())
-}
-
-/// The Allan deviation with N, B and K, where they are read off it.
-fn allan(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_hz: f64) -> Chart {
-    let of = |wv: &[f64]| -> Vec<(f64, f64)> {
         fitted
-            .tau_s
+            .processes
             .iter()
-            .zip(wv)
-            .map(|(t, nu)| deviation(*t, *nu))
-            .collect()
-    };
-    let mut series = recordings(fitted, diagnoses, deviation);
-    if series.is_empty() {
-        series.push(Series::line("data", Colour::Ink, of(&fitted.wv)));
+            .filter(|(_, wv)| wv.iter().any(|nu| *nu > 0.0))
+            .zip(PROCESSES.into_iter().cycle())
+            .map(|((name, wv), hue)| Series::dashed(name, Colour::Hue(hue), line(wv))),
+    );
+    upper.extend(data([wv, ci_low, ci_high].map(|wv| allan(wv))));
+    upper.push(Series::line("model", Colour::REAL, line(implied)));
+    if let Some(practical) = outcome.practical(rate_hz) {
+        let (pair, minimum) = (practical.parameters.walk, practical.parameters.minimum);
+        let read = [
+            (pair.density > 0.0).then_some(("N", 1.0, pair.density)),
+            practical
+                .walk_is_observed()
+                .then_some(("K", 3.0, pair.walk)),
+            minimum.map(|m| ("0.664 B", m.tau_s, m.deviation)),
+        ];
+        upper.extend(
+            read.into_iter()
+                .flatten()
+                .map(|(name, x, y)| Series::new(name, Colour::RIGHT, Mark::Reading(x, y))),
+        );
     }
-    let model = of(&fitted.implied);
-    series.push(Series::line("model", Colour::REAL, model.clone()));
-    series.extend(exported(outcome, &model, rate_hz));
-    let y = ChartAxis::log(&format!("Allan deviation ({})", fitted.sensor.unit()));
-    let title = format!("Allan deviation: {}", group_name(fitted));
+    let mut lower = data([wv, ci_low, ci_high].map(|wv| ratio(wv))).to_vec();
+    lower.push(Series::new("model", Colour::REAL, Mark::Level(1.0)));
+    let panels = [
+        (
+            1.4,
+            ChartAxis::log(&format!("Allan deviation ({})", fitted.sensor.unit())),
+            upper,
+        ),
+        (
+            0.5,
+            ChartAxis::log("data / model").including(0.8, 1.25),
+            lower,
+        ),
+    ];
+    let panels = panels.map(|(height, axis, series)| Panel {
+        height,
+        ..Panel::new(axis, series)
+    });
+    let (group, estimator) = (group_name(fitted), fitted.estimator.to_uppercase());
     Chart::new(
-        &title,
+        &format!("Allan deviation: {group}, {estimator}"),
         ChartAxis::log("averaging time (s)"),
-        vec![Panel::new(y, series)],
+        panels.into(),
     )
-}
-
-/// Lines of N and K over the times of a model, with the points where they are read, and the floor.
-fn exported(outcome: &Outcome, model: &[(f64, f64)], rate_hz: f64) -> Vec<Series> {
-    let Some(practical) = outcome.practical(rate_hz) else {
-        return Vec::new();
-    };
-    let (pair, minimum) = (practical.parameters.walk, practical.parameters.minimum);
-    // Beyond the model's own values the lines would only stretch the axis.
-    let lowest = 0.3 * model.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
-    let highest = 1.5 * model.iter().map(|p| p.1).fold(0.0, f64::max);
-    let line = |name, colour, value: &dyn Fn(f64) -> f64| {
-        let points = model.iter().map(|(t, _)| (*t, value(*t)));
-        let shown = points.filter(|(_, y)| (lowest..highest).contains(y));
-        Series::dashed(name, colour, shown.collect())
-    };
-    let reading = |name, colour, x, y| Series::new(name, colour, Mark::Reading(x, y));
-    let [n, k, b] = [0, 2, 3].map(Colour::Hue);
-    let mut series = Vec::new();
-    if pair.density > 0.0 {
-        series.push(line("N/√τ", n, &|t| pair.density / t.sqrt()));
-        series.push(reading("N", n, 1.0, pair.density));
-    }
-    if practical.walk_is_observed() {
-        series.push(line("K√(τ/3)", k, &|t| pair.walk * (t / 3.0).sqrt()));
-        series.push(reading("K", k, 3.0, pair.walk));
-    }
-    series.extend(minimum.map(|m| reading("0.664 B", b, m.tau_s, m.deviation)));
-    series
+    .in_group("scales")
 }
 
 /// Hues of processes: those that neither model nor recordings have.
@@ -387,30 +370,32 @@ const ABNORMAL: [usize; 2] = [6, 7];
 fn recordings(
     fitted: &FittedCurve,
     diagnoses: &[Diagnosis],
-    point: impl Fn(f64, f64) -> (f64, f64),
+    line: impl Fn(&[f64]) -> Vec<(f64, f64)>,
 ) -> Vec<Series> {
     if fitted.replicates.len() < 2 {
         return Vec::new();
     }
-    let own = diagnoses.iter().filter(|d| d.sensor == fitted.sensor);
-    let abnormal: Vec<&str> = own
+    let abnormal: Vec<&str> = diagnoses
+        .iter()
+        .filter(|d| d.sensor == fitted.sensor)
         .filter(|d| is_abnormal(d))
         .map(|d| d.name.as_str())
         .collect();
-    let names = recording_names(fitted.replicates.iter().map(|r| r.file.as_str()));
     let series = fitted
         .replicates
         .iter()
-        .zip(names)
+        .zip(recording_names(
+            fitted.replicates.iter().map(|r| r.file.as_str()),
+        ))
         .map(|(replicate, name)| {
-            let points = fitted.tau_s.iter().zip(&replicate.wv);
-            let points = points.map(|(t, nu)| point(*t, *nu)).collect();
+            let points = line(&replicate.wv);
             match abnormal.iter().position(|file| *file == replicate.file) {
                 None => Series::thin("recordings", Colour::Soft, points),
-                Some(k) => {
-                    let hue = Colour::Hue(ABNORMAL[k % ABNORMAL.len()]);
-                    Series::line(&format!("{name} (abnormal)"), hue, points)
-                }
+                Some(k) => Series::line(
+                    &format!("{name} (abnormal)"),
+                    Colour::Hue(ABNORMAL[k % ABNORMAL.len()]),
+                    points,
+                ),
             }
         });
     series.collect()
@@ -446,8 +431,8 @@ fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
         let off = percent((m.ratio - 1.0).abs());
         let known = departure
             .known_to
-            .map(|level| format!(" (up to {})", at(level)));
-        let known = known.unwrap_or_default();
+            .map(|level| format!(" (up to {})", at(level)))
+            .unwrap_or_default();
         format!(", within {off} at all scales known to 10 %{known}")
     });
     format!("{name}: {spec} fits{p}{off}")
@@ -476,19 +461,22 @@ fn recordings_line(outcomes: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<Str
     };
     let mut abnormal = Vec::new();
     for (name, shown) in names.iter().zip(recording_names(names.iter().copied())) {
-        let own = diagnoses
+        let findings: Vec<String> = diagnoses
             .iter()
-            .filter(|d| d.name == *name && is_abnormal(d));
-        let findings: Vec<String> = own.map(finding).collect();
+            .filter(|d| d.name == *name && is_abnormal(d))
+            .map(finding)
+            .collect();
         if !findings.is_empty() {
             abnormal.push(format!("{shown} ({})", findings.join(", ")));
         }
     }
     if abnormal.is_empty() {
-        let differ = outcomes.iter().find_map(|o| o.differing());
-        let differ = differ.map_or(String::new(), |(p, _)| {
-            format!(", but they differ beyond their noise (p = {p:.3})")
-        });
+        let differ = outcomes
+            .iter()
+            .find_map(|o| o.differing())
+            .map_or(String::new(), |(p, _)| {
+                format!(", but they differ beyond their noise (p = {p:.3})")
+            });
         return Some(format!("{count} recordings, none abnormal{differ}"));
     }
     let named = some(&abnormal);
@@ -513,15 +501,16 @@ fn beginnings(found: &Beginnings) -> Option<(&'static str, String)> {
         None => format!("{name} never settles"),
     };
     let lines: Vec<String> = told.iter().zip(names).map(line).collect();
-    let head = match found.left_out {
-        true => "left out at the beginning",
-        false => "not stationary at the beginning",
+    let head = if found.left_out {
+        "left out at the beginning"
+    } else {
+        "not stationary at the beginning"
     };
     (!lines.is_empty()).then(|| (head, some(&lines)))
 }
 
 /// `accel.x`, with the estimator where there are several.
-pub(super) fn fit_name(outcome: &Outcome, outcomes: &[&Outcome]) -> String {
+fn fit_name(outcome: &Outcome, outcomes: &[&Outcome]) -> String {
     match outcomes.iter().filter(|o| o.scope == outcome.scope).count() {
         1 => outcome.scope.name(),
         _ => format!("{} {}", outcome.scope.name(), outcome.estimator),
@@ -534,7 +523,7 @@ const FACTOR: f64 = 3.0;
 const PEAK: f64 = 3.78;
 
 /// Remarks on a fit, the most important first.
-pub(super) fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
+fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
     let (fit, curve, rate_hz) = (&outcome.fit, &outcome.curve, settings.rate_hz);
     let (model, labels) = (&fit.composite, fit.composite.labels());
     let seconds = |level: &u32| tau_s(*level, rate_hz);
@@ -547,35 +536,42 @@ pub(super) fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
     }));
     // A range that was asked for is no news.
     if let ([first, ..], None) = (&curve.ignored[..], settings.fit_range) {
-        let last = curve.ignored.last().unwrap_or(first);
-        let scales = [first, last]
+        let scales = [first, curve.ignored.last().unwrap_or(first)]
             .map(|level| duration(seconds(level)))
             .join(" to ");
         notes.push(format!("scales {scales} are not fitted: too many outliers"));
     }
-    let indistinct = outcome
-        .inference
+    notes.extend(
+        outcome
+            .inference
+            .iter()
+            .filter_map(|i| i.indistinct.as_ref())
+            .map(|i| {
+                format!(
+                    "{} describes the curve as well (p = {:.2})",
+                    i.spec, i.p_value
+                )
+            }),
+    );
+    for i in intervals(outcome)
         .iter()
-        .filter_map(|i| i.indistinct.as_ref());
-    notes.extend(indistinct.map(|i| {
-        format!(
-            "{} describes the curve as well (p = {:.2})",
-            i.spec, i.p_value
-        )
-    }));
-    let amplitudes = intervals(outcome)
-        .iter()
-        .filter(|i| !i.of.parameter.is_shape() && i.absent.is_none());
-    for i in amplitudes.filter(|i| i.high > FACTOR * FACTOR * i.low) {
+        .filter(|i| !i.of.parameter.is_shape() && i.absent.is_none())
+        .filter(|i| i.high > FACTOR * FACTOR * i.low)
+    {
         let name = model.name_of(i.of);
         let factor = readable((i.high / i.low).sqrt());
-        notes.push(match i.low > 0.0 {
-            true => format!("{name} is known to a factor of {factor} only"),
-            false => format!("{name} may be zero"),
+        notes.push(if i.low > 0.0 {
+            format!("{name} is known to a factor of {factor} only")
+        } else {
+            format!("{name} may be zero")
         });
     }
-    let zero = fit.zero.iter().map(|i| &labels[*i]);
-    notes.extend(zero.map(|label| format!("{label} is zero: not seen in these data")));
+    notes.extend(
+        fit.zero
+            .iter()
+            .map(|i| &labels[*i])
+            .map(|label| format!("{label} is zero: not seen in these data")),
+    );
     let longest_s = outcome.counted_levels().last().map_or(0.0, seconds);
     for (i, label) in labels
         .iter()
@@ -602,11 +598,12 @@ pub(super) fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
 }
 
 /// Why parameters have no interval.
-pub(super) fn without_interval(outcome: &Outcome) -> impl Iterator<Item = String> {
+fn without_interval(outcome: &Outcome) -> impl Iterator<Item = String> {
     let labels = outcome.fit.composite.labels();
-    let absent = intervals(outcome).iter();
-    let absent = absent.filter_map(|i| Some((i, i.absent.as_ref()?)));
-    absent.map(move |(interval, why)| undetermined(interval, why, &labels))
+    intervals(outcome)
+        .iter()
+        .filter_map(|i| Some((i, i.absent.as_ref()?)))
+        .map(move |(interval, why)| undetermined(interval, why, &labels))
 }
 
 fn undetermined(interval: &ParameterInterval, why: &Undetermined, labels: &[String]) -> String {
@@ -647,8 +644,7 @@ fn recording_notes(
         notes.extend(trim_note(sensor, abnormal, outcomes, settings));
     }
     for found in own.first().iter().flat_map(|d| &d.common) {
-        let ends = [found.tau_s.first(), found.tau_s.last()];
-        let from_to = ends
+        let from_to = [found.tau_s.first(), found.tau_s.last()]
             .map(|end| end.map_or_else(String::new, |s| duration(*s)))
             .join(" to ");
         let size = percent(found.size);
@@ -681,24 +677,25 @@ fn trim_note(
     settings: &Settings,
 ) -> Option<String> {
     if !settings.estimators.contains(&Estimator::DrAwv) {
-        let advice =
-            "the model includes the abnormal recordings: --estimator dr-awv leaves them out";
-        return Some(advice.to_owned());
+        return Some(
+            "the model includes the abnormal recordings: --estimator dr-awv leaves them out"
+                .to_owned(),
+        );
     }
-    let own = outcomes
+    let fit = outcomes
         .iter()
-        .filter(|o| o.scope.sensor == sensor && o.recordings > 0);
-    let fit = own.min_by_key(|o| o.replicates)?;
+        .filter(|o| o.scope.sensor == sensor && o.recordings > 0)
+        .min_by_key(|o| o.replicates)?;
     // Pooled, a recording has a signal for each axis.
     let needed = abnormal * fit.replicates.div_ceil(fit.recordings);
     let trim = settings.trim.count(fit.replicates);
-    let advice =
-        format!("a trim of {trim} does not leave out the abnormal recordings: --trim {needed}");
-    (trim < needed).then_some(advice)
+    (trim < needed).then_some(format!(
+        "a trim of {trim} does not leave out the abnormal recordings: --trim {needed}"
+    ))
 }
 
 /// The finding about the means of one sensor, without its name.
-pub(super) fn turn_on_remark(found: &TurnOnSpread) -> String {
+fn turn_on_remark(found: &TurnOnSpread) -> String {
     let spread = format!("{} {}", readable(found.spread()), found.sensor.unit());
     match found.finding {
         TurnOnFinding::Seen => {
@@ -720,7 +717,7 @@ pub(super) fn turn_on_remark(found: &TurnOnSpread) -> String {
 }
 
 /// The reasons of a choice.
-pub(super) fn reasons(ranking: &Ranking) -> Vec<String> {
+fn reasons(ranking: &Ranking) -> Vec<String> {
     let (best, taken) = (&ranking.candidates[0], &ranking.candidates[ranking.chosen]);
     let wvic = |c: &Candidate| format!("{} {:.4}", c.spec, c.wvic());
     let (name, pair) = (&taken.spec, format!("{}, {}", wvic(taken), wvic(best)));
@@ -734,7 +731,473 @@ pub(super) fn reasons(ranking: &Ranking) -> Vec<String> {
     if taken.is_rejected() {
         lines.push("the J-test rejects every candidate".to_owned());
     }
-    let simpler = ranking.too_simple.iter();
-    lines.extend(simpler.map(|(spec, p)| format!("{spec} is too simple (p ≤ {p:.3})")));
+    lines.extend(
+        ranking
+            .too_simple
+            .iter()
+            .map(|(spec, p)| format!("{spec} is too simple (p ≤ {p:.3})")),
+    );
     lines
+}
+
+// A calibration as JSON: fits with their figures, recordings, turn-on biases.
+
+/// The facts of a fit that stand in the provenance of its model too; null where there are none.
+fn fit_record(outcome: &Outcome, settings: &Settings) -> Value {
+    let (fit, goodness) = (&outcome.fit, outcome.goodness());
+    let worst = outcome.departure().misfit;
+    let notes = fit_notes(outcome, settings).into_iter();
+    let notes: Vec<String> = notes.chain(without_interval(outcome)).collect();
+    let is_trimmed = outcome.estimator == Estimator::DrAwv;
+    json!({
+        "signals": outcome.scope.name(),
+        "model": outcome.spec.to_string(),
+        "replicates": outcome.replicates,
+        "recordings": outcome.recordings,
+        "trim": is_trimmed.then(|| settings.trim.count(outcome.replicates)),
+        "scales": outcome.curve.levels.len(),
+        "objective": fit.objective,
+        "termination": fit.termination,
+        "combinations": fit.combinations,
+        "starts": fit.starts,
+        "agreeing": fit.agreeing,
+        "runner_up": fit.runner_up,
+        "bootstrap": outcome.inference.as_ref().map_or(0, |i| i.draws),
+        "j_dof": goodness.map(|g| g.dof),
+        "j_p_value": goodness.map(|g| g.p_value),
+        "worst_ratio": worst.map(|miss| miss.ratio),
+        "worst_tau_s": worst.map(|miss| tau_s(miss.level, settings.rate_hz)),
+        "notes": notes,
+    })
+}
+
+/// A fit: its record, models and figures. `axis` is `all` of pooled axes; `spread_p_value` is the probability that
+/// replicates of one noise differ as much at some scale; `parameter_spread` are laws of model files; `missed` are the
+/// scales at which curve and model differ by more than four standard deviations; `zero` are the processes whose amplitude
+/// is zero, `at_end` those whose correlation time lies at the end of its range.
+pub(super) fn fit_json(outcome: &Outcome, all: &[&Outcome], settings: &Settings) -> Value {
+    let (fit, rate_hz) = (&outcome.fit, settings.rate_hz);
+    let (inference, ranking) = (outcome.inference.as_ref(), outcome.ranking.as_ref());
+    let labels = fit.composite.labels();
+    let labelled = |processes: &[usize]| -> Vec<&str> {
+        processes.iter().map(|i| labels[*i].as_str()).collect()
+    };
+    let miss = |m: &Miss| json!({ "tau_s": tau_s(m.level, rate_hz), "ratio": m.ratio, "deviations": m.deviations });
+    let missed: Vec<Value> = outcome.departure().missed.iter().map(miss).collect();
+    let law = |found: &ParameterSpread| {
+        json!({
+            "process": labels[found.of.process],
+            "parameter": found.of.parameter.name(),
+            "distribution": "lognormal",
+            "median": found.median,
+            "median_ci95": found.median_ci95,
+            "sd": found.sd,
+            "sd_ci95": found.sd_ci95,
+        })
+    };
+    let laws: Vec<Value> = inference.iter().flat_map(|i| &i.varying).map(law).collect();
+    let indistinct = inference.and_then(|i| i.indistinct.as_ref()).map(|i| {
+        json!({
+            "processes": labelled(&i.processes),
+            "simpler": i.spec.to_string(),
+            "p_value": i.p_value,
+            "simpler_processes": processes(&i.composite, &i.intervals),
+        })
+    });
+    let fit_facts = json!({
+        "name": fit_name(outcome, all),
+        "sensor": outcome.scope.sensor,
+        "axis": outcome.scope.axis.map_or("all", |axis| axis.name()),
+        "estimator": outcome.estimator,
+        "ranking": ranking.map_or(Vec::new(), candidates),
+        "reasons": ranking.map_or(Vec::new(), reasons),
+        "processes": processes(&fit.composite, intervals(outcome)),
+        "goodness": outcome.goodness(),
+        "spread": inference.map_or(&[][..], |i| &i.spread),
+        "spread_p_value": inference.and_then(|i| i.alike),
+        "parameter_spread": laws,
+        "indistinct": indistinct,
+        "figures": figures(outcome, rate_hz),
+        "missed": missed,
+        "zero": labelled(&fit.zero),
+        "at_end": labelled(&fit.at_end),
+    });
+    merged([fit_record(outcome, settings), fit_facts])
+}
+
+fn candidates(ranking: &Ranking) -> Vec<Value> {
+    let entry = |(i, c): (usize, &Candidate)| {
+        json!({
+            "model": c.spec.to_string(),
+            "parameters": c.spec.parameters(),
+            "objective": c.objective,
+            "optimism": c.optimism,
+            "wvic": c.wvic(),
+            "p_value": c.p_value,
+            "j_test_p_value": c.j_p_value,
+            "chosen": i == ranking.chosen,
+        })
+    };
+    ranking.candidates.iter().enumerate().map(entry).collect()
+}
+
+/// Processes with the keys of model files; beside each parameter `_ci95` and `_se`, null where they are not determined.
+fn processes(model: &Composite, intervals: &[ParameterInterval]) -> Vec<Value> {
+    let mut all: Vec<Value> = model
+        .processes
+        .iter()
+        .map(|process| json!(process))
+        .collect();
+    for i in intervals {
+        let (entry, name) = (&mut all[i.of.process], i.of.parameter.name());
+        entry[format!("{name}_ci95")] = json!(i.absent.is_none().then_some([i.low, i.high]));
+    }
+    all
+}
+
+fn intervals(outcome: &Outcome) -> &[ParameterInterval] {
+    outcome.inference.as_ref().map_or(&[], |i| &i.intervals)
+}
+
+fn interval_of(intervals: &[ParameterInterval], of: ParameterRef) -> Option<&ParameterInterval> {
+    intervals.iter().find(|i| i.of == of)
+}
+
+/// The means of one sensor, by the model of one estimator; where a bias is seen both probabilities are below `level`.
+pub(super) fn turn_on_json(found: &TurnOnSpread) -> Value {
+    json!({
+        "sensor": found.sensor,
+        "estimator": found.estimator,
+        "finding": found.finding,
+        "sigmas": found.sigmas(),
+        "spread": found.spread(),
+        "noise": found.noise(),
+        "relative_error": found.relative_error(),
+        "p_noise": found.p_noise,
+        "p_drift": found.p_drift,
+        "level": TURN_ON_LEVEL,
+        "axes": found.axes,
+        "remark": turn_on_remark(found),
+    })
+}
+
+/// A figure of a model, in the unit of data sheets, or why the data do not show it. `ends`: the 95 % interval where draws were
+/// made, if they determine it; `averages`: averaging times at which it is the largest part.
+fn figure(
+    (name, unit): (String, &str),
+    value: Result<f64, &str>,
+    ends: Option<Option<[f64; 2]>>,
+    averages: String,
+) -> Value {
+    json!({
+        "name": name,
+        "value": value.ok(),
+        "ci95": ends.flatten().filter(|_| value.is_ok()),
+        "unit": unit,
+        "interval": match (value, ends) {
+            (Err(why), _) => why.to_owned(),
+            (_, None) => String::new(),
+            (_, Some(None)) => "not determined".to_owned(),
+            (_, Some(Some(ends))) => ends.map(readable).join(" … "),
+        },
+        "averages": averages,
+    })
+}
+
+/// N, B and K of a fit, and what a pair of N and K does not carry.
+fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
+    let mut figures = outcome
+        .practical(rate_hz)
+        .map_or_else(BTreeMap::new, |p| practical_figures(outcome, &p));
+    let model = &outcome.fit.composite;
+    for (index, (process, label)) in model.processes.iter().zip(model.labels()).enumerate() {
+        let Some((letter, name, unit, parameter, convert)) =
+            further_figure(process, outcome.scope.sensor)
+                .filter(|_| !outcome.fit.zero.contains(&index))
+        else {
+            continue;
+        };
+        let own = |of: ParameterRef| of.process == index && of.parameter == parameter;
+        let interval = intervals(outcome).iter().find(|i| own(i.of)).map(|i| {
+            let mut ends = [i.low, i.high].map(|end| convert(end, rate_hz));
+            ends.sort_by(f64::total_cmp);
+            i.absent.is_none().then_some(ends)
+        });
+        let value = model.parameters().find(|(of, _)| own(*of));
+        let figure = figure(
+            (format!("{label} {name}"), unit),
+            value.map(|(_, value)| convert(value, rate_hz)).ok_or(""),
+            interval,
+            averages(outcome, index, rate_hz),
+        );
+        let key = match letter {
+            "T" => format!("T_{label}"),
+            letter => letter.to_owned(),
+        };
+        figures.insert(key, figure);
+    }
+    figures
+}
+
+fn practical_figures(outcome: &Outcome, practical: &Practical) -> BTreeMap<String, Value> {
+    let sensor = outcome.scope.sensor;
+    let (pair, ends) = (&practical.parameters.walk, &practical.intervals);
+    let [white, walk] = match sensor {
+        Sensor::Accel => ["velocity random walk N", "accel. random walk K"],
+        Sensor::Gyro => ["angle random walk N", "rate random walk K"],
+    };
+    let figure =
+        |name: &str, quantity: Quantity, value: Result<f64, &str>, ends: Option<[f64; 2]>, at| {
+            let (unit, factor) = quantity.sheet(sensor);
+            let ends = outcome
+                .inference
+                .is_some()
+                .then_some(ends.map(|ends| ends.map(|end| end * factor)));
+            figure((name.to_owned(), unit), value.map(|x| x * factor), ends, at)
+        };
+    let crossover = pair.crossover_s().map(duration);
+    let none = format!("none up to {}", duration(practical.range_s));
+    let to = crossover
+        .as_ref()
+        .map_or(String::new(), |t| format!("up to {t}"));
+    let from = crossover.map_or(none.clone(), |t| {
+        format!(
+            "from {t}{}",
+            practical
+                .walk_until_s
+                .map(|t| format!(" to {}", duration(t)))
+                .unwrap_or_default()
+        )
+    });
+    let minimum = practical.parameters.minimum;
+    let floor = minimum.map_or(none, |m| format!("floor at {}", duration(m.tau_s)));
+    let named = [
+        (
+            "N",
+            figure(white, Quantity::Density, Ok(pair.density), ends.density, to),
+        ),
+        (
+            "B",
+            figure(
+                "bias instability B",
+                Quantity::Bias,
+                minimum.map(|m| m.bias_instability()).ok_or("not reached"),
+                ends.instability,
+                floor,
+            ),
+        ),
+        (
+            "K",
+            figure(
+                walk,
+                Quantity::Walk,
+                practical
+                    .walk_is_observed()
+                    .then_some(pair.walk)
+                    .ok_or("not observed"),
+                ends.walk,
+                from,
+            ),
+        ),
+    ];
+    named.map(|(key, figure)| (key.to_owned(), figure)).into()
+}
+
+/// Letter, name and unit of what a process is known by beside N and K, the parameter that it follows from, and how, at a
+/// rate (Hz).
+type FurtherFigure = (
+    &'static str,
+    &'static str,
+    &'static str,
+    Parameter,
+    fn(f64, f64) -> f64,
+);
+
+fn further_figure(process: &Process, sensor: Sensor) -> Option<FurtherFigure> {
+    let [increment, ramp] = match sensor {
+        Sensor::Accel => ["m/s", "m/s² per s"],
+        Sensor::Gyro => ["rad", "rad/s per s"],
+    };
+    const TIME: &str = "correlation time T";
+    Some(match process {
+        Process::Ar1(p) if p.phi() > 0.0 => ("T", TIME, "s", Parameter::Phi, |phi, rate_hz| {
+            -1.0 / (phi.ln() * rate_hz)
+        }),
+        Process::GaussMarkov(_) => ("T", TIME, "s", Parameter::Beta, |beta, _| 1.0 / beta),
+        // Of the increments over a sample, as IEEE 952 has it.
+        Process::Quantization(_) => (
+            "Q",
+            "quantization Q",
+            increment,
+            Parameter::Q2,
+            |q2, rate_hz| q2.sqrt() / rate_hz,
+        ),
+        Process::Drift(_) => ("R", "ramp", ramp, Parameter::Slope, |slope, rate_hz| {
+            slope * rate_hz
+        }),
+        _ => return None,
+    })
+}
+
+/// Averaging times at which a process is the largest part of the model's wavelet variance.
+fn averages(outcome: &Outcome, index: usize, rate_hz: f64) -> String {
+    let model = &outcome.fit.composite;
+    let part = |process: &Process, level: u32| match process.haar_wv(level) / model.haar_wv(level) {
+        part if part.is_finite() => part,
+        // Of nothing nothing is a part.
+        _ => 0.0,
+    };
+    let largest_at = |level: u32| {
+        model
+            .processes
+            .iter()
+            .map(|p| part(p, level))
+            .enumerate()
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(i, _)| i)
+    };
+    let levels = outcome.counted_levels();
+    let leads = || levels.iter().filter(|l| largest_at(**l) == Some(index));
+    let time = |level: &u32| duration(0.5 * tau_s(*level, rate_hz));
+    match (leads().next(), leads().next_back()) {
+        (Some(first), Some(last)) if first == last => time(first),
+        (Some(first), Some(last)) => format!("{} – {}", time(first), time(last)),
+        _ => {
+            format!(
+                "none ({} at most)",
+                percent(
+                    levels
+                        .iter()
+                        .map(|l| part(&model.processes[index], *l))
+                        .fold(0.0, f64::max)
+                )
+            )
+        }
+    }
+}
+
+// The model file of a calibration.
+
+/// The facts of a calibration for its model files.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct CalibrationNote {
+    /// Seed of the bootstrap, if there was one.
+    pub seed: Option<u64>,
+    /// How the recordings were read and grouped, key by key: what was left out at their beginning, gaps, axes, scales, pool.
+    pub reading: toml::Table,
+    /// The recordings or the curve, and the parameters file.
+    pub inputs: Vec<Input>,
+}
+
+impl CalibrationNote {
+    /// The model file of one estimator. Channels of no group are missing in it. `curves`: BLAKE3, in hexadecimal, of the
+    /// file of curves that goes beside it.
+    pub(crate) fn model_file(&self, shown: &ShownCalibration<'_>, curves: &str) -> ModelFile {
+        let (outcomes, settings) = (&shown.outcomes, shown.settings);
+        let mut file = ModelFile::new(model_of(outcomes.iter().copied(), settings.rate_hz));
+        file.missing = Channel::ALL.to_vec();
+        for outcome in outcomes {
+            for channel in outcome.scope.channels() {
+                file.missing.retain(|c| *c != channel);
+                file.intervals.extend(intervals_of_axis(outcome, channel));
+            }
+        }
+        file.spread = spread(outcomes, settings.rate_hz);
+        let mut provenance = self.provenance(outcomes, settings, curves);
+        let mut remarks = toml::Table::new();
+        let mut turn_on = TurnOn::default();
+        for found in &shown.turn_on {
+            let sensor = found.sensor;
+            remarks.insert(sensor.name().to_owned(), turn_on_remark(found).into());
+            let sigmas = found.sigmas().map(|sigmas| {
+                Axis::ALL.map(
+                    |axis| match file.missing.contains(&Channel { sensor, axis }) {
+                        true => 0.0,
+                        false => sigmas[axis as usize],
+                    },
+                )
+            });
+            match sensor {
+                Sensor::Accel => turn_on.accel_m_s2 = sigmas,
+                Sensor::Gyro => turn_on.gyro_rad_s = sigmas,
+            }
+        }
+        file.turn_on = (turn_on != TurnOn::default()).then_some(turn_on);
+        if !remarks.is_empty() {
+            provenance.insert("turn_on".to_owned(), remarks.into());
+        }
+        file.provenance = Some(provenance);
+        file
+    }
+
+    fn provenance(&self, outcomes: &[&Outcome], settings: &Settings, curves: &str) -> toml::Table {
+        let estimator = outcomes.first().map_or(Estimator::Given, |o| o.estimator);
+        let is_robust = estimator.is_robust();
+        let fit = |outcome: &&Outcome| known(fit_record(outcome, settings));
+        // TOML integers are signed; larger seeds go as text.
+        let seed =
+            |seed: u64| i64::try_from(seed).map_or_else(|_| json!(seed.to_string()), Into::into);
+        let mut table = known(json!({
+            "program": PROGRAM,
+            "schema": SCHEMA,
+            "estimator": estimator,
+            "model": settings.model.to_string(),
+            "weighting": settings.weighting.name(),
+            "fit_range_s": settings.fit_range.map(|range| [range.from_s, range.to_s]),
+            "seed": self.seed.map(seed),
+            "efficiency": is_robust.then(|| settings.tuning.efficiency()),
+            "fits": outcomes.iter().map(fit).collect::<Vec<_>>(),
+            "inputs": self.inputs,
+            "curves_blake3": curves,
+        }));
+        table.extend(self.reading.clone());
+        table
+    }
+}
+
+/// The laws by which the parameters of recordings differ; none where none is known to.
+fn spread(outcomes: &[&Outcome], rate_hz: f64) -> Option<Spread> {
+    let mut spread = Spread::default();
+    for outcome in outcomes {
+        let (composite, labels) = (&outcome.fit.composite, outcome.fit.composite.labels());
+        let variation = |found: &ParameterSpread| {
+            let ci95 = Some(LognormalIntervals {
+                median: found.median_ci95,
+                sd: found.sd_ci95,
+            });
+            let law = Law::Lognormal {
+                median: found.median,
+                sd: found.sd,
+                ci95,
+            };
+            let (process, parameter) = (&labels[found.of.process], found.of.parameter.name());
+            Variation::new(composite, rate_hz, process, parameter, law).ok()
+        };
+        let laws: Vec<Variation> = outcome
+            .inference
+            .iter()
+            .flat_map(|i| &i.varying)
+            .filter_map(variation)
+            .collect();
+        outcome
+            .scope
+            .channels()
+            .iter()
+            .for_each(|c| spread.axes[c.index()].clone_from(&laws));
+    }
+    (spread != Spread::default()).then_some(spread)
+}
+
+fn intervals_of_axis(outcome: &Outcome, channel: Channel) -> impl Iterator<Item = Interval> {
+    let labels = outcome.fit.composite.labels();
+    intervals(outcome)
+        .iter()
+        .filter(|i| i.low.is_finite())
+        .map(move |i| Interval {
+            channel,
+            process: labels[i.of.process].clone(),
+            parameter: i.of.parameter.name().to_owned(),
+            low: i.low,
+            high: i.high,
+        })
 }

@@ -1,10 +1,8 @@
 //! Calibration: from static recordings, or directories of them, to a noise model for each sensor or axis.
 
-use super::document::ShownCalibration;
-use super::fits::{fit_json, turn_on_json};
-use super::model_file::CalibrationNote;
+use super::document::{CalibrationNote, ShownCalibration, fit_json, turn_on_json};
 use crate::app::reading::note_report;
-use crate::app::{Context, Failure};
+use crate::app::{Context, Failure, refused};
 use crate::io::recordings::{FileReport, ReadOptions, Report};
 use crate::io::{curve_file, input, recordings};
 use crate::report::CurvesFile;
@@ -13,13 +11,12 @@ use nav_sim_calibration::{
     Outcome, Pool, Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve, grouped,
     infer_telling, replicates, turn_on, warm_up,
 };
-use nav_sim_signal::imu::{Channel, Recording, Sensor, Signal};
+use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::names::UnknownName;
 use nav_sim_signal::noise::Model;
 use nav_sim_signal::wavelet::{Curve, Tuning, default_levels};
 use rayon::prelude::*;
 use serde_json::json;
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -30,21 +27,6 @@ pub enum EstimatorChoice {
     One(Estimator),
     /// The three averages; of a single recording GMWM and RGMWM.
     All,
-}
-
-impl Default for EstimatorChoice {
-    fn default() -> Self {
-        Self::One(Estimator::default())
-    }
-}
-
-impl fmt::Display for EstimatorChoice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::One(estimator) => estimator.fmt(f),
-            Self::All => f.write_str("all"),
-        }
-    }
 }
 
 impl FromStr for EstimatorChoice {
@@ -61,7 +43,6 @@ impl FromStr for EstimatorChoice {
 
 impl EstimatorChoice {
     /// Whether it takes one recording at a time, however many there are.
-    #[must_use]
     pub fn is_single(self) -> bool {
         matches!(self, Self::One(estimator) if estimator.is_single())
     }
@@ -81,12 +62,12 @@ impl EstimatorChoice {
     /// The estimators for so many recordings.
     fn estimators(self, recordings: usize) -> Result<Vec<Estimator>, Failure> {
         match self {
-            Self::One(estimator) if estimator.is_single() && recordings > 1 => {
-                let message = format!(
+            Self::One(estimator) if estimator.is_single() && recordings > 1 => refused(
+                format!(
                     "--estimator {estimator} takes one recording at a time; there are {recordings}"
-                );
-                Err(Failure::input(message).hint("awv, sr-awv and dr-awv take several"))
-            }
+                ),
+                "awv, sr-awv and dr-awv take several",
+            ),
             Self::One(estimator) => Ok(vec![estimator]),
             Self::All if recordings == 1 => Ok(vec![Estimator::Gmwm, Estimator::Rgmwm]),
             Self::All => Ok(vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv]),
@@ -119,7 +100,7 @@ impl Default for CalibrationOptions {
             reading: ReadOptions::default(),
             skip_warm_up: false,
             scales: None,
-            estimators: EstimatorChoice::default(),
+            estimators: EstimatorChoice::One(Estimator::default()),
             pool: None,
             settings: Settings::default(),
             bootstrap: Some(Bootstrap::default()),
@@ -219,8 +200,10 @@ pub(crate) fn measure(
         ..settings.clone()
     };
     if *pool == Some(Pool::Sensor) && settings.pool() == Pool::Axes {
-        let message = "--pool sensor: gmwm, rgmwm and avlr take one signal at a time";
-        return Err(Failure::input(message).hint("--pool axes"));
+        return refused(
+            "--pool sensor: gmwm, rgmwm and avlr take one signal at a time",
+            "--pool axes",
+        );
     }
     let mut measured: Vec<_> = looks.into_iter().flat_map(|look| look.replicates).collect();
     one_switching_on(&report, &mut measured);
@@ -260,10 +243,11 @@ impl Calibration {
     }
 
     /// The noise model of an estimator, at the rate of the recordings; axes without a recording have no noise.
-    #[must_use]
     pub fn model(&self, estimator: Estimator) -> Model {
-        let own = self.outcomes.iter().filter(|o| o.estimator == estimator);
-        nav_sim_calibration::model_of(own, self.settings.rate_hz)
+        nav_sim_calibration::model_of(
+            self.outcomes.iter().filter(|o| o.estimator == estimator),
+            self.settings.rate_hz,
+        )
     }
 
     /// The fits of one estimator, or all of them.
@@ -355,10 +339,10 @@ fn one_switching_on(report: &Report, measured: &mut [(Channel, Replicate)]) {
         .flat_map(|file| file.recordings().skip(1))
         .map(|(name, _)| name)
         .collect();
-    let of_later = measured
+    measured
         .iter_mut()
-        .filter(|(_, replicate)| later.contains(&replicate.name));
-    of_later.for_each(|(_, replicate)| replicate.mean = f64::NAN);
+        .filter(|(_, replicate)| later.contains(&replicate.name))
+        .for_each(|(_, replicate)| replicate.mean = f64::NAN);
 }
 
 /// Refuses copies of a recording.
@@ -370,8 +354,10 @@ fn distinct(looks: &[MeasuredRecording]) -> Result<(), Failure> {
         };
         if let Some(first) = looks[..i].iter().find(copy) {
             let (copy, first) = (&look.recording, &first.recording);
-            let message = format!("{copy} is a copy of {first}: it would count as two replicates");
-            return Err(Failure::input(message).hint("leave one of them out"));
+            return refused(
+                format!("{copy} is a copy of {first}: it would count as two replicates"),
+                "leave one of them out",
+            );
         }
     }
     Ok(())
@@ -406,11 +392,10 @@ pub(crate) fn without_warm_up(
     mut recording: Recording,
     leave_out: bool,
 ) -> (Recording, Vec<WarmUp>) {
-    let begins_otherwise = |s: &Signal| warm_up(&s.samples);
     let found: Vec<_> = recording
         .signals
         .par_iter()
-        .filter_map(begins_otherwise)
+        .filter_map(|s| warm_up(&s.samples))
         .collect();
     if let Some(samples) = longest(&found).filter(|_| leave_out) {
         for signal in &mut recording.signals {
@@ -439,16 +424,13 @@ fn shortest(report: &Report, scales: Option<u32>, context: &Context<'_>) {
         found[found.len() / 2],
     );
     if scales < usual {
-        context.warn(match scales < used {
-            false => format!(
-                "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there \
-                 would be more (half of them have {usual}): leave it out for those"
-            ),
-            true => format!(
+        context.warn(if scales < used { format!(
                 "{recording}: its {samples} samples have {scales} scales; the longer ones, up to {used} scales, are \
                  averaged over the longer recordings alone"
-            ),
-        });
+            ) } else { format!(
+                "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there \
+                 would be more (half of them have {usual}): leave it out for those"
+            ) });
     }
 }
 
@@ -472,11 +454,13 @@ pub(crate) fn read_curves(
     let path = || path.display().to_string();
     let rate_hz = match (named[0].rate_hz, rate_hz) {
         (Some(stated), Some(given)) => {
-            let message = format!(
-                "{}: the curve says its rate, {stated} Hz; --rate-hz {given} is another",
-                path()
+            return refused(
+                format!(
+                    "{}: the curve says its rate, {stated} Hz; --rate-hz {given} is another",
+                    path()
+                ),
+                "leave --rate-hz out: it is for a CSV curve",
             );
-            return Err(Failure::input(message).hint("leave --rate-hz out: it is for a CSV curve"));
         }
         (stated, given) => stated.or(given).ok_or_else(|| {
             Failure::input(format!(
@@ -489,8 +473,10 @@ pub(crate) fn read_curves(
     let mut is_unsaid = false;
     let mut curves = Curves::new();
     for named in named {
-        let estimator = named.estimator.and_then(|name| name.parse().ok());
-        let estimator = estimator.unwrap_or(Estimator::Given);
+        let estimator = named
+            .estimator
+            .and_then(|name| name.parse().ok())
+            .unwrap_or(Estimator::Given);
         is_unsaid |= named.sensor.or(sensor).is_none();
         let sensor = named.sensor.or(sensor).unwrap_or(Sensor::Accel);
         let scope = Scope {
@@ -501,24 +487,30 @@ pub(crate) fn read_curves(
             .iter()
             .any(|(s, e, _)| (*s, *e) == (scope, estimator))
         {
-            let message = format!(
-                "{}: there are two curves of {} for {estimator}",
-                path(),
-                scope.name()
+            return refused(
+                format!(
+                    "{}: there are two curves of {} for {estimator}",
+                    path(),
+                    scope.name()
+                ),
+                "calibrate the recordings themselves: it averages them",
             );
-            return Err(Failure::input(message)
-                .hint("calibrate the recordings themselves: it averages them"));
         }
         curves.push((scope, estimator, named.curve));
     }
-    let has = |e: &Estimator| curves.iter().any(|(_, estimator, _)| estimator == e);
-    let estimators = Estimator::ALL.into_iter().filter(has).collect();
-    let settings = Settings {
-        estimators,
-        rate_hz,
-        ..settings.clone()
-    };
-    Ok((curves, settings, is_unsaid))
+    let estimators = Estimator::ALL
+        .into_iter()
+        .filter(|e| curves.iter().any(|(_, estimator, _)| estimator == e))
+        .collect();
+    Ok((
+        curves,
+        Settings {
+            estimators,
+            rate_hz,
+            ..settings.clone()
+        },
+        is_unsaid,
+    ))
 }
 
 /// The models of curves.

@@ -22,17 +22,15 @@
 //! ```
 
 mod document;
-mod fits;
 mod measure;
-mod model_file;
 
+pub(crate) use document::CalibrationNote;
 pub use measure::{Calibration, CalibrationOptions, EstimatorChoice, calibrate};
 pub(crate) use measure::{Measured, measure, visit, without_warm_up};
-pub(crate) use model_file::CalibrationNote;
 
 use crate::app::inputs::{files, listed};
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Inputs, Out, OutputFile, Result, refused};
 use crate::io::draws_file::DrawsFile;
 use crate::io::input;
 use crate::io::model_file::ModelFile;
@@ -70,91 +68,47 @@ pub struct Calibrate {
         required_unless_present = "curve",
         conflicts_with = "curve"
     )]
-    pub inputs: Vec<PathBuf>,
+    inputs: Vec<PathBuf>,
     /// Fit a curve instead of recordings: CSV tau_samples,wv,edof, or a .wv.json of calibrate or wv
     #[arg(long, value_name = "FILE", conflicts_with_all = OF_RECORDINGS)]
-    pub curve: Option<PathBuf>,
+    curve: Option<PathBuf>,
     /// Which curve is fitted: an average over the replicates (awv; sr-awv, robust to outliers; dr-awv, robust to
-    /// abnormal replicates too), or the curve of a single recording (gmwm, rgmwm; avlr: slopes of its Allan deviation)
-    #[arg(long, value_parser = parse::words::<EstimatorChoice>(&ESTIMATORS), default_value_t)]
-    pub estimator: EstimatorChoice,
+    /// abnormal replicates too), or the curve of a single recording (gmwm, classical; rgmwm, robust; avlr: slopes of its
+    /// Allan deviation, read off one by one: WN, QN, RW, DR); all: the three averages (of one recording: gmwm and rgmwm)
+    #[arg(long, value_parser = parse::one_of::<EstimatorChoice>(&ESTIMATORS), default_value = "dr-awv")]
+    estimator: EstimatorChoice,
     /// Sum of WN QN AR1 GM MA1 FN RW DR such as 2*AR1+RW+WN+QN, N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN, or auto: the
     /// simplest sum of WN QN RW DR and up to two AR1 that fits as well as the best one, with the reasons
     #[arg(long, value_name = "SUM", default_value = ModelSpec::USUAL)]
-    pub model: String,
+    model: String,
     /// Replicates that dr-awv drops at each end of each scale: a number, or a percentage of all
     #[arg(long, value_name = "A", default_value_t)]
-    pub trim: Trim,
-    /// Weight of a scale in the fit
-    #[arg(long, value_parser = parse::words::<Weighting>(&WEIGHTINGS), default_value_t)]
-    pub weighting: Weighting,
-    /// Which signals are replicates of one another (default: sensor; axes for gmwm, rgmwm and avlr)
-    #[arg(long, value_parser = parse::words::<Pool>(&POOLS))]
-    pub pool: Option<Pool>,
+    trim: Trim,
+    /// Weight of a scale in the fit: model, the inverse variance by the fitted model, where a scale far above it weighs
+    /// less; edof, the same with the observed wv: the convention of the literature, low where wv is low by chance
+    #[arg(long, value_parser = parse::one_of::<Weighting>(&Weighting::NAMES), default_value_t)]
+    weighting: Weighting,
+    /// Which signals are replicates of one another: axes, those of one axis (a model per axis), or sensor, those of all
+    /// axes of a sensor (default: sensor; axes for gmwm, rgmwm and avlr)
+    #[arg(long, value_parser = parse::one_of::<Pool>(&Pool::NAMES))]
+    pool: Option<Pool>,
     /// Draws behind intervals and goodness of fit (0: neither), fewer for tests
     #[arg(long, value_name = "B", hide = true, default_value_t = Bootstrap::DRAWS as u32, value_parser = clap::value_parser!(u32).range(0..=100_000))]
-    pub bootstrap: u32,
+    bootstrap: u32,
     /// How they are read.
     #[command(flatten)]
     pub recordings: RecordingRequest,
     /// Scales and robustness.
     #[command(flatten)]
-    pub tuning: VarianceRequest,
+    tuning: VarianceRequest,
 }
 
 /// Flags about recordings and their averages, which a curve has behind it.
 const OF_RECORDINGS: [&str; 6] = ["estimator", "trim", "pool", "skip_s", "gaps", "efficiency"];
 
 /// Those of several recordings first, then those of one.
-pub(crate) const ESTIMATORS: [(&str, &str); 7] = [
-    (
-        Estimator::Awv.name(),
-        "Average of the classical wavelet variances",
-    ),
-    (
-        Estimator::SrAwv.name(),
-        "Average of the robust wavelet variances",
-    ),
-    (
-        Estimator::DrAwv.name(),
-        "Trimmed average of the robust wavelet variances",
-    ),
-    (
-        Estimator::Gmwm.name(),
-        "Classical wavelet variance of one recording",
-    ),
-    (
-        Estimator::Rgmwm.name(),
-        "Robust wavelet variance of one recording",
-    ),
-    (
-        Estimator::Avlr.name(),
-        "Slopes of the Allan deviation of one recording, read off one by one: WN, QN, RW, DR",
-    ),
-    (
-        "all",
-        "The three averages (of one recording: gmwm and rgmwm)",
-    ),
-];
-
-const WEIGHTINGS: [(&str, &str); 2] = [
-    (
-        Weighting::Model.name(),
-        "Inverse variance by the fitted model; a scale far above it weighs less",
-    ),
-    (
-        Weighting::Edof.name(),
-        "The same with the observed wv: the convention of the literature, low where wv is low by chance",
-    ),
-];
-
-const POOLS: [(&str, &str); 2] = [
-    (Pool::Axes.name(), "Those of one axis: one model per axis"),
-    (
-        Pool::Sensor.name(),
-        "Those of all axes of a sensor: one model per sensor",
-    ),
-];
+pub(crate) const ESTIMATORS: [&str; 7] =
+    ["awv", "sr-awv", "dr-awv", "gmwm", "rgmwm", "avlr", "all"];
 
 impl Command for Calibrate {
     type Answer = Calibration;
@@ -179,19 +133,23 @@ impl Command for Calibrate {
             return Ok(());
         };
         let (.., is_unsaid) = self.curves(path, &self.settings()?)?;
-        match is_unsaid {
-            false => Ok(()),
-            true => Err(Failure::input(format!(
-                "{}: the curve does not say of which sensor it is",
-                path.display()
-            ))
-            .hint("--axes accel or --axes gyro")),
+        if is_unsaid {
+            refused(
+                format!(
+                    "{}: the curve does not say of which sensor it is",
+                    path.display()
+                ),
+                "--axes accel or --axes gyro",
+            )
+        } else {
+            Ok(())
         }
     }
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        let curve = files("curve", &self.curve);
-        Ok(curve.chain(listed("recording", &self.inputs)?).collect())
+    fn inputs(&self) -> Result<Inputs> {
+        Ok(files("curve", &self.curve)
+            .chain(listed("recording", &self.inputs)?)
+            .collect())
     }
 
     fn run(&self, context: &Context<'_>) -> Result<Calibration> {
@@ -244,8 +202,7 @@ impl Answer for Calibration {
         let estimators = &self.settings.estimators;
         let of_estimator = |estimator: &Estimator| {
             let stem = stem_of(*estimator, estimators);
-            let names = (model_ending(&stem), stem);
-            self.files_of(*estimator, names, None)
+            self.files_of(*estimator, (model_ending(&stem), stem), None)
         };
         estimators.iter().flat_map(of_estimator).collect()
     }
@@ -266,8 +223,12 @@ impl Calibrate {
 
     /// The curves in the place of recordings, and whether they do not say of which sensor: then as of an accelerometer.
     fn curves(&self, path: &Path, settings: &Settings) -> Result<(Curves, Settings, bool)> {
-        let rate_hz = self.recordings.reading.rate_hz;
-        read_curves(path, rate_hz, self.recordings.sensor(), settings)
+        read_curves(
+            path,
+            self.recordings.reading.rate_hz,
+            self.recordings.sensor(),
+            settings,
+        )
     }
 
     /// The draws behind intervals.
@@ -300,10 +261,9 @@ impl Calibrate {
             return Ok(chosen);
         }
         if self.tuning.fitted().is_some() {
-            let message =
-                "--scales FROM:TO with --estimator avlr: slopes are read where they are found";
-            return Err(
-                Failure::input(message).hint("--estimator gmwm fits the same curve over a range")
+            return refused(
+                "--scales FROM:TO with --estimator avlr: slopes are read where they are found",
+                "--estimator gmwm fits the same curve over a range",
             );
         }
         let without = match &chosen {
@@ -317,10 +277,10 @@ impl Calibrate {
         let Some(name) = without else {
             return Ok(chosen);
         };
-        let message =
-            format!("--estimator avlr: {name} has no slope of its own in the Allan deviation");
-        Err(Failure::input(message)
-                .hint("--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm"))
+        refused(
+            format!("--estimator avlr: {name} has no slope of its own in the Allan deviation"),
+            "--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm",
+        )
     }
 }
 

@@ -15,11 +15,11 @@ use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
     Aim, Factor, FilterPass, Task, Track, TrueErrors, TruthSide, scaled,
 };
-use nav_sim_navigation::simulation::{Experiment, ExperimentError, RunResult};
+use nav_sim_navigation::simulation::{Experiment, ExperimentError};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
+use nav_sim_signal::noise::Model;
 use nav_sim_signal::noise::continuous::same_rate;
-use nav_sim_signal::noise::{Kind, Model};
 use rayon::prelude::*;
 use std::fmt;
 
@@ -53,7 +53,6 @@ nav_sim_signal::named!(Inflation { None = "none", Tuned = "tuned", Tenfold = "x1
 
 impl Candidate {
     /// The estimator's model as it is, in the default filter of 15 states.
-    #[must_use]
     pub fn new(estimator: Estimator, model: ModelSpec) -> Self {
         let (filter, inflation) = (FilterStates::default(), Inflation::default());
         Self {
@@ -101,9 +100,10 @@ impl Candidate {
         let mut all: Vec<Self> = Vec::new();
         for &estimator in estimators {
             for model in models {
-                let model = match estimator == Estimator::Avlr && !is_of_slopes(model) {
-                    true => ModelChoice::Given(white_and_walk()),
-                    false => model.clone(),
+                let model = if estimator == Estimator::Avlr && !is_of_slopes(model) {
+                    ModelChoice::Given(white_and_walk())
+                } else {
+                    model.clone()
                 };
                 for &filter in filters {
                     for &inflation in inflations {
@@ -129,7 +129,6 @@ impl Candidate {
     }
 
     /// Whether it may be chosen. What is made of a single recording, while there are several, is shown for comparison.
-    #[must_use]
     pub const fn is_eligible(&self) -> bool {
         !self.estimator.is_single()
     }
@@ -143,10 +142,7 @@ fn white_and_walk() -> ModelSpec {
 /// Whether every process has a slope of its own in the Allan deviation.
 fn is_of_slopes(model: &ModelChoice) -> bool {
     match model {
-        ModelChoice::Given(spec) => spec
-            .kinds()
-            .iter()
-            .all(|kind: &Kind| kind.shape().is_none()),
+        ModelChoice::Given(spec) => spec.kinds().iter().all(|kind| kind.shape().is_none()),
         ModelChoice::Auto => false,
     }
 }
@@ -233,9 +229,13 @@ impl Laboratory {
             models: Vec::new(),
         };
         let own = |unit: &Unit| {
-            let n2 = ModelChoice::Given(ModelSpec::n2());
             let (_, outcomes, settings) = laboratory
-                .fit(&[unit], Estimator::Awv, &n2, Some(Pool::Axes))
+                .fit(
+                    &[unit],
+                    Estimator::Awv,
+                    &ModelChoice::Given(ModelSpec::n2()),
+                    Some(Pool::Axes),
+                )
                 .map_err(|e| {
                     Failure::from(e).within(&format!("the noise of {} alone", unit.name))
                 })?;
@@ -291,9 +291,10 @@ impl Laboratory {
                 .any(|(_, r)| is_abnormal(&r.name))
         };
         let normal: Vec<usize> = self.others(None).filter(is_normal).collect();
-        Ok(match normal.len() < FEWEST {
-            true => self.others(None).collect(),
-            false => normal,
+        Ok(if normal.len() < FEWEST {
+            self.others(None).collect()
+        } else {
+            normal
         })
     }
 
@@ -407,16 +408,20 @@ impl Drive {
         runs: u64,
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<Fold, Failure> {
-        let models = self.models(laboratory, Some(k), candidates)?;
-        let beliefs = self.beliefs(candidates, &models)?;
+        let beliefs = self.beliefs(candidates, &self.models(laboratory, Some(k), candidates)?)?;
         let expected = self.expected(&beliefs, &laboratory.models[k]);
         recordings.retain(|r| self.independent_windows(r.len()) >= 1.0);
-        let truth = Truth::Static(&recordings);
-        let sampled = match monte_carlo::run(&self.experiment(truth, &beliefs), runs, progress) {
-            Ok(results) => {
-                let score = |r: &RunResult| Score::of_runs(&r.runs, r.outages.len());
-                Some(results.iter().map(score).collect())
-            }
+        let sampled = match monte_carlo::run(
+            &self.experiment(Truth::Static(&recordings), &beliefs),
+            runs,
+            progress,
+        ) {
+            Ok(results) => Some(
+                results
+                    .iter()
+                    .map(|r| Score::of_runs(&r.runs, r.outages.len()))
+                    .collect(),
+            ),
             // none is as long as the trajectory, or lacks its last sample
             Err(ExperimentError::Truth(TruthError::TooShort { .. })) => None,
             Err(_) if recordings.is_empty() => None,
@@ -446,15 +451,15 @@ impl Drive {
         let mut made: Vec<(&Candidate, Model)> = Vec::new();
         let mut models = Vec::new();
         for candidate in candidates {
-            let known = made
+            let model = match made
                 .iter()
-                .find(|(other, _)| other.is_calibrated_as(candidate));
-            let model = match known {
+                .find(|(other, _)| other.is_calibrated_as(candidate))
+            {
                 Some((_, model)) => model.clone(),
                 None => {
-                    let calibrated = laboratory.calibrate(candidate, without);
-                    let (_, outcomes, settings) =
-                        calibrated.map_err(|e| Failure::from(e).within(&candidate.to_string()))?;
+                    let (_, outcomes, settings) = laboratory
+                        .calibrate(candidate, without)
+                        .map_err(|e| Failure::from(e).within(&candidate.to_string()))?;
                     model_of(&outcomes, settings.rate_hz)
                 }
             };
@@ -479,15 +484,18 @@ impl Drive {
             Inflation::None => Ok(model.clone()),
             Inflation::Tenfold => {
                 let on_variance = 100.0;
-                let factor = |sensor| Factor {
-                    sensor,
-                    on_variance,
-                };
-                Ok(scaled(model, &Sensor::ALL.map(factor)))
+                Ok(scaled(
+                    model,
+                    &Sensor::ALL.map(|sensor| Factor {
+                        sensor,
+                        on_variance,
+                    }),
+                ))
             }
             Inflation::Tuned => {
-                let truths = laboratory.others(without);
-                let truths = truths.map(|k| laboratory.models[k].clone().into());
+                let truths = laboratory
+                    .others(without)
+                    .map(|k| laboratory.models[k].clone().into());
                 let full = self.scenario.with_full_noise();
                 let full = |model: &Model| full.belief(model, &self.outages, &self.track);
                 let task = Task {
@@ -501,8 +509,10 @@ impl Drive {
                     aim: Aim::Mean,
                     allow_smaller: true,
                 };
-                let factors = task.factors().map_err(|source| unfit(candidate, source))?;
-                Ok(scaled(model, &factors))
+                Ok(scaled(
+                    model,
+                    &task.factors().map_err(|source| unfit(candidate, source))?,
+                ))
             }
         }
     }
@@ -528,8 +538,10 @@ impl Drive {
 
     /// Every filter where a model makes the errors.
     fn expected(&self, beliefs: &[Belief], truth: &Model) -> Vec<Score> {
-        let experiment = self.experiment(Truth::Model(truth), beliefs);
-        let sources = TruthSide::together(&TruthSide::sources(&experiment, truth));
+        let sources = TruthSide::together(&TruthSide::sources(
+            &self.experiment(Truth::Model(truth), beliefs),
+            truth,
+        ));
         let score = |belief: &Belief| {
             Score::expected(&FilterPass::new(&self.track, belief).errors_at_ends(&sources))
         };

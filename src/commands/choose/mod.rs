@@ -7,31 +7,32 @@
 //! raise by claiming more, or less, than it knows. The recording is the unit of every interval, not the window:
 //! windows of one recording share its noise. [`Ranking`] compares candidates pair by pair, recording by recording.
 
-pub mod candidates;
-mod document;
-pub mod ranking;
-
 use crate::app::inputs::{self, SettingsArgs, files, listed};
 use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Inputs, Out, OutputFile, Result, refused};
 use crate::commands::calibrate::{
     Calibration, CalibrationNote, CalibrationOptions, ESTIMATORS, EstimatorChoice, Measured,
     measure, without_warm_up,
 };
-use crate::io::recordings;
-use crate::io::recordings::{FileReport, Gaps, ReadOptions};
+use crate::io::recordings::{self, FileReport, Gaps, ReadOptions};
 use crate::parse;
 use crate::report::{json, six_digits};
 use candidates::{Candidate, Drive, Fold, Inflation, Laboratory, Unit};
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, model_of};
-use nav_sim_document::Document;
+use nav_sim_document::{
+    Axis, Chart, Colour, Document, Importance, Panel, Series, Table, Tone, readable, window,
+};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_signal::imu::{Channel, Recording};
 use nav_sim_signal::noise::Model;
-use ranking::Ranking;
+use ranking::{Mean, Placed, Ranking};
 use serde::Serialize;
+use serde_json::json;
 use std::path::PathBuf;
+
+pub mod candidates;
+pub mod ranking;
 
 // `nav-sim choose`: the noise model for a filter, by the recordings themselves.
 
@@ -53,42 +54,42 @@ Examples:
 pub struct Choose {
     /// Static recordings, three or more files, or directories of them
     #[arg(required = true, value_name = "RECORDINGS")]
-    pub inputs: Vec<PathBuf>,
+    inputs: Vec<PathBuf>,
     /// Trajectory: motion profile (.toml) or table (.csv)
     #[arg(long, value_name = "FILE")]
     pub trajectory: PathBuf,
     /// Outages, receiver, start, what filters expect.
     #[command(flatten)]
-    pub settings: SettingsArgs,
+    settings: SettingsArgs,
     /// Estimators to compare [default: awv, sr-awv, dr-awv and, for comparison, gmwm and avlr of single recordings]
-    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = parse::words::<Estimator>(EACH))]
-    pub estimator: Vec<Estimator>,
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = parse::one_of::<Estimator>(EACH))]
+    estimator: Vec<Estimator>,
     /// Models to compare, such as N2,N1,WN+RW,auto [default: N2, and WN+RW with awv]
     #[arg(long, value_name = "MODELS", value_delimiter = ',')]
-    pub model: Vec<String>,
+    model: Vec<String>,
     /// Filters to compare: 15, 21, full [default: 15, and full with awv]
     #[arg(long, value_name = "STATES", value_delimiter = ',')]
-    pub filter: Vec<FilterStates>,
+    filter: Vec<FilterStates>,
     /// How models are inflated: none, tuned (consistent in the mean for the models of the single recordings), x10 (ten
     /// times the standard deviations) [default: none, and all three with awv]
     #[arg(long, value_name = "HOW", value_delimiter = ',')]
-    pub inflate: Vec<Inflation>,
+    inflate: Vec<Inflation>,
     /// Runs on each recording (default: two for each window that fits side by side, 16 to 64)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
-    pub runs: Option<u64>,
+    runs: Option<u64>,
     /// What DR-AWV drops at each end of each scale: a number, or a share such as 30%
     #[arg(long, value_name = "A", default_value_t)]
-    pub trim: Trim,
-    /// What to do where the time jumps or stands still
-    #[arg(long, value_parser = parse::words::<Gaps>(WHOLE), default_value_t)]
-    pub gaps: Gaps,
+    trim: Trim,
+    /// What to do where the time jumps or stands still: refuse the file, split it there, or ignore it
+    #[arg(long, value_parser = parse::one_of::<Gaps>(WHOLE), default_value_t)]
+    gaps: Gaps,
     /// How recordings are read.
     #[command(flatten)]
     pub recordings: ReadingRequest,
 }
 
 /// The estimators that are one.
-const EACH: &[(&str, &str)] = ESTIMATORS.split_at(6).0;
+const EACH: &[&str] = ESTIMATORS.split_at(6).0;
 
 /// The ranking (`ranking.json`), and the winner's calibration of all recordings.
 #[derive(Serialize)]
@@ -119,12 +120,13 @@ impl Answer for ChoiceMade {
 
     /// The winner's model with its curves and draws, and the ranking.
     fn files(&self) -> Vec<OutputFile<'_>> {
-        let names = ("model.toml".to_owned(), "model".to_owned());
-        let inflated = self
-            .inflated
-            .as_ref()
-            .map(|(model, how)| (model, how.name()));
-        let mut files = self.calibration.files_of(self.estimator, names, inflated);
+        let mut files = self.calibration.files_of(
+            self.estimator,
+            ("model.toml".to_owned(), "model".to_owned()),
+            self.inflated
+                .as_ref()
+                .map(|(model, how)| (model, how.name())),
+        );
         files.push(OutputFile::whole("ranking.json", json(self)));
         files
     }
@@ -145,12 +147,12 @@ impl Command for Choose {
         ],
     };
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         self.candidates()?;
-        let trajectory = files("trajectory", [&self.trajectory]);
-        let scenario = files("scenario", &self.settings.file.scenario);
-        let recordings = listed("recording", &self.inputs)?;
-        Ok(trajectory.chain(recordings).chain(scenario).collect())
+        Ok(files("trajectory", [&self.trajectory])
+            .chain(listed("recording", &self.inputs)?)
+            .chain(files("scenario", &self.settings.file.scenario))
+            .collect())
     }
 
     /// Files are read twice, so that no more than a few are in memory.
@@ -161,8 +163,10 @@ impl Command for Choose {
         let seed = context.seed_or(scenario.run.seed);
         let outages = inputs::placed(&scenario, &trajectory, seed, context)?;
         if outages.is_empty() {
-            let message = "there is no outage, and candidates are judged at the ends of outages";
-            return Err(Failure::input(message).hint("give one with --outage START:END"));
+            return refused(
+                "there is no outage, and candidates are judged at the ends of outages",
+                "give one with --outage START:END",
+            );
         }
         // the candidates have estimators and models of their own
         let options = CalibrationOptions {
@@ -196,8 +200,10 @@ impl Command for Choose {
                 "{} recordings are too few to leave one out: {FEWEST} or more are needed",
                 files.len()
             );
-            let hint = "each recording is a file; nav-sim calibrate takes fewer";
-            return Err(Failure::input(message).hint(hint));
+            return refused(
+                message,
+                "each recording is a file; nav-sim calibrate takes fewer",
+            );
         }
         let units = units(&measured);
         let samples: Vec<usize> = units.iter().map(samples_in).collect();
@@ -206,8 +212,8 @@ impl Command for Choose {
         let runs_on = |k: &usize| {
             // two on each window that lies in the recording side by side; whole batches
             let windows = drive.independent_windows(samples[*k]);
-            let usual = ((2.0 * windows / 8.0).ceil() as u64 * 8).clamp(16, 64);
-            self.runs.unwrap_or(usual)
+            self.runs
+                .unwrap_or(((2.0 * windows / 8.0).ceil() as u64 * 8).clamp(16, 64))
         };
         let judges = laboratory.judges()?;
         context.begin("runs", judges.iter().map(runs_on).sum());
@@ -216,25 +222,37 @@ impl Command for Choose {
             let file = &files[*k];
             let (read, _) = recordings::read(std::slice::from_ref(&file.path), &reading)?;
             // a warm-up that was left out of the curves is no stretch to navigate on either
-            let measured = |recording| without_warm_up(recording, options.skip_warm_up).0;
-            let read: Vec<Recording> = read.into_iter().map(measured).collect();
+            let read: Vec<Recording> = read
+                .into_iter()
+                .map(|recording| without_warm_up(recording, options.skip_warm_up).0)
+                .collect();
             let advance = |n| context.advance(n);
-            let fold = drive.leave_out(&laboratory, *k, read, &candidates, runs_on(k), &advance)?;
-            folds.push((file.file.clone(), fold));
+            folds.push((
+                file.file.clone(),
+                drive.leave_out(&laboratory, *k, read, &candidates, runs_on(k), &advance)?,
+            ));
         }
         context.end();
         let ranking = Ranking::new(&candidates, &folds);
         let winner = &candidates[ranking.candidates[0].index];
         // an estimator of single recordings never wins: this is of all of them
         let (groups, outcomes, settings) = laboratory.calibrate(winner, None)?;
-        let model = model_of(&outcomes, settings.rate_hz);
-        let model = drive.inflated(&laboratory, None, winner, &model)?;
-        let bootstrap = Bootstrap {
-            seed,
-            ..Bootstrap::default()
-        };
-        let mut calibration =
-            Calibration::new(groups, outcomes, settings, Some(bootstrap), &|_| {});
+        let model = drive.inflated(
+            &laboratory,
+            None,
+            winner,
+            &model_of(&outcomes, settings.rate_hz),
+        )?;
+        let mut calibration = Calibration::new(
+            groups,
+            outcomes,
+            settings,
+            Some(Bootstrap {
+                seed,
+                ..Bootstrap::default()
+            }),
+            &|_| {},
+        );
         calibration.turn_on.clear();
         calibration.note = CalibrationNote {
             reading: self.recordings.provenance(self.gaps),
@@ -290,10 +308,10 @@ impl Choose {
         if candidates.iter().any(Candidate::is_eligible) {
             return Ok(candidates);
         }
-        Err(Failure::input(
+        refused(
             "no candidate uses all recordings: gmwm, rgmwm and avlr take one at a time",
+            "add awv, sr-awv or dr-awv to --estimator",
         )
-        .hint("add awv, sr-awv or dr-awv to --estimator"))
     }
 }
 
@@ -319,8 +337,10 @@ fn nominal_hz(found_hz: f64, fix_hz: f64) -> f64 {
 fn units(measured: &Measured) -> Vec<Unit> {
     let unit = |file: &FileReport| {
         let names: Vec<String> = file.recordings().map(|(name, _)| name).collect();
-        let replicates = measured.replicates.iter();
-        let own = replicates.filter(|(_, r)| names.contains(&r.name));
+        let own = measured
+            .replicates
+            .iter()
+            .filter(|(_, r)| names.contains(&r.name));
         Unit {
             name: file.file.clone(),
             replicates: own.cloned().collect(),
@@ -340,3 +360,174 @@ fn samples_in(unit: &Unit) -> usize {
     };
     Channel::ALL.into_iter().map(of_channel).max().unwrap_or(0)
 }
+
+// The ranking of candidates as a document.
+
+impl Ranking {
+    /// The winner, what cannot be told from it, and how good it is.
+    fn verdict(&self) -> Vec<String> {
+        const NAMED: usize = 3;
+        let (winner, recordings) = (&self.candidates[0], self.candidates[0].folds.len());
+        let name = &winner.candidate;
+        let eligible = self.candidates.iter().filter(|p| p.eligible).count();
+        let mut lines = vec![match (self.tells, eligible) {
+            (_, 1) => format!("{name}: there is no other candidate"),
+            (true, _) => {
+                format!("{name} is the best of {eligible} candidates on {recordings} recordings")
+            }
+            (false, _) => format!(
+                "undecided: {recordings} recordings cannot tell {eligible} candidates apart; {name} scores highest"
+            ),
+        }];
+        if self.tells && !self.tied.is_empty() {
+            let named: Vec<&str> = self.tied.iter().map(String::as_str).take(NAMED).collect();
+            let more = match self.tied.len() - named.len() {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            lines.push(format!(
+                "cannot be told from it: {}{more}",
+                named.join("; ")
+            ));
+        }
+        lines.push(format!(
+            "its horizontal error at the ends of outages: {} m, believed {} m, NEES {} (9 if right)",
+            readable(winner.rmse_m),
+            readable(winner.believed_m),
+            readable(winner.nees.value)
+        ));
+        lines
+    }
+}
+
+impl ChoiceMade {
+    fn ranked(&self) -> Document {
+        let (ranking, json) = (&self.ranking, json!(self));
+        let tone = if ranking.tells {
+            Tone::Good
+        } else {
+            Tone::Undecided
+        };
+        let mut document = Document::new("Which noise model", tone, self.verdict.iter());
+        self.notes(&mut document);
+        let ends: Vec<String> = self
+            .outages
+            .iter()
+            .map(|o| window(o.start_s, o.end_s))
+            .collect();
+        document.facts(&[
+            ("trajectory", self.trajectory.clone()),
+            ("outages", ends.join(", ")),
+            ("seed", self.seed.to_string()),
+        ]);
+        let columns = [
+            ("candidate", "candidate"),
+            ("", "place"),
+            ("log score (nats)", "log_score/value"),
+            ("to the best", "difference/log_score/value"),
+            ("95 %", "difference/log_score/ci95"),
+            ("NEES (9)", "nees/value"),
+            ("95 %", "nees/ci95"),
+            ("RMSE (m)", "rmse_m"),
+        ];
+        document.lead(Table::of(&json, "/candidates/*", &columns));
+        document.chart(&self.chart(), CAPTION);
+        let columns = [
+            ("candidate", "candidate"),
+            ("RMSE (m)", "rmse_m"),
+            ("to the best (%)", "difference/rmse_pct/value"),
+            ("95 %", "difference/rmse_pct/ci95"),
+            ("believed (m)", "believed_m"),
+            ("coverage (0.95)", "coverage"),
+        ];
+        document.table(&Table::of(&json, "/candidates/*", &columns));
+        let columns = [
+            ("recording left out", "recording"),
+            ("candidate", "../../candidate"),
+            ("windows", "windows"),
+            ("NEES (9)", "nees"),
+            ("log score (nats)", "log_score"),
+            ("RMSE (m)", "rmse_m"),
+        ];
+        let folds = Table::of(&json, "/candidates/*/folds/*", &columns);
+        document.folded("Recording by recording", |inside| inside.table(&folds));
+        document
+    }
+
+    /// Notes, the most important first.
+    fn notes(&self, document: &mut Document) {
+        let (ranking, folds) = (&self.ranking, &self.ranking.candidates[0].folds);
+        let mut warn = |names: &[String], text: &dyn Fn(String) -> String| {
+            if !names.is_empty() {
+                document.note(Importance::Warning, text(names.join(", ")));
+            }
+        };
+        warn(&self.abnormal, &|names| {
+            let verb = if self.abnormal.len() == 1 {
+                "is"
+            } else {
+                "are"
+            };
+            format!(
+                "{names} {verb} abnormal, and no judge of candidates: nav-sim calibrate says how"
+            )
+        });
+        let is_common = 2 * ranking.undescribed.len() > folds.len();
+        warn(&ranking.undescribed, &|names| {
+            if is_common {
+                format!("no candidate describes {names}: a warm-up? try --skip-s auto")
+            } else {
+                format!("no candidate describes {names}: look at it with nav-sim calibrate")
+            }
+        });
+        warn(&ranking.decisive, &|names| {
+            format!("without any one of {names} another candidate would win")
+        });
+        if folds.iter().any(|fold| fold.windows == 0) {
+            document.note(
+                Importance::Remark,
+                "recordings shorter than the trajectory are judged by covariance analysis, their own N2 as truth",
+            );
+        }
+    }
+
+    /// Log scores against the best, a row a candidate.
+    fn chart(&self) -> Chart {
+        let placed = self.ranking.candidates.iter().rev().enumerate();
+        let (mut names, mut points, mut bars) = (Vec::new(), Vec::new(), Vec::new());
+        for (
+            row,
+            Placed {
+                candidate,
+                difference,
+                ..
+            },
+        ) in placed
+        {
+            let Mean {
+                value,
+                ci95: (low, high),
+            } = difference.log_score;
+            let height = row as f64;
+            names.push(candidate.clone());
+            points.push((value, height, f64::NAN));
+            bars.extend([(low, height), (high, height), (f64::NAN, f64::NAN)]);
+        }
+        let rows = names.len() as f64;
+        let series = vec![
+            Series::dashed("best", Colour::RIGHT, vec![(0.0, -0.5), (0.0, rows - 0.5)]),
+            Series::line("", Colour::BELIEVED, bars),
+            Series::points("", Colour::BELIEVED, points),
+        ];
+        Chart::new(
+            "Log score against the best",
+            Axis::linear("nats"),
+            vec![Panel {
+                height: 0.1 * (rows + 1.0),
+                ..Panel::new(Axis::names(names), series)
+            }],
+        )
+    }
+}
+
+const CAPTION: &str = "Log score: the mean log density of the true errors under the filter's covariance, less that of the best. Bars: 95 % intervals over recordings.";

@@ -99,7 +99,6 @@ impl Ranking {
     ///
     /// # Panics
     /// Without a candidate that may be chosen, or without a recording.
-    #[must_use]
     pub fn new(candidates: &[Candidate], folds: &[(String, Fold)]) -> Self {
         let eligible: Vec<usize> = (0..candidates.len())
             .filter(|c| candidates[*c].is_eligible())
@@ -111,8 +110,9 @@ impl Ranking {
             .map(|c| place(c, &candidates[c], winner, rivals, folds))
             .collect();
         placed.sort_by(|a, b| {
-            let order = b.log_score.value.total_cmp(&a.log_score.value);
-            b.eligible.cmp(&a.eligible).then(order)
+            b.eligible
+                .cmp(&a.eligible)
+                .then(b.log_score.value.total_cmp(&a.log_score.value))
         });
         let without = |left_out: usize| {
             let mut rest = all.clone();
@@ -120,7 +120,7 @@ impl Ranking {
             best(&eligible, &rest).is_some_and(|other| other != winner)
         };
         let named = |k: usize| folds[k].0.clone();
-        let fails = |k: &usize| !all[*k].scores.iter().any(|s| s.nees <= FAILS);
+        let fails = |k: &usize| !all[*k].scores.iter().any(|s| s.all.nees <= FAILS);
         let tells = folds.len() >= FEWEST && placed.iter().any(|p| p.eligible && !p.tied);
         let tied = placed.iter().skip(1).filter(|p| p.place == "tied");
         Self {
@@ -139,7 +139,7 @@ impl Ranking {
 
 /// The candidate of the highest mean log score; none without a recording.
 fn best(eligible: &[usize], folds: &[&Fold]) -> Option<usize> {
-    let score = |c: usize| folds.iter().map(|f| f.scores[c].log_score).sum::<f64>();
+    let score = |c: usize| folds.iter().map(|f| f.scores[c].all.log_score).sum::<f64>();
     // the first of equals
     let higher = |best: usize, c: usize| if score(c) > score(best) { c } else { best };
     eligible
@@ -164,7 +164,7 @@ fn place(
             .map(|(_, f)| value(&f.scores[c]) - value(&f.scores[winner]))
             .collect()
     };
-    let density = paired(&|s| s.log_score);
+    let density = paired(&|s| s.all.log_score);
     let (log_score, joint95) = (
         interval(&density, 0.05),
         interval(&density, 0.05 / rivals as f64).ci95,
@@ -192,10 +192,10 @@ fn place(
         index: c,
         eligible,
         tied,
-        log_score: interval(&per_recording(&|s| s.log_score), 0.05),
-        rmse_m: root_mean_square(per_recording(&|s| s.rmse_m)),
-        believed_m: root_mean_square(per_recording(&|s| s.believed_m)),
-        nees: positive(interval(&per_recording(&|s| s.nees), 0.05)),
+        log_score: interval(&per_recording(&|s| s.all.log_score), 0.05),
+        rmse_m: root_mean_square(per_recording(&|s| s.all.rmse_m)),
+        believed_m: root_mean_square(per_recording(&|s| s.all.believed_m)),
+        nees: positive(interval(&per_recording(&|s| s.all.nees), 0.05)),
         coverage: coverage.map(|all| all.iter().sum::<f64>() / all.len() as f64),
         difference: Difference {
             log_score,
@@ -209,7 +209,7 @@ fn place(
 /// The RMSE over all recordings against that of the winner (%). The interval is that of the mean of what each recording adds to the
 /// logarithm of the ratio (its derivative with respect to the recording's weight).
 fn rmse_ratio_pct(c: usize, winner: usize, folds: &[(String, Fold)]) -> Mean {
-    let square = |candidate: usize, fold: &Fold| fold.scores[candidate].rmse_m.powi(2);
+    let square = |candidate: usize, fold: &Fold| fold.scores[candidate].all.rmse_m.powi(2);
     let mean = |candidate: usize| {
         folds.iter().map(|(_, f)| square(candidate, f)).sum::<f64>() / folds.len() as f64
     };
@@ -256,11 +256,13 @@ mod ranking_tests {
 
     fn fold(scores: &[f64]) -> Fold {
         let score = |&log_score: &f64| Score {
-            rmse_m: 10.0 - log_score,
-            believed_m: 10.0,
-            nees: 9.0,
+            all: EndScore {
+                rmse_m: 10.0 - log_score,
+                believed_m: 10.0,
+                nees: 9.0,
+                log_score,
+            },
             coverage: Some(0.95),
-            log_score,
             diverged: 0,
             outages: Vec::new(),
         };
@@ -280,9 +282,10 @@ mod ranking_tests {
     fn the_ratio_of_the_rmse_is_that_of_the_rmse_shown() {
         let with = |rmse_m: [f64; 2]| {
             let scores = rmse_m
-                .map(|rmse_m| Score {
-                    rmse_m,
-                    ..fold(&[0.0]).scores[0].clone()
+                .map(|rmse_m| {
+                    let mut score = fold(&[0.0]).scores[0].clone();
+                    score.all.rmse_m = rmse_m;
+                    score
                 })
                 .to_vec();
             Fold {
@@ -404,37 +407,31 @@ mod ranking_tests {
 
 // How good a filter was at the ends of outages.
 
-/// A filter on one recording: what is said of the end of an outage, over all outages.
+/// A filter on one recording, over all outages.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Score {
-    /// Horizontal RMSE (m).
-    pub rmse_m: f64,
-    /// What the filter believes of it (m).
-    pub believed_m: f64,
-    /// Mean NEES of position, velocity and attitude; 9 is right.
-    pub nees: f64,
+    /// Over all outages; the log score is minus infinity (null) where a run diverged.
+    #[serde(flatten)]
+    pub all: EndScore,
     /// Share of errors within the filter's 95 % ellipsoid of the nine states; none where nothing is sampled.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<f64>,
-    /// Mean log density of the nine errors (m, m/s, rad) under the filter's belief (nats); minus infinity (null)
-    /// where a run diverged.
-    pub log_score: f64,
     /// Runs that diverged; they are in no mean.
     pub diverged: usize,
     /// Outage by outage.
     pub outages: Vec<EndScore>,
 }
 
-/// The same at the end of one outage.
+/// A filter at the end of an outage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EndScore {
     /// Horizontal RMSE (m).
     pub rmse_m: f64,
     /// What the filter believes of it (m).
     pub believed_m: f64,
-    /// Mean NEES.
+    /// Mean NEES of position, velocity and attitude; 9 is right.
     pub nees: f64,
-    /// Mean log density (nats).
+    /// Mean log density of the nine errors (m, m/s, rad) under the filter's belief (nats).
     pub log_score: f64,
 }
 
@@ -460,19 +457,15 @@ impl Score {
         let limit = ChiSquared::new(NEES_DOF as f64).map_or(f64::NAN, |law| law.inverse_cdf(0.95));
         let inside = |o: &OutageRecord| f64::from(u8::from(o.nees_end <= limit));
         let coverage = mean(kept.iter().flat_map(|run| run.iter()).map(inside));
-        let outages = (0..outages).map(end).collect();
-        let score = Self {
+        let mut score = Self {
             coverage: Some(coverage),
             diverged,
-            ..Self::of_ends(outages)
+            ..Self::of_ends((0..outages).map(end).collect())
         };
-        match diverged {
-            0 => score,
-            _ => Self {
-                log_score: f64::NEG_INFINITY,
-                ..score
-            },
+        if diverged > 0 {
+            score.all.log_score = f64::NEG_INFINITY;
         }
+        score
     }
 
     /// As covariance analysis expects it.
@@ -492,11 +485,13 @@ impl Score {
     fn of_ends(outages: Vec<EndScore>) -> Self {
         let mean = |value: &dyn Fn(&EndScore) -> f64| mean(outages.iter().map(value));
         Self {
-            rmse_m: mean(&|o| o.rmse_m.powi(2)).sqrt(),
-            believed_m: mean(&|o| o.believed_m.powi(2)).sqrt(),
-            nees: mean(&|o| o.nees),
+            all: EndScore {
+                rmse_m: mean(&|o| o.rmse_m.powi(2)).sqrt(),
+                believed_m: mean(&|o| o.believed_m.powi(2)).sqrt(),
+                nees: mean(&|o| o.nees),
+                log_score: mean(&|o| o.log_score),
+            },
             coverage: None,
-            log_score: mean(&|o| o.log_score),
             diverged: 0,
             outages,
         }

@@ -3,26 +3,27 @@
 //! [`Export::new`] fits the pair that the target knows ([`noise::practical`](nav_sim_signal::noise::practical)) to the model's
 //! noisiest axis, states by how much the two differ, and [`Export::text`] writes it in the target's own syntax (`targets.rs`).
 
-mod targets;
-mod words;
-
-pub use targets::Target;
-pub(crate) use words::Quantity;
-
 use crate::app::inputs::files;
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Refuse, Result};
-use crate::io::model_file;
-use crate::io::model_file::ModelFile;
+use crate::app::{
+    Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, refused,
+};
+use crate::io::model_file::{self, ModelFile};
 use crate::parse::{one_of, seconds_range};
-use nav_sim_document::{Document, Importance, Tone};
+use nav_sim_calibration::percent;
+use nav_sim_document::{Document, Importance, Tone, readable};
 use nav_sim_signal::imu::{Axis, Sensor};
 use nav_sim_signal::noise::practical::{
     AxisParameters, Bias, Closure, Curve, Horizon, Pair, Policy, Ratio,
 };
 use nav_sim_signal::noise::{Composite, Process};
+use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+
+mod targets;
+
+pub use targets::Target;
 
 /// Longest averaging time at which a minimum is believed of a model that no calibration made (s).
 const LONGEST_S: f64 = 10_000.0;
@@ -40,17 +41,17 @@ Examples:
 pub struct ExportArgs {
     /// Noise model (TOML)
     #[arg(value_name = "MODEL")]
-    pub model: PathBuf,
+    model: PathBuf,
     /// Program to export to
     #[arg(long, value_name = "PROGRAM", value_parser = one_of::<Target>(&Target::NAMES))]
-    pub target: Target,
+    target: Target,
     /// strict: WN and RW as they are; matched: the model's Allan deviation at 1 s and the closest bias; envelope: the
     /// smallest pair that is nowhere below the model
     #[arg(long, value_name = "POLICY", value_parser = one_of::<Policy>(&Policy::NAMES), default_value = Policy::Matched.name())]
-    pub policy: Policy,
+    policy: Policy,
     /// Averaging times over which the pair stands for the model
     #[arg(long, value_name = "FROM:TO", value_parser = horizon, default_value = "1s:100s")]
-    pub horizon: Horizon,
+    horizon: Horizon,
 }
 
 fn horizon(text: &str) -> Result<Horizon, String> {
@@ -86,7 +87,7 @@ impl Command for ExportArgs {
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(files("model", [&self.model]).collect())
     }
 
@@ -196,8 +197,7 @@ pub struct Export {
 /// # Errors
 /// As [`exported`].
 pub fn export(file: &ModelFile, name: &str, target: Target) -> Result<String, Failure> {
-    let export = Export::new(file, target, Policy::Matched, Horizon::default())?;
-    Ok(export.text(name))
+    Ok(Export::new(file, target, Policy::Matched, Horizon::default())?.text(name))
 }
 
 impl Export {
@@ -213,15 +213,16 @@ impl Export {
     ) -> Result<Self, Failure> {
         let rate_hz = file.model.rate_hz;
         let axes = |sensor: Sensor| -> Vec<(Axis, &Composite)> {
-            let own = file.present().filter(|c| c.sensor == sensor);
-            own.map(|c| (c.axis, file.model.axis(c))).collect()
+            file.present()
+                .filter(|c| c.sensor == sensor)
+                .map(|c| (c.axis, file.model.axis(c)))
+                .collect()
         };
         let mut curves = Vec::new();
         for sensor in Sensor::ALL {
             let noise: Vec<&Composite> = axes(sensor).iter().map(|(_, noise)| *noise).collect();
             check(target, policy, sensor, &noise)?;
-            let curve = Curve::largest(&noise, rate_hz, horizon);
-            curves.push(curve.refuse_within(sensor)?);
+            curves.push(Curve::largest(&noise, rate_hz, horizon).refuse_within(sensor)?);
         }
         let bias = if target.has_one_time && policy != Policy::Strict {
             Bias::MarkovOf(curves[0].shared_correlation_time_s(&curves[1], policy))
@@ -233,13 +234,15 @@ impl Export {
         let of_sensor = |sensor: Sensor| -> Result<SensorExport, Failure> {
             let (curve, axes) = (&curves[sensor as usize], axes(sensor));
             let noise: Vec<&Composite> = axes.iter().map(|(_, noise)| *noise).collect();
-            let largest = AxisParameters::of(&noise, rate_hz, horizon, policy, range_s);
-            let largest = largest.refuse_within(sensor)?;
+            let largest = AxisParameters::of(&noise, rate_hz, horizon, policy, range_s)
+                .refuse_within(sensor)?;
             let exported = curve.pair(policy, bias);
             let turn_on = file.turn_on.unwrap_or_default().sigma(sensor);
             // A random walk moves so far within the horizon.
-            let walked = largest.walk.walk * horizon.to_s.sqrt();
-            let spread = largest.markov.markov.map_or(walked, |m| m.sigma);
+            let spread = largest
+                .markov
+                .markov
+                .map_or(largest.walk.walk * horizon.to_s.sqrt(), |m| m.sigma);
             let deviation = |noise: &Composite| noise.allan_variance(second).sqrt();
             Ok(SensorExport {
                 sensor,
@@ -258,10 +261,12 @@ impl Export {
             && (accel.t_corr_s / gyro.t_corr_s - 1.0).abs() > 1e-9
         {
             let (name, accel_s, gyro_s) = (target.name, accel.t_corr_s, gyro.t_corr_s);
-            return Err(Failure::input(format!(
-                "{name} has one correlation time, the model's sensors have {accel_s:.3} s and {gyro_s:.3} s"
-            ))
-            .hint(MATCHED));
+            return refused(
+                format!(
+                    "{name} has one correlation time, the model's sensors have {accel_s:.3} s and {gyro_s:.3} s"
+                ),
+                MATCHED,
+            );
         }
         Ok(Self {
             target,
@@ -274,7 +279,6 @@ impl Export {
     }
 
     /// The text of the file; `model` is its name in the head.
-    #[must_use]
     pub fn text(&self, model: &str) -> String {
         self.filled(&self.head(model)).1
     }
@@ -292,10 +296,10 @@ fn check(
 ) -> Result<(), Failure> {
     let (name, sensor) = (target.name, sensor.name());
     if axes.is_empty() {
-        return Err(Failure::input(format!(
-            "the model has no {sensor}, and {name} needs both sensors"
-        ))
-        .hint("calibrate recordings of both sensors, or write the other one's section by hand"));
+        return refused(
+            format!("the model has no {sensor}, and {name} needs both sensors"),
+            "calibrate recordings of both sensors, or write the other one's section by hand",
+        );
     }
     let has = |kind: fn(&Process) -> bool| axes.iter().any(|a| a.processes.iter().any(kind));
     let walks = has(|p| matches!(p, Process::RandomWalk(_)));
@@ -306,12 +310,177 @@ fn check(
         _ => walks.then_some("random walk"),
     };
     match lacking {
-        Some(bias) if policy == Policy::Strict => {
-            let message = format!("{name} has no {bias}, and the model's {sensor} has one");
-            Err(Failure::input(message).hint(MATCHED))
-        }
+        Some(bias) if policy == Policy::Strict => refused(
+            format!("{name} has no {bias}, and the model's {sensor} has one"),
+            MATCHED,
+        ),
         _ => Ok(()),
     }
+}
+
+// Head of an exported file, its warnings and its JSON.
+
+/// A pair is in doubt when its Allan deviation is off by more than this.
+const TOLERANCE: f64 = 1.5;
+/// Shares of the Allan variance, and differences of axes, that are told.
+const NOTABLE: f64 = 0.1;
+
+/// A quantity of a sensor.
+pub(crate) enum Quantity {
+    /// White noise density N: velocity or angle random walk.
+    Density,
+    /// Random-walk density K: acceleration or rate random walk.
+    Walk,
+    /// A bias: its instability, its standard deviation.
+    Bias,
+}
+
+impl Quantity {
+    /// Unit of data sheets, and the factor from SI to it.
+    pub(crate) const fn sheet(self, sensor: Sensor) -> (&'static str, f64) {
+        const ROOT_HOUR: f64 = 60.0;
+        match (self, sensor) {
+            (Self::Density, Sensor::Accel) => ("m/s/sqrt(h)", ROOT_HOUR),
+            (Self::Density, Sensor::Gyro) => ("deg/sqrt(h)", ROOT_HOUR / DEG),
+            (Self::Walk, Sensor::Accel) => ("m/s^2/sqrt(h)", ROOT_HOUR),
+            (Self::Walk, Sensor::Gyro) => ("deg/h/sqrt(h)", ROOT_HOUR / DEG_PER_HOUR),
+            (Self::Bias, Sensor::Accel) => ("ug", 1e6 / STANDARD_GRAVITY),
+            (Self::Bias, Sensor::Gyro) => ("deg/h", 1.0 / DEG_PER_HOUR),
+        }
+    }
+
+    fn text(self, x: f64, sensor: Sensor) -> String {
+        let (unit, factor) = self.sheet(sensor);
+        format!("{} {unit}", readable(x * factor))
+    }
+}
+
+impl Export {
+    /// The comment at the head of the file.
+    fn head(&self, model: &str) -> Vec<String> {
+        let (horizon, name) = (self.horizon, self.target.name);
+        let mut lines = vec![format!(
+            "{name}: {model}, {} Hz, policy {} over averages of {} s to {} s (nav-sim export)",
+            self.rate_hz, self.policy, horizon.from_s, horizon.to_s
+        )];
+        lines.extend(self.summary());
+        lines.extend(self.doubts().into_iter().map(|d| format!("Warning: {d}")));
+        lines
+    }
+
+    /// A line for each sensor: its parameters in the units of data sheets, and how far the pair is from the model.
+    fn summary(&self) -> Vec<String> {
+        let line = |s: &SensorExport| {
+            let (low, high) = (s.closure.lowest.ratio, s.closure.highest.ratio);
+            format!(
+                "{}: {}; {low:.2} to {high:.2} × the model",
+                s.sensor.name(),
+                s.parameters()
+            )
+        };
+        self.sensors.iter().map(line).collect()
+    }
+
+    /// Warnings before pasting, the most important first.
+    fn doubts(&self) -> Vec<String> {
+        let misfit = self.misfit.iter();
+        let mut doubts: Vec<String> = misfit.map(|misfit| format!("the model {misfit}")).collect();
+        for s in &self.sensors {
+            doubts.extend(
+                s.doubts(self.policy)
+                    .into_iter()
+                    .map(|doubt| format!("{}: {doubt}", s.sensor.name())),
+            );
+        }
+        doubts.extend(self.filled(&[]).0.iter().filter_map(|e| {
+            let (Entry { key, value, .. }, wanted) = (e, e.wanted?);
+            Some(format!(
+                "{key} is {value:.3e}, the end of its range; the model says {wanted:.3e}"
+            ))
+        }));
+        if self.target.vibrates {
+            doubts.push(
+                "a recording at rest has no vibration: these values are a lower bound".into(),
+            );
+        }
+        doubts
+    }
+}
+
+impl SensorExport {
+    fn doubts(&self, policy: Policy) -> Vec<String> {
+        let mut doubts = Vec::new();
+        let Pair {
+            density,
+            walk,
+            markov,
+        } = self.exported;
+        if density <= 0.0 {
+            doubts.push("N is 0, with which many filters fail: try --policy matched".to_owned());
+        }
+        if walk <= 0.0 && markov.is_none_or(|m| m.sigma <= 0.0) {
+            doubts.push("K is 0: a filter will hold its bias estimate for certain".to_owned());
+        }
+        let (lowest, highest) = (self.closure.lowest, self.closure.highest);
+        let is_far = [lowest.ratio < 1.0 / TOLERANCE, highest.ratio > TOLERANCE];
+        for ((Ratio { ratio, tau_s }, trust), is_far) in [(lowest, "much"), (highest, "little")]
+            .into_iter()
+            .zip(is_far)
+        {
+            if is_far {
+                let at = seconds(tau_s);
+                doubts.push(format!(
+                    "{ratio:.2} times the model's Allan deviation at {at}: trusted too {trust} there"
+                ));
+            }
+        }
+        if self.left_out.ratio > NOTABLE && policy != Policy::Envelope {
+            let (share, at) = (percent(self.left_out.ratio), seconds(self.left_out.tau_s));
+            doubts.push(format!(
+                "quantization noise or drift, {share} of the Allan variance at {at}, is left out"
+            ));
+        }
+        let largest = self.axes.iter().map(|(_, d)| *d).fold(0.0, f64::max);
+        let shares = self.axes.iter().map(|(axis, d)| (axis, d / largest));
+        if shares.clone().any(|(_, share)| share < 1.0 - NOTABLE) {
+            let shares: Vec<String> = shares.map(|(axis, d)| format!("{axis} {d:.2}")).collect();
+            let shares = shares.join(", ");
+            doubts.push(format!(
+                "axes differ (Allan deviation at 1 s: {shares}); the largest is exported"
+            ));
+        } else if self.axes.len() < 3 {
+            doubts.push(format!("the model has {} of three axes", self.axes.len()));
+        }
+        doubts
+    }
+
+    /// `N 0.42 deg/sqrt(h), K 12 deg/h/sqrt(h), B 8.3 deg/h at 160 s`.
+    fn parameters(&self) -> String {
+        let figure = |what: Quantity, x: f64| what.text(x, self.sensor);
+        let pair = self.exported;
+        let bias = match pair.markov {
+            None => format!("K {}", figure(Quantity::Walk, pair.walk)),
+            Some(m) => {
+                let sigma = figure(Quantity::Bias, m.sigma);
+                format!("bias {sigma} with T = {}", seconds(m.t_corr_s))
+            }
+        };
+        let floor = match self.largest.minimum {
+            None => "B not reached".to_owned(),
+            Some(m) => {
+                let floor = figure(Quantity::Bias, m.bias_instability());
+                format!("B {floor} at {}", seconds(m.tau_s))
+            }
+        };
+        format!(
+            "N {}, {bias}, {floor}",
+            figure(Quantity::Density, pair.density)
+        )
+    }
+}
+
+fn seconds(t_s: f64) -> String {
+    format!("{} s", readable(t_s))
 }
 
 #[cfg(test)]

@@ -363,11 +363,13 @@ impl FromStr for Target {
     type Err = UnknownName;
 
     fn from_str(word: &str) -> Result<Self, UnknownName> {
-        let found = TARGETS.into_iter().find(|target| target.name == word);
-        found.ok_or_else(|| UnknownName {
-            word: word.to_owned(),
-            legal: &Self::NAMES,
-        })
+        TARGETS
+            .into_iter()
+            .find(|target| target.name == word)
+            .ok_or_else(|| UnknownName {
+                word: word.to_owned(),
+                legal: &Self::NAMES,
+            })
     }
 }
 
@@ -454,8 +456,9 @@ impl Export {
                         }
                     }
                     ("shipped", Some(entry)) if entry.value > 0.0 => {
-                        let times = (argument.parse().unwrap_or(f64::NAN) / entry.value).sqrt();
-                        let times = nav_sim_document::readable(times);
+                        let times = nav_sim_document::readable(
+                            (argument.parse().unwrap_or(f64::NAN) / entry.value).sqrt(),
+                        );
                         line += &format!(
                             "; the shipped {argument} is {times} times its standard deviation"
                         );
@@ -487,9 +490,10 @@ impl Export {
         let after = |word: &str| words.iter().position(|w| *w == word).map(|i| words[i + 1]);
         let unit = words.first().copied().filter(|w| !["", "else"].contains(w));
         let asked = in_unit(self.quantity(name), unit.unwrap_or_default());
-        let bounds = after("in").and_then(|range| range.split_once(".."));
-        let bounds = bounds.and_then(|(low, high)| Some((low.parse().ok()?, high.parse().ok()?)));
-        let value = bounds.map_or(asked, |(low, high): (f64, f64)| asked.clamp(low, high));
+        let value = after("in")
+            .and_then(|range| range.split_once(".."))
+            .and_then(|(low, high)| Some((low.parse().ok()?, high.parse().ok()?)))
+            .map_or(asked, |(low, high)| asked.clamp(low, high));
         let infinite = after("else").unwrap_or("Inf");
         let is_number = value.is_finite();
         let value = if is_number {
@@ -536,10 +540,11 @@ impl Export {
             "*sqrt(f)" => x * self.rate_hz.sqrt(),
             "*sqrt(2f)" => x * (2.0 * self.rate_hz).sqrt(),
             step => {
-                let step_s = step
+                x / step
                     .strip_prefix("/sqrt(")
-                    .and_then(|s| s.strip_suffix(')')?.parse::<f64>().ok());
-                x / step_s.unwrap_or(f64::NAN).sqrt()
+                    .and_then(|s| s.strip_suffix(')')?.parse::<f64>().ok())
+                    .unwrap_or(f64::NAN)
+                    .sqrt()
             }
         }
     }
@@ -556,11 +561,13 @@ impl SensorExport {
     /// The Gauss-Markov bias; of no size and endless memory where the pair has none: the correlation time that a search leaves to
     /// a bias of no size means nothing.
     fn markov(&self) -> Markov {
-        let markov = self.exported.markov.filter(|m| m.sigma > 0.0);
-        markov.unwrap_or(Markov {
-            sigma: 0.0,
-            t_corr_s: f64::INFINITY,
-        })
+        self.exported
+            .markov
+            .filter(|m| m.sigma > 0.0)
+            .unwrap_or(Markov {
+                sigma: 0.0,
+                t_corr_s: f64::INFINITY,
+            })
     }
 
     fn quantity(&self, symbol: &str, rate_hz: f64) -> f64 {

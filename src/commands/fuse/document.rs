@@ -1,6 +1,7 @@
 //! A fusion as a document: verdict, figures, track, errors, innovations.
 
 use super::{Cause, FuseAnswer};
+use crate::report::trajectory::track_map;
 use crate::report::{reduction_doubt, reduction_line, tone};
 use glam::{DVec2, DVec3};
 use nav_sim_document::{
@@ -8,6 +9,7 @@ use nav_sim_document::{
     seconds, window,
 };
 use nav_sim_navigation::earth::ned_difference;
+use nav_sim_navigation::frames::NavState;
 use nav_sim_navigation::fusion::{ClocksApart, Finding, FixRecord, Row, Solution};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use std::path::Path;
@@ -19,8 +21,11 @@ impl FuseAnswer {
     /// Verdict, figures, charts and notes.
     pub(super) fn page(&self) -> Document {
         let (solution, summary) = (&self.solution, &self.summary);
-        let tone = tone(summary.verdict.kind);
-        let mut document = Document::new("INS/GNSS fusion of recorded data", tone, self.verdict());
+        let mut document = Document::new(
+            "INS/GNSS fusion of recorded data",
+            tone(summary.verdict.kind),
+            self.verdict(),
+        );
         document.facts(&self.facts());
         let outages: Vec<_> = summary
             .outcome
@@ -121,7 +126,7 @@ impl FuseAnswer {
     fn figures(&self, document: &mut Document) {
         const OUTAGE: (&str, &str) = ("outage", "{start_s}–{end_s} s");
         document.section("Figures");
-        let mut rows = [
+        let rows = [
             (
                 "NIS per component, {fixes/used} fixes used, {fixes/withheld} withheld",
                 "nis_per_component -",
@@ -134,34 +139,37 @@ impl FuseAnswer {
                 "horizontal 1 σ, rms (m)",
                 "horizontal_sigma_rms_m smoothed/horizontal_sigma_rms_m",
             ),
-        ]
-        .map(|(title, keys)| (title.to_owned(), keys.to_owned()))
-        .to_vec();
-        let of_reference = [
-            ("NEES (9 if right)", "nees_mean"),
-            ("horizontal RMSE (m)", "horizontal_rmse_m"),
-            ("horizontal error, largest (m)", "horizontal_max_m"),
-            ("down RMSE (m)", "rmse/pos_d_m"),
-            ("roll RMSE (°)", "rmse/roll_deg"),
-            ("pitch RMSE (°)", "rmse/pitch_deg"),
-            ("yaw RMSE (°)", "rmse/yaw_deg"),
+            (
+                "NEES (9 if right)",
+                "reference/nees_mean smoothed/reference/nees_mean",
+            ),
+            (
+                "horizontal RMSE (m)",
+                "reference/horizontal_rmse_m smoothed/reference/horizontal_rmse_m",
+            ),
+            (
+                "horizontal error, largest (m)",
+                "reference/horizontal_max_m smoothed/reference/horizontal_max_m",
+            ),
+            (
+                "yaw RMSE (°)",
+                "reference/rmse/yaw_deg smoothed/reference/rmse/yaw_deg",
+            ),
         ];
-        rows.extend(of_reference.map(|(title, key)| {
-            let keys = format!("reference/{key} smoothed/reference/{key}");
-            (title.to_owned(), keys)
-        }));
-        for (k, o) in self.summary.outcome.outages.iter().enumerate() {
-            let window = window(o.outage.start_s, o.outage.end_s);
-            rows.extend(["fix", "reference"].map(|end| {
+        let of_outage = |k: usize| {
+            ["fix", "reference"].map(|end| {
+                let place = format!("{{outages/{k}/start_s}}–{{outages/{k}/end_s}} s");
                 (
-                    format!("end of outage {window}: error from the {end} (m)"),
+                    format!("end of outage {place}: error from the {end} (m)"),
                     format!("outages/{k}/end_from_{end}/horizontal_m -"),
                 )
-            }));
-        }
+            })
+        };
+        let outages = 0..self.summary.outcome.outages.len();
+        let ends: Vec<_> = outages.flat_map(of_outage).collect();
         let rows: Vec<_> = rows
-            .iter()
-            .map(|(title, keys)| (title.as_str(), keys.as_str()))
+            .into_iter()
+            .chain(ends.iter().map(|(title, keys)| (&**title, &**keys)))
             .collect();
         let table = Table::of_keys(self, &["", "filter", "smoothed"], &rows);
         document.lead(table.without_unknown());
@@ -192,16 +200,19 @@ impl FuseAnswer {
             Table::of(self, "/smoothed/outages/*", &columns),
         );
         let rows = [
-            ("wheel scale", "wheel_scale"),
-            ("mounting pitch (°)", "mounting_pitch_deg"),
-            ("mounting yaw (°)", "mounting_yaw_deg"),
+            (
+                "wheel scale",
+                "vehicle/wheel_scale/value vehicle/wheel_scale/sigma",
+            ),
+            (
+                "mounting pitch (°)",
+                "vehicle/mounting_pitch_deg/value vehicle/mounting_pitch_deg/sigma",
+            ),
+            (
+                "mounting yaw (°)",
+                "vehicle/mounting_yaw_deg/value vehicle/mounting_yaw_deg/sigma",
+            ),
         ];
-        let rows =
-            rows.map(|(title, key)| (title, format!("vehicle/{key}/value vehicle/{key}/sigma")));
-        let rows: Vec<_> = rows
-            .iter()
-            .map(|(title, keys)| (*title, keys.as_str()))
-            .collect();
         table(
             "Vehicle",
             Table::of_keys(self, &["", "value", "1 σ"], &rows),
@@ -218,6 +229,7 @@ impl FuseAnswer {
         let columns = [
             ("state", "@"),
             ("RMSE", "."),
+            ("smoothed", "../../../smoothed/reference/rmse/@"),
             ("error over σ, rms", "../../error_over_sigma/@"),
         ];
         table("States", Table::of(self, "/reference/rmse/*", &columns));
@@ -305,13 +317,16 @@ fn cause(cause: &Cause) -> String {
     match cause {
         Cause::Clocks(clocks) => apart(clocks),
         Cause::Displaced(found) => {
-            let arm = found
+            let options: Vec<_> = found
                 .lever_arm_b
-                .map(|[arm, sigma]| format!("--lever-arm={} (± {})", three(arm), three(sigma)));
-            let delay = found
-                .delay_s
-                .map(|[delay, sigma]| format!("--gnss-delay={delay:.3} (± {sigma:.3})"));
-            let options: Vec<_> = arm.into_iter().chain(delay).collect();
+                .map(|[arm, sigma]| format!("--lever-arm={} (± {})", three(arm), three(sigma)))
+                .into_iter()
+                .chain(
+                    found
+                        .delay_s
+                        .map(|[delay, sigma]| format!("--gnss-delay={delay:.3} (± {sigma:.3})")),
+                )
+                .collect();
             let [now, then] = found.nis;
             let (now, then) = (readable(now), readable(then));
             format!(
@@ -341,47 +356,47 @@ const FIXES: &str = "Of a right filter 95 % of the used fixes are in the band.";
 const SMOOTHED: Colour = Colour::Hue(2);
 
 fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
-    let Some(first) = solution.rows.first() else {
-        return Chart::map("Track", Vec::new());
-    };
     let place = |row: &Row| {
-        let moved = ned_difference(&first.state, row.state.lat, row.state.lon, row.state.h);
+        let NavState { lat, lon, h, .. } = row.state;
+        let moved = ned_difference(&solution.rows[0].state, lat, lon, h);
         DVec2::new(moved.y, moved.x)
     };
     let error = |row: &Row| {
         row.error
-            .map_or(DVec2::NAN, |e| DVec2::new(e.values[1], e.values[0]))
+            .map(|e| DVec2::new(e.values[1], e.values[0]))
+            .unwrap_or(DVec2::NAN)
     };
-    let reference = |row: &Row| place(row) - error(row);
-    let way = |rows: &[Row], point: &dyn Fn(&Row) -> DVec2| -> Vec<(f64, f64)> {
-        let shown = rows.iter().step_by(rows.len().div_ceil(MOST_PLACES).max(1));
-        shown.map(point).map(|p| (p.x, p.y)).collect()
+    let track = |rows: &[Row], point: &dyn Fn(&Row) -> DVec2| -> Vec<(f64, [f64; 2])> {
+        rows.iter()
+            .step_by(rows.len().div_ceil(MOST_PLACES).max(1))
+            .map(|row| (row.t_s, point(row).into()))
+            .collect()
     };
+    let mut chart = track_map("solution", &track(&solution.rows, &place), "Track", outages);
+    let line = |track: Vec<(f64, [f64; 2])>| track.into_iter().map(|(_, p)| p.into()).collect();
     let mut series = Vec::new();
-    // the three lie on one another but for metres: wide beneath narrow beneath dashed, all are seen
+    // the lines lie on one another but for metres: wide beneath narrow beneath dashed, all are seen
     if solution.rows.iter().any(|row| row.error.is_some()) {
-        let line = Mark::Line(way(&solution.rows, &reference), Stroke::Bold);
-        series.push(Series::new("reference", Colour::Ink, line));
+        series.push(Series::new(
+            "reference",
+            Colour::Ink,
+            Mark::Line(
+                line(track(&solution.rows, &|row| place(row) - error(row))),
+                Stroke::Bold,
+            ),
+        ));
     }
-    for (start_s, end_s) in outages {
-        let [first, end] =
-            [start_s, end_s].map(|t| solution.rows.partition_point(|row| row.t_s < *t));
-        let line = Mark::Line(way(&solution.rows[first..end], &place), Stroke::Bold);
-        series.push(Series::new("outage", Colour::Hue(4), line));
-    }
-    series.push(Series::line(
-        "solution",
-        Colour::REAL,
-        way(&solution.rows, &place),
-    ));
-    let smoothed = solution.smoothed.iter();
-    series.extend(smoothed.map(|rows| Series::dashed("smoothed", SMOOTHED, way(rows, &place))));
-    let ends = [("start", Some(first)), ("end", solution.rows.last())];
-    series.extend(ends.into_iter().filter_map(|(name, row)| {
-        let DVec2 { x, y } = place(row?);
-        Some(Series::new(name, Colour::RIGHT, Mark::Place(x, y)))
-    }));
-    Chart::map("Track", series)
+    let drawn = &mut chart.panels[0].series;
+    series.append(drawn);
+    series.extend(
+        solution
+            .smoothed
+            .iter()
+            .map(|rows| line(track(rows, &place)))
+            .map(|line| Series::dashed("smoothed", SMOOTHED, line)),
+    );
+    *drawn = series;
+    chart
 }
 
 /// Some of many rows, for curves that are smooth.
@@ -407,10 +422,13 @@ fn solutions(solution: &Solution) -> Vec<(&[Row], [&'static str; 2], [Colour; 2]
 fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let mut series = Vec::new();
     for (rows, [stated, error], [believed, real]) in solutions(solution) {
-        let sigma = thinned(rows)
-            .map(|row| (row.t_s, row.sigma[0].hypot(row.sigma[1])))
-            .collect();
-        series.push(Series::dashed(stated, believed, sigma));
+        series.push(Series::dashed(
+            stated,
+            believed,
+            thinned(rows)
+                .map(|row| (row.t_s, row.sigma[0].hypot(row.sigma[1])))
+                .collect(),
+        ));
         let errors = rows
             .iter()
             .filter_map(|row| Some((row.t_s, row.error?.values[0].hypot(row.error?.values[1]))));
@@ -428,17 +446,24 @@ fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
     let chart = |(i, name): (usize, &&str)| {
         let is_velocity = (3..6).contains(&i);
         let error = |row: &Row| {
-            let known = row
-                .error
-                .filter(|e| !is_velocity || e.velocity_sigma < UNEVEN);
-            (row.t_s, known.map_or(f64::NAN, |e| e.values[i]))
+            (
+                row.t_s,
+                row.error
+                    .filter(|e| !is_velocity || e.velocity_sigma < UNEVEN)
+                    .map_or(f64::NAN, |e| e.values[i]),
+            )
         };
         let mut series = Vec::new();
         for (rows, [stated, line], [believed, real]) in solutions(solution) {
-            let sigma = thinned(rows)
-                .map(|row| (row.t_s, -row.sigma[i], row.sigma[i]))
-                .collect();
-            series.push(Series::new(stated, believed, Mark::Band(sigma)));
+            series.push(Series::new(
+                stated,
+                believed,
+                Mark::Band(
+                    thinned(rows)
+                        .map(|row| (row.t_s, -row.sigma[i], row.sigma[i]))
+                        .collect(),
+                ),
+            ));
             series.push(Series::line(line, real, rows.iter().map(error).collect()));
         }
         Chart::over_time(
@@ -494,10 +519,13 @@ fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
             )
         }
     };
-    let panels = ["north", "east", "down"]
-        .into_iter()
-        .enumerate()
-        .map(panel)
-        .collect();
-    Chart::over_time("Innovations of position, normalised", panels, outages)
+    Chart::over_time(
+        "Innovations of position, normalised",
+        ["north", "east", "down"]
+            .into_iter()
+            .enumerate()
+            .map(panel)
+            .collect(),
+        outages,
+    )
 }

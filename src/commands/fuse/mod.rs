@@ -4,12 +4,14 @@ mod document;
 
 use crate::app::inputs::files;
 use crate::app::{
-    Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result, inputs,
+    Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Refuse, Result, inputs,
+    refused,
 };
 use crate::commands::run::reduction_of;
 use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
 use crate::io::model_file::ModelFile;
 use crate::io::trajectory_file::{self, load_reference};
+use crate::parse::{self, numbers};
 use crate::report::json;
 use glam::{DMat3, DQuat, DVec3};
 use nav_sim_document::{Document, Importance, seconds, shortest, window};
@@ -56,7 +58,7 @@ impl Command for Fuse {
     };
     const PLOT: bool = false;
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+    fn inputs(&self) -> Result<Inputs> {
         Ok(files("imu", [&self.imu])
             .chain(files("gnss", [&self.gnss]))
             .chain(files("model", [&self.model]))
@@ -118,13 +120,13 @@ Examples:
 pub struct Fuse {
     /// IMU recording (.csv, .tsv, .txt, .npy, also .gz)
     #[arg(value_name = "IMU")]
-    pub imu: PathBuf,
+    imu: PathBuf,
     /// GNSS fixes (.csv, .txt, .pos, .nmea, also .gz)
     #[arg(value_name = "GNSS")]
-    pub gnss: PathBuf,
+    gnss: PathBuf,
     /// Noise model that the filter believes
     #[arg(value_name = "MODEL")]
-    pub model: PathBuf,
+    model: PathBuf,
     /// Initial state: a file (TOML); the heading and its standard deviation (degrees), where the course does not show it;
     /// auto: level from the IMU, heading from the GNSS course
     #[arg(
@@ -134,11 +136,11 @@ pub struct Fuse {
         default_value = "auto",
         allow_hyphen_values = true
     )]
-    pub initial: StartChoice,
+    initial: StartChoice,
     /// GNSS antenna from the IMU: front, right, down (m)
     #[arg(long = "lever-arm", value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
         hide_default_value = true, allow_hyphen_values = true)]
-    pub lever_arm_m: [f64; 3],
+    lever_arm_m: [f64; 3],
     /// Attitude of the IMU in the vehicle (degrees) if its axes are not front, right, down; after a colon the standard
     /// deviations about the vehicle's front, right, down (1 where not given); flu or rfu: axes of that name; auto:
     /// estimated from the drive of a road vehicle
@@ -147,53 +149,53 @@ pub struct Fuse {
         value_name = "ROLL,PITCH,YAW[:SD,SD,SD]|flu|rfu|auto",
         allow_hyphen_values = true
     )]
-    pub mounting: Option<MountingChoice>,
+    mounting: Option<MountingChoice>,
     /// Reference trajectory to compare with; stretches where it jumps are left out
     #[arg(long, value_name = "TRAJECTORY")]
-    pub reference: Option<PathBuf>,
+    reference: Option<PathBuf>,
     /// Window in which fixes are withheld, on the clock of the data in seconds (repeatable)
     #[arg(long = "outage", value_name = "START:END")]
-    pub outages: Vec<Outage>,
+    outages: Vec<Outage>,
     /// States of the filter: 15 (one bias an axis, to which the model is reduced), 21 (and a scale factor an axis) or
     /// full (a bias state for each process)
     #[arg(long, value_name = "STATES", default_value = "15")]
-    pub filter: FilterStates,
+    filter: FilterStates,
     /// Constant biases that the filter expects beside the model: standard deviations, accelerometer in m/s²,
     /// gyroscope in rad/s
-    #[arg(long, value_name = "ACCEL,GYRO", value_parser = at_least_zero)]
-    pub turn_on_bias: Option<[f64; 2]>,
+    #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair)]
+    turn_on_bias: Option<[f64; 2]>,
     /// Standard deviations where the GNSS file states none: of the position in m, and after a colon of the velocity in
     /// m/s; each one number or north,east,down. x3 or x3:2: times what it states
     #[arg(long, value_name = "POS[:VEL]|xPOS[:VEL]", value_parser = gnss_sigma)]
-    pub gnss_sigma: Option<GnssSigma>,
+    gnss_sigma: Option<GnssSigma>,
     /// Time by which receiver or logger stamp the fixes late (s)
     #[arg(long = "gnss-delay", value_name = "S", value_parser = number, default_value = "0", allow_hyphen_values = true)]
-    pub gnss_delay_s: f64,
+    gnss_delay_s: f64,
     /// How long errors of positions last: as the innovations show, no longer than a fix, or so many seconds
     #[arg(long, value_name = "auto|none|SECONDS", value_parser = correlation, default_value = "auto")]
-    pub gnss_correlation: Correlation,
+    gnss_correlation: Correlation,
     /// Road vehicle: its rear axle moves neither sideways nor up; needs the mounting of the IMU
     #[arg(long)]
-    pub nhc: bool,
+    nhc: bool,
     /// The velocity is zero where IMU and fixes show that the vehicle stands
     #[arg(long)]
-    pub zupt: bool,
+    zupt: bool,
     /// Speed of a wheel: a table of t_s and wheel_m_s (or _km_h), negative in reverse; its scale is estimated
     #[arg(long, value_name = "FILE")]
-    pub odometer: Option<PathBuf>,
+    odometer: Option<PathBuf>,
     /// Middle of the rear axle from the IMU: front, right, down (m)
     #[arg(long = "rear-axle", value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
         hide_default_value = true, allow_hyphen_values = true)]
-    pub rear_axle_m: [f64; 3],
+    rear_axle_m: [f64; 3],
     /// Names of the IMU's columns, for a file without a header or instead of it
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
-    pub columns: Option<Vec<String>>,
+    columns: Option<Vec<String>>,
     /// Topic of the IMU in a log that has several; after a comma that of the fixes
     #[arg(long, value_name = "IMU[,FIXES]", value_delimiter = ',')]
-    pub topic: Vec<String>,
+    topic: Vec<String>,
     /// Also smooth the solution: every row is then estimated from all fixes, later ones included
     #[arg(long)]
-    pub smooth: bool,
+    smooth: bool,
 }
 
 impl Fuse {
@@ -271,13 +273,12 @@ impl FromStr for MountingChoice {
         }
         // nobody mounts by less, and what a drive shows is known no better
         let (angles, sigma) = text.split_once(':').unwrap_or((text, "1,1,1"));
-        match (list(angles), list(sigma)) {
+        match (numbers(angles), numbers(sigma)) {
             (Some([roll, pitch, yaw]), Some(sigma_deg))
-                if sigma_deg.iter().all(|s: &f64| (0.0..=MAX_SIGMA_DEG).contains(s)) =>
+                if sigma_deg.iter().all(|s| (0.0..=MAX_SIGMA_DEG).contains(s)) =>
             {
-                let [roll, pitch, yaw] = [roll, pitch, yaw].map(|angle: f64| angle * DEG);
-                let q_s_b = RollPitchYaw { roll, pitch, yaw }.to_quat();
-                Ok(Self::Given(q_s_b, DVec3::from(sigma_deg) * DEG))
+                let [roll, pitch, yaw] = [roll, pitch, yaw].map(|angle| angle * DEG);
+                Ok(Self::Given(RollPitchYaw { roll, pitch, yaw }.to_quat(), DVec3::from(sigma_deg) * DEG))
             }
             _ => Err(
                 "expected degrees, such as -9.5,-60.8,-166.8 or -9.5,-60.8,-166.8:1.5,0.5,0.8, or flu, rfu, auto"
@@ -290,12 +291,6 @@ impl FromStr for MountingChoice {
 /// Standard deviations of fixes where the file states none, and factors of what it states, of position and of velocity.
 pub type GnssSigma = (Option<FixSigma>, [f64; 2]);
 
-/// Finite numbers between commas.
-fn list<const N: usize>(text: &str) -> Option<[f64; N]> {
-    let all: Option<Vec<f64>> = text.split(',').map(|x| number(x.trim()).ok()).collect();
-    all?.try_into().ok()
-}
-
 fn number(text: &str) -> Result<f64, &'static str> {
     text.parse()
         .ok()
@@ -304,16 +299,12 @@ fn number(text: &str) -> Result<f64, &'static str> {
 }
 
 fn arm(text: &str) -> Result<[f64; 3], String> {
-    let arm: [f64; 3] = list(text).ok_or("expected 3 numbers between commas")?;
-    match arm.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
-        true => Ok(arm),
-        false => Err(format!("more than {MAX_LEVER_ARM_M} m")),
+    let arm: [f64; 3] = numbers(text).ok_or("expected 3 numbers between commas")?;
+    if arm.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
+        Ok(arm)
+    } else {
+        Err(format!("more than {MAX_LEVER_ARM_M} m"))
     }
-}
-
-fn at_least_zero(text: &str) -> Result<[f64; 2], &'static str> {
-    let pair = list(text).filter(|pair| pair.iter().all(|x| *x >= 0.0));
-    pair.ok_or("expected two numbers ≥ 0, such as 0.1,0.002")
 }
 
 fn correlation(text: &str) -> Result<Correlation, &'static str> {
@@ -334,16 +325,16 @@ fn gnss_sigma(text: &str) -> Result<GnssSigma, &'static str> {
     };
     let (position, velocity) = factors.split_once(':').unwrap_or((factors, factors));
     let factor = |text: &str| number(text).ok().filter(|factor| *factor > 0.0);
-    let both = factor(position).zip(factor(velocity));
-    both.map(|(position, velocity)| (None, [position, velocity]))
+    factor(position)
+        .zip(factor(velocity))
+        .map(|(position, velocity)| (None, [position, velocity]))
         .ok_or("expected factors > 0: x3 or x3:2")
 }
 
 /// `POS` or `N,E,D` in metres, then `:VEL` or `:N,E,D` in m/s.
 fn fix_sigma(text: &str) -> Result<FixSigma, &'static str> {
     let three = |part: &str| {
-        let three = list::<3>(part).or(list::<1>(part).map(|[all]| [all; 3]));
-        three.filter(|sigma| sigma.iter().all(|x| *x > 0.0)).ok_or(
+        numbers::<3>(part).or(numbers::<1>(part).map(|[all]| [all; 3])).filter(|sigma| sigma.iter().all(|x| *x > 0.0)).ok_or(
             "expected metres above 0, one or three (north, east, down), and after a colon m/s: 2,2,4:0.1",
         )
     };
@@ -371,10 +362,10 @@ impl FromStr for StartChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let numbers = text
+        match text
             .split_once(':')
-            .map(|(deg, sigma)| (number(deg), number(sigma)));
-        match numbers {
+            .map(|(deg, sigma)| (number(deg), number(sigma)))
+        {
             _ if text == "auto" => Ok(Self::Auto),
             Some((Ok(deg), Ok(sigma_deg)))
                 if sigma_deg > 0.0 && sigma_deg <= MAX_SIGMA_DEG && deg.abs() <= 360.0 =>
@@ -404,8 +395,7 @@ impl From<FusionError> for Failure {
                 Some("a filter of fewer states, or the drive in parts".to_owned())
             }
             FusionError::Diverged { .. } => {
-                let failure = Self::could_not(&e);
-                return failure.hint("check axes, units and the initial state");
+                return Self::could_not(&e).hint("check axes, units and the initial state");
             }
             _ => None,
         };
@@ -483,12 +473,15 @@ impl Drive {
                 .filter(|t| !t.is_empty())
         };
         let imu = read_imu(&request.imu, request.columns.as_deref(), topic(0))?;
-        let span_s = imu
-            .samples
-            .first()
-            .zip(imu.samples.last())
-            .map(|(first, last)| (first.t_s, last.t_s));
-        let (mut gnss, remarks) = read_gnss(&request.gnss, unsaid.as_ref(), span_s, topic(1))?;
+        let (mut gnss, remarks) = read_gnss(
+            &request.gnss,
+            unsaid.as_ref(),
+            imu.samples
+                .first()
+                .zip(imu.samples.last())
+                .map(|(first, last)| (first.t_s, last.t_s)),
+            topic(1),
+        )?;
         for fix in &mut gnss {
             *fix = fix.with_sigmas_times(position, velocity);
             fix.t_s -= request.gnss_delay_s;
@@ -514,11 +507,12 @@ impl Drive {
                 "the model was converted from {from} Hz to {to:.3} Hz"
             ));
         }
-        let of_file = initial
-            .as_ref()
-            .map(|start| start.sigma.clone())
-            .unwrap_or_default();
-        let mut expected = request.expected(of_file);
+        let mut expected = request.expected(
+            initial
+                .as_ref()
+                .map(|start| start.sigma.clone())
+                .unwrap_or_default(),
+        );
         inputs::expect_turn_on(&mut expected, &model, &request.model, context);
         expected.validate().refuse()?;
         let options = trajectory_file::Options::default();
@@ -528,7 +522,7 @@ impl Drive {
             .map(|path| load_reference(path, &options))
             .transpose()?;
         let reference = reference.map(|(reference, warnings)| {
-            warnings.iter().for_each(|warning| context.warn(warning));
+            context.warn_each(&warnings);
             reference
         });
         let mut configuration = json!({
@@ -572,25 +566,25 @@ impl Drive {
             aids: &[],
         };
         let mut settings = self.settings.clone();
-        let of_model = (&self.model.model, self.request.filter, &self.expected);
-        let (belief, reduction) =
-            belief(of_model, self.imu_rate_hz, &self.gnss, &settings.outages)?;
+        let (belief, reduction) = belief(
+            (&self.model.model, self.request.filter, &self.expected),
+            self.imu_rate_hz,
+            &self.gnss,
+            &settings.outages,
+        )?;
         let plan = OutagePlan {
             fixed: settings.outages,
             ..OutagePlan::default()
         };
         let times_s: Vec<f64> = self.gnss.iter().map(|fix| fix.t_s).collect();
         let placed = plan.on(&FixedData::recorded(&times_s), 0)?;
-        placed
-            .remarks
-            .iter()
-            .for_each(|remark| context.warn(remark));
+        context.warn_each(&placed.remarks);
         settings.outages = placed.windows;
         let mounting = match self.request.mounting {
-            Some(MountingChoice::Auto) => {
-                let found = mounting::find(&recorded, &settings, &belief);
-                Some(found.map_err(|e| self.not_mounted(e, &recorded, &settings, &belief))?)
-            }
+            Some(MountingChoice::Auto) => Some(
+                mounting::find(&recorded, &settings, &belief)
+                    .map_err(|e| self.not_mounted(e, &recorded, &settings, &belief))?,
+            ),
             _ => None,
         };
         if let Some(Mounting { q_s_b, sigma_b, .. }) = mounting {
@@ -632,12 +626,12 @@ impl Drive {
         let asked = (self.reference.as_ref(), self.request.gnss_correlation);
         let weighed = fuse_correlated(&recorded, &belief, &start, &settings, asked)?;
         if self.reference.is_some() && weighed.solution.rows.iter().all(|row| row.error.is_none()) {
-            let message = "the reference and the solution have no time in common";
-            return Err(Failure::input(message).hint("both need one clock"));
+            return refused(
+                "the reference and the solution have no time in common",
+                "both need one clock",
+            );
         }
-        doubt_heading(&weighed.solution, &settings.outages)
-            .iter()
-            .for_each(|doubt| context.warn(doubt));
+        context.warn_each(doubt_heading(&weighed.solution, &settings.outages));
         let outcome = outcome(&weighed.solution, &settings.outages);
         let Assessment { verdict, findings } = assess(&weighed, &outcome, &doubts);
         let is_correlated = weighed
@@ -652,22 +646,24 @@ impl Drive {
             settings: &settings,
             is_given: self.initial.is_some(),
         };
-        let explained = is_unexplained
+        let cause = is_unexplained
             .then(|| {
                 scene.cause(&Recorded {
                     gnss: &weighed.gnss,
                     ..recorded
                 })
             })
-            .flatten();
-        let cause = explained.map(|cause| cause.after(delay_s));
+            .flatten()
+            .map(|cause| cause.after(delay_s));
         let kind = if cause.is_some() {
             verdict.max(VerdictKind::Doubtful)
         } else {
             verdict
         };
-        let against = |(verdict, finding)| (verdict > VerdictKind::Consistent).then_some(finding);
-        let evidence = findings.into_iter().filter_map(against).collect();
+        let evidence = findings
+            .into_iter()
+            .filter_map(|(verdict, finding)| (verdict > VerdictKind::Consistent).then_some(finding))
+            .collect();
         let constants = belief
             .groups
             .iter()
@@ -744,15 +740,16 @@ impl Drive {
         let is_within =
             |w: &WheelSpeed| span.is_some_and(|(a, b)| (a.t_s..=b.t_s).contains(&w.t_s));
         if !self.wheel.is_empty() && !self.wheel.iter().any(is_within) {
-            let message = "the wheel and the IMU have no time in common";
-            return Err(Failure::input(message).hint("both need one clock"));
+            return refused(
+                "the wheel and the IMU have no time in common",
+                "both need one clock",
+            );
         }
         match wheel_ratio(recorded, &self.wheel, outages) {
-            Some(ratio) if !RATIO.contains(&ratio) => {
-                let message = format!("the wheel reads {ratio:.2} times the speed of the fixes");
-                Err(Failure::input(message)
-                    .hint("check the unit in the header: _m_s, _km_h or _mph"))
-            }
+            Some(ratio) if !RATIO.contains(&ratio) => refused(
+                format!("the wheel reads {ratio:.2} times the speed of the fixes"),
+                "check the unit in the header: _m_s, _km_h or _mph",
+            ),
             _ => Ok(()),
         }
     }
@@ -772,8 +769,13 @@ impl Drive {
                 mounting_sigma_b: found.sigma_b,
                 ..settings.clone()
             };
-            let start = coarse(there, &settings, belief).ok()?.start;
-            displaced(there, belief, &start, &settings)?.delay_s
+            displaced(
+                there,
+                belief,
+                &coarse(there, &settings, belief).ok()?.start,
+                &settings,
+            )?
+            .delay_s
         };
         let Some(mut clocks) = clocks_apart(recorded, rest) else {
             return e.into();
@@ -819,15 +821,21 @@ impl Scene<'_> {
 
     /// Mean NIS per component with a start of its own.
     fn nis(&self, recorded: &Recorded<'_>) -> Option<f64> {
-        let solution = fuse(
-            recorded,
-            self.belief,
-            &self.start(recorded)?,
-            self.settings,
-            None,
+        Some(
+            outcome(
+                &fuse(
+                    recorded,
+                    self.belief,
+                    &self.start(recorded)?,
+                    self.settings,
+                    None,
+                )
+                .ok()?,
+                &[],
+            )
+            .nis_per_component,
         )
-        .ok()?;
-        Some(outcome(&solution, &[]).nis_per_component).filter(|nis| nis.is_finite())
+        .filter(|nis| nis.is_finite())
     }
 
     fn start(&self, recorded: &Recorded<'_>) -> Option<Start> {
@@ -857,8 +865,12 @@ impl Cause {
 
 /// A start that states the attitude of the vehicle: that of the IMU is known no better than the mounting.
 fn beside_mounting(mut start: Start, settings: &Settings) -> Start {
-    let mounting_deg = (settings.mounting_sigma_b / DEG).to_array();
-    for (sigma, mounting) in start.sigma.att_sigma_deg.iter_mut().zip(mounting_deg) {
+    for (sigma, mounting) in start
+        .sigma
+        .att_sigma_deg
+        .iter_mut()
+        .zip((settings.mounting_sigma_b / DEG).to_array())
+    {
         *sigma = sigma.hypot(mounting).min(30.0).max(*sigma);
     }
     start
@@ -867,11 +879,13 @@ fn beside_mounting(mut start: Start, settings: &Settings) -> Start {
 /// Heading that the motion between outages hardly shows.
 fn doubt_heading(solution: &Solution, outages: &[Outage]) -> Option<String> {
     let start_s = solution.rows.first()?.t_s;
-    let fixed = solution
-        .rows
-        .iter()
-        .filter(|row| !outages.iter().any(|o| o.withholds(row.t_s)));
-    weak_heading(fixed.map(|row| (row.t_s - start_s, row.sigma[8])))
+    weak_heading(
+        solution
+            .rows
+            .iter()
+            .filter(|row| !outages.iter().any(|o| o.withholds(row.t_s)))
+            .map(|row| (row.t_s - start_s, row.sigma[8])),
+    )
 }
 
 // The filter of a fusion: made for a recording whose trajectory is not known.
@@ -947,11 +961,13 @@ fn receiver(gnss: &[GnssFix], interval_s: f64) -> GnssSettings {
 /// its own rate.
 fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, continuous::RateError> {
     let kept = |axis: &Composite| {
-        let processes = axis
-            .processes
-            .iter()
-            .filter(|p| !matches!(p, Process::Quantization(_)));
-        Composite::new(processes.copied().collect())
+        Composite::new(
+            axis.processes
+                .iter()
+                .filter(|p| !matches!(p, Process::Quantization(_)))
+                .copied()
+                .collect(),
+        )
     };
     let axes = std::array::from_fn(|i| kept(&model.axes[i]));
     continuous::at_rate(
@@ -1189,16 +1205,19 @@ fn vehicle(solution: &Solution, settings: &AidingSettings) -> Option<Value> {
         return None;
     }
     let mut found = json!({ "aids": aid_innovations(&solution.aids) });
-    let keys = [
+    for (i, (key, unit)) in [
         ("wheel_scale", 1.0),
         ("mounting_pitch_deg", DEG),
         ("mounting_yaw_deg", DEG),
-    ];
-    for (i, (key, unit)) in keys.into_iter().enumerate() {
-        let known = solution
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        if let Some([value, sigma]) = solution
             .vehicle
-            .filter(|_| settings.state_sigmas()[i] > 0.0);
-        if let Some([value, sigma]) = known.map(|v| v.map(|estimates| estimates[i] / unit)) {
+            .filter(|_| settings.state_sigmas()[i] > 0.0)
+            .map(|v| v.map(|estimates| estimates[i] / unit))
+        {
             found[key] = json!({ "value": value, "sigma": sigma });
         }
     }
@@ -1252,8 +1271,9 @@ fn directory(answer: &FuseAnswer) -> Vec<OutputFile<'static>> {
         smoothed.map(|rows| kml(rows, "smoothed solution", title)),
         Some(json(summary)),
     ];
-    let files = FILES.into_iter().zip(contents);
-    files
+    FILES
+        .into_iter()
+        .zip(contents)
         .filter_map(|(name, text)| Some(OutputFile::whole(name, text?)))
         .collect()
 }
@@ -1326,8 +1346,11 @@ fn innovations_csv(solution: &Solution) -> String {
     ]);
     for fix in &solution.fixes {
         let status = if fix.used { "used" } else { "withheld" };
-        let used = u8::from(fix.used).to_string();
-        let mut cells = vec![fixed(fix.t_s, 6), used, status.to_owned()];
+        let mut cells = vec![
+            fixed(fix.t_s, 6),
+            u8::from(fix.used).to_string(),
+            status.to_owned(),
+        ];
         for list in [&fix.innovation, &fix.sigma] {
             cells.extend((0..6).map(|i| list.get(i).map_or_else(String::new, |x| fixed(*x, 6))));
         }

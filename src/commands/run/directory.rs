@@ -36,9 +36,12 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory> {
     let value: Value = from_json(&path, &json)?;
     let (found, expected) = (&value["schema_version"], Manifest::SCHEMA_VERSION);
     if *found != expected {
-        let message = format!("\"schema_version\" is {found}; this nav-sim reads {expected}");
-        let failure = Failure::contents(path, Place::Within, message);
-        return Err(failure.or_hint("repeat the run with this version"));
+        return Err(Failure::contents(
+            path,
+            Place::Within,
+            format!("\"schema_version\" is {found}; this nav-sim reads {expected}"),
+        )
+        .or_hint("repeat the run with this version"));
     }
     let manifest: Manifest = from_json(&path, &json)?;
     let origin: RunOrigin = from_json(&path, &json)?;
@@ -109,11 +112,12 @@ fn part<T>(
     let (path, text) = text(directory, name)?;
     let found = parse(&path, &text)?;
     match manifest.outputs.get(name) {
-        Some(blake3) if *blake3 != input::hash_of(text.as_bytes()) => {
-            let message =
-                "is not what its manifest.json says (BLAKE3): it is damaged, or was changed";
-            Err(Failure::contents(path, Place::Within, message).or_hint(REPEAT))
-        }
+        Some(blake3) if *blake3 != input::hash_of(text.as_bytes()) => Err(Failure::contents(
+            path,
+            Place::Within,
+            "is not what its manifest.json says (BLAKE3): it is damaged, or was changed",
+        )
+        .or_hint(REPEAT)),
         _ => Ok(found),
     }
 }
@@ -131,11 +135,10 @@ fn text(directory: &Path, name: &str) -> Result<(String, String)> {
     let text = source::text(&path).map_err(|e| {
         let is_missing = e.kind() == std::io::ErrorKind::NotFound;
         let failure = Failure::io(&path, e);
-        match is_missing {
-            true => {
-                failure.hint("not a finished run directory: make one with `nav-sim run … -o DIR`")
-            }
-            false => failure,
+        if is_missing {
+            failure.hint("not a finished run directory: make one with `nav-sim run … -o DIR`")
+        } else {
+            failure
         }
     })?;
     Ok((path.display().to_string(), text))

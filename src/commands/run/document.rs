@@ -2,12 +2,10 @@
 
 use super::{Navigation, RunAnswer};
 use crate::report::trajectory::track_map;
-use crate::report::verdict::requirement_line;
-use crate::report::verdict::verdict_lines;
+use crate::report::verdict::{requirement_line, verdict_lines, windows};
 use crate::report::{reduction_doubt, reduction_line, tone, unexpected_line};
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone,
-    readable, window,
+    Axis, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone, window,
 };
 use nav_sim_navigation::ekf::FixUpdate;
 use nav_sim_navigation::metrics::{EpochMetrics, OutageSummary, Summary, VerdictKind};
@@ -31,9 +29,10 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
         epochs, summary, ..
     } = &answer.navigation;
     let windows = windows(summary);
-    let tone = match summary.require.iter().all(|met| met.met) {
-        true => tone(summary.verdict.kind),
-        false => Tone::Bad,
+    let tone = if summary.require.iter().all(|met| met.met) {
+        tone(summary.verdict.kind)
+    } else {
+        Tone::Bad
     };
     let required = summary.require.iter();
     // What was asked for comes before the filter.
@@ -43,9 +42,8 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     lines.extend(verdict);
     let mut page = Document::new(&format!("INS/GNSS {}", summary.method), tone, lines);
     notes(summary, answer, &mut page);
-    page.facts(&assumptions(summary, answer));
     page.chart(
-        &track_map(&answer.track, "Reference trajectory", &windows),
+        &track_map("reference", &answer.track, "Reference trajectory", &windows),
         "",
     );
     page.chart(&horizontal(epochs, summary), HORIZONTAL);
@@ -89,8 +87,7 @@ fn notes(summary: &Summary, answer: &RunAnswer, page: &mut Document) {
             .into_iter()
             .for_each(|doubt| page.note(Importance::Detail, doubt));
     }
-    let shown = largest(summary, 1);
-    for outage in shown.iter().map(|k| &summary.outages[*k]) {
+    for outage in largest(summary, 1).iter().map(|k| &summary.outages[*k]) {
         sources(outage)
             .into_iter()
             .for_each(|line| page.note(Importance::Remark, line));
@@ -99,13 +96,12 @@ fn notes(summary: &Summary, answer: &RunAnswer, page: &mut Document) {
 
 /// `sources of the horizontal error at the end of 300–390 s: gyro.AR1 78 %, gyro.WN 11 %, gnss.velocity 10 %`
 fn sources(outage: &OutageSummary) -> Option<String> {
-    let ranked = outage
+    let shares: Vec<String> = outage
         .budget
         .as_ref()?
         .ranked(&[0, 1])
         .into_iter()
-        .take(SOURCES);
-    let shares: Vec<String> = ranked
+        .take(SOURCES)
         .map(|(name, share)| format!("{name} {:.0} %", 100.0 * share))
         .collect();
     let place = window(outage.start_s, outage.end_s);
@@ -130,12 +126,15 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
     let summary = &answer.navigation.summary;
     if summary.outages.is_empty() {
         page.section("Accuracy over the run");
-        let columns = [
-            ("state", "@"),
-            ("RMSE, mean", "."),
-            ("ASEE, mean", "../../asee_mean/@"),
-        ];
-        page.lead(Table::of(answer, "/accuracy/rmse_mean/*", &columns));
+        page.lead(Table::of(
+            answer,
+            "/accuracy/rmse_mean/*",
+            &[
+                ("state", "@"),
+                ("RMSE, mean", "."),
+                ("ASEE, mean", "../../asee_mean/@"),
+            ],
+        ));
         return;
     }
     page.section("At the ends of outages");
@@ -175,8 +174,10 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
     for k in shown {
         let outage = &summary.outages[*k];
         let table = Table::of(answer, &format!("/outages/{k}/rmse_end/*"), &columns);
-        let title = format!("States, {}", window(outage.start_s, outage.end_s));
-        page.folded(&title, |page| page.table(&table));
+        page.folded(
+            &format!("States, {}", window(outage.start_s, outage.end_s)),
+            |page| page.table(&table),
+        );
     }
 }
 
@@ -206,41 +207,13 @@ fn provenance(answer: &RunAnswer, page: &mut Document) {
         "nav-sim {}; the command is in manifest.json.",
         env!("CARGO_PKG_VERSION")
     ));
-    let mut table = Table::new(["input", "file", "BLAKE3"]);
-    for i in &answer.inputs {
-        table.row([i.role.clone(), i.path.clone(), i.blake3.clone()].map(Cell::from));
-    }
-    page.table(&table);
+    page.table(&Table::of(
+        &answer.inputs,
+        "/*",
+        &[("input", "role"), ("file", "path"), ("BLAKE3", "blake3")],
+    ));
     let configuration = toml::to_string_pretty(&answer.origin.configuration).unwrap_or_default();
     page.folded("Configuration", |page| page.code(&configuration));
-}
-
-/// What the results rest on, beside the configuration.
-fn assumptions(summary: &Summary, answer: &RunAnswer) -> Vec<(&'static str, String)> {
-    let input = |role: &str| {
-        let found = answer.inputs.iter().find(|i| i.role == role);
-        found.map_or("", |i| i.path.as_str())
-    };
-    let truth = match (input("static"), input("truth")) {
-        ("", "") => format!("{} (the model of the filter)", input("model")),
-        ("", model) => model.to_owned(),
-        (recording, _) => format!("windows of {recording}"),
-    };
-    let mut facts = vec![
-        ("trajectory", input("trajectory").to_owned()),
-        (
-            "model of the filter",
-            format!("{}, {} states", input("model"), summary.filter_states),
-        ),
-        ("what makes the errors", truth),
-    ];
-    let (runs, diverged) = (summary.runs, summary.diverged);
-    if runs > 0 {
-        let worth = readable(summary.independent_runs);
-        let text = format!("{runs} ({diverged} diverged), worth {worth} independent ones");
-        facts.push(("runs", text));
-    }
-    facts
 }
 
 /// The sources of the errors at the ends of the outages that are shown.
@@ -266,15 +239,6 @@ fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
 }
 
 // The figures of a run.
-
-/// The outages (start, end) (s).
-fn windows(summary: &Summary) -> Vec<(f64, f64)> {
-    summary
-        .outages
-        .iter()
-        .map(|o| (o.start_s, o.end_s))
-        .collect()
-}
 
 fn over_time(epochs: &[EpochMetrics], value: impl Fn(&EpochMetrics) -> f64) -> Vec<(f64, f64)> {
     epochs.iter().map(|e| (e.t_s, value(e))).collect()
@@ -306,11 +270,14 @@ pub(super) fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
             Mark::Points(summary.outages.iter().map(end).collect()),
         ),
     ];
-    let panel = Panel {
-        height: 1.2,
-        ..Panel::new(Axis::log("horizontal error (m)"), series)
-    };
-    Chart::over_time("Horizontal position error", vec![panel], &windows(summary))
+    Chart::over_time(
+        "Horizontal position error",
+        vec![Panel {
+            height: 1.2,
+            ..Panel::new(Axis::log("horizontal error (m)"), series)
+        }],
+        &windows(summary),
+    )
 }
 
 /// Every state: what the filter believes and how wrong it is.
@@ -338,10 +305,13 @@ pub(super) fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
         let mut series = vec![Series::line("", Colour::Ink, over_time(epochs, value))];
         // of expected values there is no scatter, and no band for it
         if summary.runs > 0 {
-            let zone = Mark::Zone(band[0], band[1]);
             series.insert(
                 0,
-                Series::new("95 % band of a right filter", Colour::RIGHT, zone),
+                Series::new(
+                    "95 % band of a right filter",
+                    Colour::RIGHT,
+                    Mark::Zone(band[0], band[1]),
+                ),
             );
         }
         Panel {
@@ -372,8 +342,11 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], answer: &RunAnswer) -> S
     let verdict = &summary.verdict;
     let [is_recorded, is_modelled] = ["static", "truth"].map(|role| answer.has_input(role));
     let ratios = summary.reduction.iter().flat_map(|quality| {
-        let states = quality.outage_end.iter().chain([&quality.mean]);
-        states.flat_map(|state| state.0)
+        quality
+            .outage_end
+            .iter()
+            .chain([&quality.mean])
+            .flat_map(|state| state.0)
     });
     let is_far = verdict.beyond_linear.is_some();
     let is_analysed = summary.method == Method::Lincov.name()
@@ -387,9 +360,10 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], answer: &RunAnswer) -> S
             return "--filter full has a state for each process of the model".to_owned();
         }
         None if is_recorded || is_modelled || is_analysed && !is_far => {
-            let how = match is_recorded || is_modelled {
-                true => "",
-                false => " --scenario",
+            let how = if is_recorded || is_modelled {
+                ""
+            } else {
+                " --scenario"
             };
             return format!(
                 "the errors are not those of MODEL: nav-sim tune{how} finds variances that cover them"
@@ -403,9 +377,10 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], answer: &RunAnswer) -> S
         is_met_again && verdict.worst_outage.is_none_or(|outage| outage > first)
     };
     let is_linear = answer.origin.configuration.filter.update == FixUpdate::Ekf;
-    let iterated = match is_linear && verdict.beyond_linear.is_some_and(is_after) {
-        true => "; filter.update = \"iterated\" does",
-        false => "",
+    let iterated = if is_linear && verdict.beyond_linear.is_some_and(is_after) {
+        "; filter.update = \"iterated\" does"
+    } else {
+        ""
     };
     format!(
         "errors too large for a linear filter; another MODEL or nav-sim tune does not help{iterated}"

@@ -1,7 +1,9 @@
 //! `nav-sim run`: the main job.
 
 use crate::app::inputs::{self, FilterArgs, SettingsArgs, files};
-use crate::app::{Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result};
+use crate::app::{
+    Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Refuse, Result, refused,
+};
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::ModelFile;
 use crate::io::scenario_file;
@@ -23,7 +25,7 @@ use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
     FilterPass, Instant, Track, TruthSide, assess, strapdown_over_sigma, weak_heading,
 };
-use nav_sim_navigation::simulation::{Experiment, Plan, RunResult};
+use nav_sim_navigation::simulation::{Experiment, Plan, REPORTED, RunResult};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::{Recording, Sensor};
 use nav_sim_signal::noise::reduction::is_exact;
@@ -51,39 +53,39 @@ pub struct Run {
     /// Trajectory: motion profile (.toml) or table (.csv)
     pub trajectory: PathBuf,
     /// Noise model that the filter believes
-    pub model: PathBuf,
+    model: PathBuf,
     /// Noise model that makes the INS errors (default: MODEL itself)
     #[arg(long, value_name = "MODEL2", conflicts_with = "static")]
     pub truth: Option<PathBuf>,
     /// Draw the parameters that make the errors of each run from the spread that their model states
     #[arg(long, conflicts_with = "static")]
-    pub spread: bool,
+    spread: bool,
     /// Static recording whose windows make the INS errors (repeatable)
     #[arg(id = "static", long = "static", value_name = "FILE")]
     pub recordings: Vec<PathBuf>,
     /// Sample rate of static recordings without a time column
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz, requires = "static")]
-    pub rate_hz: Option<f64>,
+    rate_hz: Option<f64>,
     /// Outages and other settings of the run.
     #[command(flatten)]
-    pub settings: SettingsArgs,
+    settings: SettingsArgs,
     /// Scenario file whose section gnss is used
     #[arg(long, value_name = "FILE")]
-    pub gnss: Option<PathBuf>,
+    gnss: Option<PathBuf>,
     /// Monte-Carlo runs (default: 100)
     #[arg(long, value_name = "N")]
-    pub runs: Option<u64>,
+    runs: Option<u64>,
     /// States of the filter, and what it expects beside the model.
     #[command(flatten)]
-    pub filter: FilterArgs,
+    filter: FilterArgs,
     /// How statistics are computed: monte-carlo (sampled runs), lincov (linear covariance analysis, no sampling) or
     /// both (runs, compared with their expected values)
     #[arg(long, value_name = "METHOD", value_parser = parse::one_of::<Method>(&Method::NAMES))]
-    pub method: Option<Method>,
+    method: Option<Method>,
     /// Limit on an error at the end of every outage, as NAME<=LIMIT (repeatable): p50_m, p95_m (horizontal),
     /// rmse_pos_e_m, yaw_deg and the other states; or "consistent"; exit code 3 if it is not met
     #[arg(long, value_name = "NAME<=LIMIT")]
-    pub require: Vec<Requirement>,
+    require: Vec<Requirement>,
 }
 
 /// Results of a run. As JSON it is `summary.json`.
@@ -147,9 +149,8 @@ impl Command for Run {
     };
     const JUDGES: &'static [&'static str] = &["require"];
 
-    fn inputs(&self) -> Result<Vec<(&'static str, PathBuf)>> {
-        let trajectory = files("trajectory", [&self.trajectory]);
-        Ok(trajectory
+    fn inputs(&self) -> Result<Inputs> {
+        Ok(files("trajectory", [&self.trajectory])
             .chain(files("model", [&self.model]))
             .chain(files("truth", &self.truth))
             .chain(inputs::listed("static", &self.recordings)?)
@@ -178,12 +179,13 @@ impl Run {
         let mut scenario = self.scenario()?;
         let (mut inputs, file, made_by) = self.read(&mut scenario, context)?;
         let is_drawn = scenario.run.method != Method::Lincov || scenario.outage_random.is_some();
-        let seed = match is_drawn {
-            true => context.seed_or(scenario.run.seed),
-            false => context
+        let seed = if is_drawn {
+            context.seed_or(scenario.run.seed)
+        } else {
+            context
                 .given_seed()
                 .or(scenario.run.seed)
-                .unwrap_or_default(),
+                .unwrap_or_default()
         };
         scenario.run.seed = is_drawn
             .then_some(seed)
@@ -192,20 +194,24 @@ impl Run {
         if self.spread {
             inputs.truth = TrueImu::Drawn(self.drawn(&made_by, &scenario, seed)?);
         }
-        let outages = inputs::placed(&scenario, &inputs.trajectory, seed, context);
-        let outages = outages.map_err(|e| match &self.settings.file.scenario {
-            Some(file) if self.settings.outages.is_empty() => e.within(&file.display().to_string()),
-            _ => e,
-        })?;
+        let outages = inputs::placed(&scenario, &inputs.trajectory, seed, context).map_err(
+            |e| match &self.settings.file.scenario {
+                Some(file) if self.settings.outages.is_empty() => {
+                    e.within(&file.display().to_string())
+                }
+                _ => e,
+            },
+        )?;
         let wanting = self
             .require
             .iter()
             .find(|r| outages.is_empty() && r.needs_outage());
         if let Some(wanting) = wanting {
             let name = wanting.name();
-            let message =
-                format!("--require {wanting}: {name} is of the ends of outages, and there is none");
-            return Err(Failure::input(message).hint("give an outage with --outage START:END"));
+            return refused(
+                format!("--require {wanting}: {name} is of the ends of outages, and there is none"),
+                "give an outage with --outage START:END",
+            );
         }
         if scenario.run.method == Method::Lincov && self.runs.is_some() {
             context.warn(
@@ -251,14 +257,13 @@ impl Run {
     fn drawn(&self, file: &ModelFile, scenario: &Scenario, seed: u64) -> Result<Vec<Model>> {
         let path = self.truth.as_ref().unwrap_or(&self.model).display();
         let Some(spread) = &file.spread else {
-            let message = format!("{path}: no [spread] to draw parameters from");
-            return Err(Failure::input(message).hint(
+            return refused(
+                format!("{path}: no [spread] to draw parameters from"),
                 "nav-sim calibrate writes one where three recordings or more differ, or leave --spread out",
-            ));
+            );
         };
         let of_run = |run| {
-            let drawn = spread.draw(&file.model, seed, run);
-            continuous::at_rate(&drawn, scenario.imu.rate_hz)
+            continuous::at_rate(&spread.draw(&file.model, seed, run), scenario.imu.rate_hz)
                 .refuse_within(format!("a model drawn from the [spread] of {path}"))
         };
         (0..scenario.run.runs).map(of_run).collect()
@@ -274,8 +279,7 @@ impl Run {
         let imu_hz = scenario.imu.rate_hz;
         let read_model = |path: &Path| {
             let file = inputs::model(path, context)?;
-            let model = inputs::at_rate(path, &file.model, imu_hz, context)?;
-            Ok::<_, Failure>((model, file))
+            Ok::<_, Failure>((inputs::at_rate(path, &file.model, imu_hz, context)?, file))
         };
         let trajectory = inputs::trajectory(&self.trajectory, context)?;
         let (model, file) = read_model(&self.model)?;
@@ -283,46 +287,55 @@ impl Run {
         let truth = self.truth.as_deref().map(read_model).transpose()?;
         // recordings are their own truth: what they had of a constant bias is taken from them
         if self.recordings.is_empty() {
-            let made_by = truth.as_ref().map_or(&file, |(_, file)| file);
-            let path = self.truth.as_ref().unwrap_or(&self.model);
-            inputs::make_turn_on(&mut scenario.imu, made_by, path, context);
+            inputs::make_turn_on(
+                &mut scenario.imu,
+                truth.as_ref().map_or(&file, |(_, file)| file),
+                self.truth.as_ref().unwrap_or(&self.model),
+                context,
+            );
         }
         let analysed = scenario.run.method == Method::Lincov;
         let draws = |path: &Path, file: &ModelFile| -> Option<Draws> {
-            let found = analysed.then(|| draws_file::usable(path, &file.model, imu_hz))?;
-            found.unwrap_or_else(|doubt| {
-                context.warn(format!("{doubt}: no intervals from the calibration"));
-                None
-            })
+            analysed
+                .then(|| draws_file::usable(path, &file.model, imu_hz))?
+                .unwrap_or_else(|doubt| {
+                    context.warn(format!("{doubt}: no intervals from the calibration"));
+                    None
+                })
         };
         let model_draws = draws(&self.model, &file);
         let made_by = truth.as_ref().map_or(&file, |(_, file)| file).clone();
         let (truth, truth_draws) = match (truth, self.recordings.as_slice()) {
-            (Some((model, file)), []) => {
-                let drawn = self.truth.as_deref().and_then(|path| draws(path, &file));
-                (TrueImu::Model(model), drawn)
-            }
+            (Some((model, file)), []) => (
+                TrueImu::Model(model),
+                self.truth.as_deref().and_then(|path| draws(path, &file)),
+            ),
             (None, []) => (TrueImu::AsBelieved, None),
-            (_, paths) => {
-                let recordings = inputs::recordings(paths, self.rate_hz, context)?;
-                (TrueImu::Recordings(recordings), None)
-            }
+            (_, paths) => (
+                TrueImu::Recordings(inputs::recordings(paths, self.rate_hz, context)?),
+                None,
+            ),
         };
-        let inputs = NavigateInputs {
-            trajectory,
-            model,
-            truth,
-            model_draws,
-            truth_draws,
-        };
-        Ok((inputs, file, made_by))
+        Ok((
+            NavigateInputs {
+                trajectory,
+                model,
+                truth,
+                model_draws,
+                truth_draws,
+            },
+            file,
+            made_by,
+        ))
     }
 }
 
 /// Runs of this request that are summed together: the bytes of results depend on it alone, not on who computed them.
 pub(crate) fn block_of(request: &Run, context: &Context<'_>) -> Result<u64> {
-    let trajectory = inputs::trajectory(&request.trajectory, context)?;
-    Ok(block(&trajectory, &request.scenario()?))
+    Ok(block(
+        &inputs::trajectory(&request.trajectory, context)?,
+        &request.scenario()?,
+    ))
 }
 
 /// Runs `first..first + count` of filters on the same noise, one result a filter (none for covariance analysis); nothing if the
@@ -377,10 +390,15 @@ impl PreparedRun<'_> {
         let (model, request) = (&self.inputs.model, self.request);
         let track = scenario.track(&self.inputs.trajectory, model, &outages)?;
         let belief = scenario.belief(model, &outages, &track).map_err(|e| {
-            let scenario = request.settings.file.scenario.as_deref();
-            let settings = request.gnss.as_deref().or(scenario);
-            let advice = "raise it, or take the full filter (--filter full), which reduces nothing";
-            inputs::no_filter(&e, &request.model, settings, advice)
+            inputs::no_filter(
+                &e,
+                &request.model,
+                request
+                    .gnss
+                    .as_deref()
+                    .or(request.settings.file.scenario.as_deref()),
+                "raise it, or take the full filter (--filter full), which reduces nothing",
+            )
         })?;
         Ok((track, belief))
     }
@@ -399,9 +417,15 @@ impl PreparedRun<'_> {
             mut origin,
             seed,
         } = self;
-        let filter = (&track, &belief);
-        let mut navigation =
-            with_runs(&inputs, &scenario, &outages, filter, seed, sampled, context)?;
+        let mut navigation = with_runs(
+            &inputs,
+            &scenario,
+            &outages,
+            (&track, &belief),
+            seed,
+            sampled,
+            context,
+        )?;
         let summary = &mut navigation.summary;
         summary.require = request.require.iter().map(|r| r.check(summary)).collect();
         if let Some(runs) = &navigation.runs {
@@ -470,15 +494,13 @@ impl Answer for RunAnswer {
             ..
         } = summary;
         if *diverged > 0 && diverged == runs {
-            let failure =
-                Failure::could_not(format!("all {runs} runs diverged: there is no result"));
             return Some(
-                failure.hint("does the model fit the IMU, are [imu] and [initial] plausible?"),
+                Failure::could_not(format!("all {runs} runs diverged: there is no result"))
+                    .hint("does the model fit the IMU, are [imu] and [initial] plausible?"),
             );
         }
         if *diverged > 0 {
-            let failure = Failure::bound(format!("{diverged} of {runs} runs diverged"));
-            return Some(failure.hint(
+            return Some(Failure::bound(format!("{diverged} of {runs} runs diverged")).hint(
                 "their indices are in summary.json, under diverged_runs; they are in no other number",
             ));
         }
@@ -489,9 +511,10 @@ impl Answer for RunAnswer {
         }
         verdict.is_far_off().then(|| {
             let nees = summary.nees.mean;
-            let message =
-                format!("the filter is overconfident by far: NEES {nees:.0}, 9 if it is right");
-            Failure::bound(message).hint("the results are written")
+            Failure::bound(format!(
+                "the filter is overconfident by far: NEES {nees:.0}, 9 if it is right"
+            ))
+            .hint("the results are written")
         })
     }
 }
@@ -554,12 +577,14 @@ pub fn navigate(
     context: &Context<'_>,
 ) -> Result<Navigation> {
     let track = scenario.track(&inputs.trajectory, &inputs.model, outages)?;
-    let belief = scenario.belief(&inputs.model, outages, &track).refuse()?;
     with_runs(
         inputs,
         scenario,
         outages,
-        (&track, &belief),
+        (
+            &track,
+            &scenario.belief(&inputs.model, outages, &track).refuse()?,
+        ),
         seed,
         None,
         context,
@@ -585,18 +610,24 @@ fn with_runs(
     // Within 1e-3 the same in a quarter of the time: for what stands beside the figures.
     let merged = track.merged();
     let full = |model: &Model| {
-        let scenario = scenario.with_full_noise();
-        scenario.belief(model, outages, track).ok()
+        scenario
+            .with_full_noise()
+            .belief(model, outages, track)
+            .ok()
     };
     let reduction = scenario.filter.states.is_reduced().then(|| {
-        let full = full(&inputs.model);
-        reduction_of((&inputs.model, belief, full.as_ref()), &merged, context)
+        reduction_of(
+            (&inputs.model, belief, full(&inputs.model).as_ref()),
+            &merged,
+            context,
+        )
     });
     // Where the motion hardly shows the heading, no filter of this kind is to be believed.
-    let yaw = FilterPass::new(&merged, belief).yaw_while_measured();
-    weak_heading(yaw.into_iter())
-        .iter()
-        .for_each(|doubt| context.warn(doubt));
+    context.warn_each(weak_heading(
+        FilterPass::new(&merged, belief)
+            .yaw_while_measured()
+            .into_iter(),
+    ));
     let experiment = scenario.experiment(
         &inputs.trajectory,
         inputs.truth(),
@@ -613,9 +644,10 @@ fn with_runs(
     // beside runs that were asked for alone it may be impossible
     let expected = possible.ok().and_then(|()| analysis.expected());
     if method != Method::MonteCarlo && expected.is_none() {
-        let message = "the covariance analysis did not stay finite and positive definite";
-        return Err(Failure::could_not(message)
-            .hint("do the models fit the IMU, are [imu] and [initial] plausible?"));
+        return Err(Failure::could_not(
+            "the covariance analysis did not stay finite and positive definite",
+        )
+        .hint("do the models fit the IMU, are [imu] and [initial] plausible?"));
     }
     let mut navigation = match (method, expected) {
         (
@@ -669,14 +701,14 @@ fn with_runs(
 /// Refuses what covariance analysis cannot do.
 fn possible(inputs: &NavigateInputs) -> Result<()> {
     match inputs.truth {
-        TrueImu::Recordings(_) => Err(Failure::input(
+        TrueImu::Recordings(_) => refused(
             "covariance analysis needs a model of what makes the errors; static recordings have none",
-        )
-        .hint("calibrate the recordings and give the model with --truth, or use --method monte-carlo")),
-        TrueImu::Drawn(_) => Err(Failure::input(
+            "calibrate the recordings and give the model with --truth, or use --method monte-carlo",
+        ),
+        TrueImu::Drawn(_) => refused(
             "covariance analysis is of one truth; --spread draws one for each run",
-        )
-        .hint("leave --spread out, or use --method monte-carlo")),
+            "leave --spread out, or use --method monte-carlo",
+        ),
         TrueImu::AsBelieved | TrueImu::Model(_) => Ok(()),
     }
 }
@@ -703,8 +735,7 @@ fn motion(recording: &Recording) -> Option<String> {
     let second = (recording.rate_hz.round() as usize).max(1);
     recording.signals.iter().find_map(|signal| {
         let limit = if signal.channel.sensor == Sensor::Accel { MOTION.0 } else { MOTION.1 };
-        let means = signal.samples.chunks_exact(second).map(|c| c.iter().sum::<f64>() / second as f64);
-        let (low, high) = means.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
+        let (low, high) = signal.samples.chunks_exact(second).map(|c| c.iter().sum::<f64>() / second as f64).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
         let message = format!(
             "{}: not static? The mean over a second of {} goes from {:.3} to {:.3} {}: motion becomes errors of the \
              IMU",
@@ -735,9 +766,11 @@ fn sampled(
     context.begin("runs", runs);
     let plan = Plan::new(experiment)?;
     let of_block = |first: u64| {
-        let count = block.min(runs - first);
-        let found = monte_carlo::run_range(&plan, first, count, &|| true, &|n| context.advance(n));
-        found.expect("nothing stops it").swap_remove(0)
+        monte_carlo::run_range(&plan, first, block.min(runs - first), &|| true, &|n| {
+            context.advance(n)
+        })
+        .expect("nothing stops it")
+        .swap_remove(0)
     };
     let mut result = of_block(0);
     for first in (block..runs).step_by(block as usize) {
@@ -795,7 +828,6 @@ impl Analysis<'_> {
 
 impl Navigation {
     /// The statistics of runs of a seed.
-    #[must_use]
     pub fn of_runs(result: RunResult, seed: u64) -> Self {
         let epochs = epochs(&result);
         let summary = Summary::of(&result, &epochs, seed);
@@ -809,7 +841,6 @@ impl Navigation {
 
 impl NavigateInputs {
     /// Along a trajectory, with models that are known for certain.
-    #[must_use]
     pub const fn new(trajectory: Trajectory, model: Model, truth: TrueImu) -> Self {
         Self {
             trajectory,
@@ -849,12 +880,12 @@ pub(crate) fn reduction_of(
     if model.axes.iter().all(is_exact) {
         return None;
     }
-    let full = full.map(|full| assess(track, full, model));
-    let quality = ReductionQuality::of(&assess(track, belief, model), full.as_ref());
+    let quality = ReductionQuality::of(
+        &assess(track, belief, model),
+        full.map(|full| assess(track, full, model)).as_ref(),
+    );
     context.remark(reduction_line(&quality));
-    reduction_doubt(&quality)
-        .iter()
-        .for_each(|doubt| context.warn(doubt));
+    context.warn_each(reduction_doubt(&quality));
     Some(quality)
 }
 
@@ -887,13 +918,15 @@ impl Analysis<'_> {
             ends.iter().map(|end| figures(&end.errors)).collect()
         };
         for (outage, interval) in outages.iter_mut().zip(intervals(truth, draws, &figures)) {
-            let rmse = outage.rmse_end.0;
-            let about = |i: usize, value: f64| (value * interval[i].0, value * interval[i].1);
-            outage.rmse_end_ci95 = Some(PerState(std::array::from_fn(|i| about(i, rmse[i]))));
             let h = &mut outage.horizontal_error_end_m;
-            let ends = |(low, high): (f64, f64)| (Some(low), Some(high));
-            h.p50_ci95 = ends(about(rmse.len(), h.p50));
-            h.p95_ci95 = ends(about(rmse.len() + 1, h.p95));
+            outage.rmse_end_ci95 = about(&outage.rmse_end.0, &interval)
+                .try_into()
+                .ok()
+                .map(PerState);
+            let ends = |value, (low, high)| (Some(value * low), Some(value * high));
+            if let [.., p50, p95] = interval[..] {
+                (h.p50_ci95, h.p95_ci95) = (ends(h.p50, p50), ends(h.p95, p95));
+            }
         }
     }
 
@@ -912,23 +945,32 @@ impl Analysis<'_> {
                 return Vec::new();
             };
             let filter = FilterPass::new(&track, &belief);
-            let means = filter.sigma_means(self.experiment.outages);
             filter
                 .sigma_at_ends()
                 .iter()
-                .zip(means)
+                .zip(filter.sigma_means(self.experiment.outages))
                 .map(|(end, mean)| [&end[..], &mean].concat())
                 .collect()
         };
         for (outage, interval) in outages.iter_mut().zip(intervals(model, draws, &figures)) {
-            let (end, mean) = (outage.asee_end.0, outage.asee_mean.0);
-            let about = |i: usize, value: f64| (value * interval[i].0, value * interval[i].1);
-            outage.asee_end_ci95 = Some(PerState(std::array::from_fn(|i| about(i, end[i]))));
-            let of_mean = PerState(std::array::from_fn(|i| about(end.len() + i, mean[i])));
+            let (end, mean) = interval.split_at(REPORTED);
+            let [end, mean] = [(&outage.asee_end, end), (&outage.asee_mean, mean)]
+                .map(|(asee, ratios)| about(&asee.0, ratios).try_into().ok().map(PerState));
+            outage.asee_end_ci95 = end;
             // An outage between two reports has no mean.
-            outage.asee_mean_ci95 = Some(of_mean).filter(|_| mean.iter().all(|x| x.is_finite()));
+            let has_mean = outage.asee_mean.0.iter().all(|x| x.is_finite());
+            outage.asee_mean_ci95 = mean.filter(|_| has_mean);
         }
     }
+}
+
+/// Intervals of values, by their ends over the values.
+fn about(values: &[f64], ratios: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    values
+        .iter()
+        .zip(ratios)
+        .map(|(value, (low, high))| (value * low, value * high))
+        .collect()
 }
 
 /// The ends of the interval that the draws give to each figure, over the estimate.
@@ -939,13 +981,21 @@ fn intervals(
 ) -> Vec<Vec<(f64, f64)>> {
     let drawn: Vec<Figures> = draws.models.par_iter().map(figures).collect();
     let of_figure = |k: usize, (i, x): (usize, &f64)| {
-        let all = drawn.iter().filter_map(|ends| Some(ends.get(k)?[i]));
-        let [low, high] = derived_interval(*x, all.collect(), draws.stretch);
+        let [low, high] = derived_interval(
+            *x,
+            drawn
+                .iter()
+                .filter_map(|ends| Some(ends.get(k)?[i]))
+                .collect(),
+            draws.stretch,
+        );
         (low / x, high / x)
     };
     let of_outage = |(k, own): (usize, &Vec<f64>)| {
-        let own = own.iter().enumerate();
-        own.map(|figure| of_figure(k, figure)).collect()
+        own.iter()
+            .enumerate()
+            .map(|figure| of_figure(k, figure))
+            .collect()
     };
     figures(estimate)
         .iter()

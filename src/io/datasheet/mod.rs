@@ -19,7 +19,7 @@
 //! other averaging time: errors after an outage come out up to two times too small.)
 
 use super::Failure;
-use super::model_file::{ModelFile, NOT_STATED, PROGRAM, SCHEMA, TurnOn};
+use super::model_file::{ModelFile, NOT_STATED, PROGRAM, SCHEMA, TurnOn, known};
 use super::toml_file::Source;
 use crate::report::readable;
 use nav_sim_signal::imu::{Channel, Sensor};
@@ -28,9 +28,10 @@ use nav_sim_signal::noise::{
 };
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 use serde::Deserialize;
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
-use toml::{Table, Value};
+use toml::Table;
 
 /// The correlation time that is assumed where none is given (s).
 const ASSUMED_CORRELATION_TIME_S: f64 = 300.0;
@@ -167,40 +168,29 @@ impl Datasheet {
     }
 
     fn provenance(&self, doubts: &[String]) -> Table {
-        let mut table = toml::toml! {
-            estimator = "datasheet"
-            label = "an assumption: figures of a datasheet, not a calibration"
-        };
-        let mut insert = |key: &str, value: Value| _ = table.insert(key.to_owned(), value);
-        insert("program", PROGRAM.into());
-        insert("schema", (SCHEMA as i64).into());
-        self.name
-            .iter()
-            .for_each(|name| insert("unit", name.clone().into()));
-        insert("assumptions", [&self.assumptions, doubts].concat().into());
-        let figures = self.entries.iter().map(Entry::provenance);
-        insert("figures", figures.collect::<Vec<_>>().into());
+        let figures: Vec<Table> = self.entries.iter().map(Entry::provenance).collect();
         let not_stated = self.not_stated();
-        if !not_stated.is_empty() {
-            insert(NOT_STATED, not_stated.into());
-        }
-        table
+        known(json!({
+            "estimator": "datasheet",
+            "label": "an assumption: figures of a datasheet, not a calibration",
+            "program": PROGRAM,
+            "schema": SCHEMA,
+            "unit": self.name,
+            "assumptions": ([&self.assumptions, doubts].concat()),
+            "figures": figures,
+            NOT_STATED: (!not_stated.is_empty()).then_some(not_stated),
+        }))
     }
 }
 
 impl Entry {
     fn provenance(&self) -> Table {
-        let figure = format!("{}.{}", self.sensor.name(), self.figure.name());
-        let texts = [
-            ("figure", Some(figure)),
-            ("given", Some(self.quantity.given.clone())),
-            ("source", self.source.clone()),
-            ("quote", self.quote.clone()),
-        ];
-        let texts = texts.into_iter();
-        texts
-            .filter_map(|(key, text)| Some((key.to_owned(), text?.into())))
-            .collect()
+        known(json!({
+            "figure": format!("{}.{}", self.sensor.name(), self.figure.name()),
+            "given": self.quantity.given,
+            "source": self.source,
+            "quote": self.quote,
+        }))
     }
 }
 

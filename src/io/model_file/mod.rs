@@ -376,6 +376,13 @@ pub(crate) fn schema() -> serde_json::Value {
 
 // Remarks of a calibration in the provenance of its model.
 
+/// What is known of a JSON object, as a table: TOML has no null.
+pub(crate) fn known(json: serde_json::Value) -> toml::Table {
+    let mut fields = json.as_object().cloned().unwrap_or_default();
+    fields.retain(|_, value| !value.is_null());
+    toml::Table::try_from(fields).expect("texts and numbers are always TOML")
+}
+
 /// Disagreement of a model with the recordings that it was fitted to, as its provenance has it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Misfit {
