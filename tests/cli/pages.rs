@@ -153,16 +153,14 @@ fn runs_and_their_comparison_have_pages_with_the_numbers_of_their_results() {
         "GNSS",
         "att_sigma_deg",
         "Reference trajectory",
-        "Percentiles of the horizontal",
+        "Horizontal position error",
         "NEES (9 if right)",
         "30–40 s",
     ] {
         assert!(page.contains(word), "{word}");
     }
     let svg = text(&dir.join("run.svg"));
-    assert!(
-        svg.contains("Horizontal position error") && svg.contains("Percentiles of the horizontal")
-    );
+    assert!(svg.contains("Horizontal position error") && svg.contains("NEES (9 if right)"));
     let ran = done(
         dir,
         "compare I_dr-awv --reference I_awv -o out/c.json --plot c.svg",
