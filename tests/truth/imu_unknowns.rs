@@ -310,7 +310,7 @@ fn what_the_filter_does_not_expect_is_warned_of() {
     assert!(!said.contains("the true"), "{said}");
     let refused = nav_sim(path, "run drive.toml imu.toml --filter 16 -o c");
     assert!(
-        refused.code == 2 && refused.stderr.contains("\"15\", \"21\" or \"full\""),
+        refused.code == 2 && refused.stderr.contains("\"16\" is not one of 15, 21, full"),
         "{}",
         refused.stderr
     );

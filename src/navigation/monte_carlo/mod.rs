@@ -1,7 +1,7 @@
 //! Monte Carlo: lane batches distributed over threads, reduced in run order.
 //!
 //! Batches of eight runs are handed out to any number of threads and added up in order, so that the result is the same
-//! to the last bit. Some eight a thread wait for their turn: memory does not grow with the number of runs, except for one
+//! to the last bit. At most 64 wait for their turn: memory does not grow with the number of runs, except for one
 //! small record per run.
 //!
 //! ```
@@ -65,9 +65,7 @@ pub fn run_range(
     let beliefs = plan.experiment().beliefs.iter();
     let mut results: Vec<RunResult> = beliefs.map(|b| empty(plan, b.states)).collect();
     let all: Vec<u64> = (0..runs).step_by(LANES).collect();
-    // Batches that wait to be added: memory is bounded, and no thread waits long for the last of them.
-    let together = (8 * rayon::current_num_threads()).max(64);
-    for together in all.chunks(together) {
+    for together in all.chunks(TOGETHER) {
         let batch = |done: &u64| {
             let live = (runs - done).min(LANES as u64);
             let computed = go_on().then(|| run_batch(plan, first + done, live as usize))?;
@@ -84,6 +82,9 @@ pub fn run_range(
     }
     Some(results)
 }
+
+/// Batches that wait to be added: memory is bounded, and no thread waits long for the last of them.
+const TOGETHER: usize = 64;
 
 fn empty(plan: &Plan<'_>, filter_states: usize) -> RunResult {
     let experiment = plan.experiment();
