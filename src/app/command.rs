@@ -499,6 +499,11 @@ impl<C: Command> Asked<C> {
         let inputs = || manifest.inputs.iter().map(|input| Path::new(&input.path));
         let mut claims = Claims::default();
         claims.note_missing(self.out.iter().chain(&self.plots));
+        let writes_models = matches!(C::NAME, "calibrate" | "datasheet" | "require" | "tune");
+        let outputs = self.out.iter().chain(&self.plots);
+        for path in outputs.filter(|_| !writes_models) {
+            atomic::guard_model(path)?;
+        }
         match (C::OUT, &self.out) {
             (Out::Directory { .. }, Some(out)) => {
                 let names = self.request.output_names();

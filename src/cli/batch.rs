@@ -62,6 +62,9 @@ pub(crate) fn run(args: &Args, mut session: Session) -> Result<(), Failure> {
             session.result(json!({ "schema_version": 1, "complete": false, "missing": missing }));
         }
         Outcome::Partial(_) => session.say("own share done"),
+        Outcome::Estimate(text) if session.is_json() => {
+            session.result(json!({ "schema_version": 1, "estimate": text }));
+        }
         Outcome::Estimate(text) => session.result(text),
         Outcome::Stopped { .. } => {}
     }

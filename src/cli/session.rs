@@ -22,7 +22,7 @@ pub(crate) struct Common {
     /// Worker threads, at most 1024 (default: one per core)
     #[arg(long, short = 'j', global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
-    /// Print verdict and table only, no notes
+    /// Print verdict, table and warnings only, no remarks or progress
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
     /// Print more
@@ -154,7 +154,8 @@ impl Session {
 impl Front for Session {
     fn note(&self, Note { importance, text }: Note) {
         match importance {
-            Importance::Warning if !self.common.quiet => {
+            // those of the commands of a demo are for --verbose, as their remarks are
+            Importance::Warning if !self.is_muted || self.common.verbose => {
                 let warning = self.painted("warning:", "1;33", &text);
                 let _ = writeln!(std::io::stderr(), "{warning}");
             }

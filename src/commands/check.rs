@@ -81,7 +81,11 @@ impl Command for CheckFiles {
             0 => None,
             1 if files.len() == 1 => failures.pop(),
             wrong => {
-                context.warn_each(&failures);
+                context.warn_each(failures.iter().map(|failure| {
+                    let own = failure.clone().for_options(|option| option == "rate-hz");
+                    let hint = own.advice().map(|advice| format!("; {advice}"));
+                    format!("{failure}{}", hint.unwrap_or_default())
+                }));
                 let message = format!("{wrong} of {} files are refused", files.len());
                 Some(if failures.iter().any(|failure| failure.code() == 1) {
                     Failure::could_not(message)

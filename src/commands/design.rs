@@ -43,7 +43,8 @@ pub struct Design {
     /// Length of each in hours [default: a table of 1, 3 and 10]
     #[arg(long, value_name = "HOURS", value_parser = parse::positive)]
     hours: Option<f64>,
-    /// How they will be calibrated
+    /// How they will be calibrated: awv averages classical wavelet variances; sr-awv robust ones, against outliers; dr-awv
+    /// also trims them, against abnormal recordings
     #[arg(long, value_name = "ESTIMATOR", value_parser = parse::one_of::<Estimator>(AVERAGES), default_value_t)]
     estimator: Estimator,
     /// Draws of the bootstrap

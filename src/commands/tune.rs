@@ -58,7 +58,8 @@ pub struct Tune {
     /// Meaning of consistent: worst, no error of any truth exceeds what the filter states; mean, the NEES is right on average
     #[arg(id = "for", long = "for", value_name = "AIM", value_parser = parse::one_of::<Aim>(&Aim::NAMES), default_value_t)]
     aim: Aim,
-    /// Filter to tune: full, 15 or 21 (these take longer); the filter that `run` makes by default is assessed too
+    /// Filter to tune: full (a bias state for each process), 15 (one bias per axis) or 21 (and a scale factor per axis);
+    /// these two take longer; the filter that `run` makes by default is assessed too
     #[arg(long, value_name = "STATES", default_value = "full")]
     filter: FilterStates,
 }

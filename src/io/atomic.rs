@@ -448,6 +448,17 @@ pub(crate) fn claim_file<'a>(
     Ok(claim)
 }
 
+/// Refuses a noise model of nav-sim: a result of another kind must not take its place.
+///
+/// # Errors
+/// When it is one.
+pub(crate) fn guard_model(path: &Path) -> Result<(), Failure> {
+    match source::head(path).is_ok_and(|text| text.contains(MARKS[0])) {
+        true => Err(foreign(path)),
+        false => Ok(()),
+    }
+}
+
 fn foreign(path: &Path) -> Failure {
     let error = refused(path, "is not of this command: it is not replaced");
     error.or_hint(help::OUTPUT).or_hint("move it away")

@@ -59,7 +59,7 @@ pub struct RunSettings {
     /// Monte-Carlo runs.
     #[schemars(range(min = 1, max = MAX_RUNS))]
     pub runs: u64,
-    /// Seed of all random numbers; without it one is drawn and recorded.
+    /// Seed of all random numbers; without it 1.
     pub seed: Option<u64>,
     /// How the statistics are found.
     pub method: Method,

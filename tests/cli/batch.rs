@@ -226,7 +226,12 @@ fn bad_studies_are_refused_before_anything_is_written() {
             "cell length_s=2_imu: run: there is no option rns",
             "did you mean runs?",
         ),
-        ("[vary]\n", "[varies]\n", "study.toml", "varies"),
+        (
+            "[vary]\n",
+            "[varies]\n",
+            "study.toml, line 8: unknown key \"varies\"",
+            "legal here: run, vary, reference",
+        ),
         (
             "[2, 4, 8, 16]",
             "[]",

@@ -306,6 +306,16 @@ fn negative_values_are_refused_in_the_words_of_their_option() {
     }
 }
 
+/// Advice on an unknown option that cannot be followed is left out.
+#[test]
+fn an_unknown_option_is_refused() {
+    let words = ["run", "a.toml", "b.toml", "--gains", "own"];
+    let output = nav_sim().args(words).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert_eq!(said, "error: unexpected argument --gains found\n");
+}
+
 /// Commands that only write files tell them in JSON too.
 #[test]
 fn json_is_spoken_by_commands_that_write_files() {

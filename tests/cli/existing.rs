@@ -17,6 +17,21 @@ fn refused(ran: &Ran, what: &str) {
     );
 }
 
+/// The answer of another kind takes no model's place, with `--force` neither.
+#[test]
+fn a_model_is_replaced_by_models_only() {
+    let place = place_with(DRIVE, MODEL);
+    done(place.path(), "datasheet --unit stim300 -o model.toml");
+    let convert = "trajectory convert drive.toml -o model.toml --force";
+    let ran = plain(place.path(), convert);
+    assert!(
+        ran.code == 2 && ran.stderr.contains("model.toml is not of this command"),
+        "{}",
+        ran.stderr
+    );
+    done(place.path(), "datasheet --unit adis16448 -o model.toml");
+}
+
 /// Each command twice, then as it makes something else.
 #[test]
 fn files_take_the_place_of_results_and_directories_that_of_the_same_run() {

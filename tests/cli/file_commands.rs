@@ -41,6 +41,12 @@ fn check_looks_at_every_file() {
     );
     assert!(said.contains("2 of 3 files are refused"), "{said}");
     assert!(out.contains("tactical.toml: a noise model"), "{out}");
+    // warnings stay with --quiet, and have their hints
+    let (_, _, said) = check(&["timeless.csv", "bad.toml", "--quiet"]);
+    assert!(
+        said.contains("warning: timeless.csv: ") && said.contains("; give the rate with --rate-hz"),
+        "{said}"
+    );
     assert!(
         check(&["timeless.csv"])
             .2

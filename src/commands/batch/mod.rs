@@ -13,6 +13,7 @@ use crate::app::{
     is_path, is_repeated, refused,
 };
 use crate::commands::run::{PreparedRun, Run, block_of, columns};
+use crate::io::toml_file::Source;
 use crate::io::{atomic, input, source};
 use crate::report::in_order;
 use clap::Args;
@@ -373,14 +374,17 @@ pub(crate) struct Cell {
 impl Study {
     /// Reads a study; `set` are keys of `[run]` over its own, as `KEY=VALUE`.
     pub(crate) fn read(path: &Path, set: &[String]) -> Result<Self> {
-        let text = source::text(path).map_err(|e| crate::io::Failure::io(path, e))?;
         let mut study: Self = if path.extension().is_some_and(|ending| ending == "json") {
+            let text = source::text(path).map_err(|e| Failure::io(path, e))?;
             serde_json::from_str(&text).refuse_within(path.display())?
         } else {
-            toml::from_str(&text).refuse_within(path.display())?
+            Source::read(path)?.get()?
         };
         for assignment in set {
-            let (key, value) = assignment.split_once('=').unwrap_or((assignment, ""));
+            let Some((key, value)) = assignment.split_once('=') else {
+                let message = format!("--set='{assignment}': expected KEY=VALUE, such as runs=8");
+                return Err(Failure::input(message));
+            };
             // a word without quotes is a text
             let parsed = format!("{key} = {value}").parse::<Table>();
             let quoted = || format!("{key} = {}", Value::from(value)).parse::<Table>();

@@ -61,13 +61,15 @@ pub struct Choose {
     /// Outages, receiver, start, what filters expect.
     #[command(flatten)]
     settings: SettingsArgs,
-    /// Estimators to compare [default: awv, sr-awv, dr-awv and, for comparison, gmwm and avlr of single recordings]
+    /// Estimators to compare, as `calibrate --estimator` describes them [default: awv, sr-awv, dr-awv and, for comparison,
+    /// gmwm and avlr of single recordings]
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = parse::one_of::<Estimator>(EACH))]
     estimator: Vec<Estimator>,
     /// Models to compare, such as N2,N1,WN+RW,auto [default: N2, and WN+RW with awv]
     #[arg(long, value_name = "MODELS", value_delimiter = ',')]
     model: Vec<String>,
-    /// Filters to compare: 15, 21, full [default: 15, and full with awv]
+    /// Filters to compare: 15 (one bias per axis), 21 (and a scale factor per axis), full (a bias state for each process)
+    /// [default: 15, and full with awv]
     #[arg(long, value_name = "STATES", value_delimiter = ',')]
     filter: Vec<FilterStates>,
     /// How models are inflated: none, tuned (consistent in the mean for the models of the single recordings), x10 (ten
