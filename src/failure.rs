@@ -134,7 +134,9 @@ impl Failure {
         let text = text.strip_prefix("error: ").unwrap_or(&text);
         let mut paragraphs = text.split("\n\n").map(str::trim);
         let message = paragraphs.next().unwrap_or_default();
-        let tip = paragraphs.find_map(|p| p.strip_prefix("tip: "));
+        let tip = paragraphs
+            .find_map(|p| p.strip_prefix("tip: "))
+            .filter(|tip| !tip.starts_with("to pass"));
         let said = |kind| e.get(kind).map(ToString::to_string);
         let known = || {
             let values = e.get(ContextKind::ValidValue);

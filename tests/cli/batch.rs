@@ -253,6 +253,13 @@ fn bad_studies_are_refused_before_anything_is_written() {
         ),
         ("seed = 5", "seed = 5\ngnss.rate = 5", "rate", "gnss"),
         (
+            "seed = 5",
+            "seed = 5\ngnss.rate_hz = [1, nan]",
+            "cell length_s=2_imu_rate_hz=nan",
+            "\"run.gnss\" = { rate_hz = nan } is not finite",
+        ),
+        ("seed = 5", "seed = ", "study.toml, line ", "column "),
+        (
             "wrong = {",
             "IMU = {",
             "two cells have the name length_s=2_IMU",

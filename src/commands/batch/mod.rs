@@ -13,6 +13,7 @@ use crate::app::{
     is_path, is_repeated, refused,
 };
 use crate::commands::run::{PreparedRun, Run, block_of, columns};
+use crate::io::toml_file::Source;
 use crate::io::{atomic, input, source};
 use crate::report::in_order;
 use clap::Args;
@@ -21,7 +22,7 @@ use nav_sim_document::{Importance, Note};
 use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::simulation::RunResult;
 use rayon::prelude::*;
-use results::{first_of, withdraw};
+use results::{first_of, guard, withdraw};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Map;
@@ -137,6 +138,7 @@ impl BatchRequest {
             answer.write(&place)?;
             Ok(Outcome::Merged(Box::new(answer)))
         };
+        guard(&place)?;
         if self.merge {
             return merged();
         }
@@ -373,11 +375,11 @@ pub(crate) struct Cell {
 impl Study {
     /// Reads a study; `set` are keys of `[run]` over its own, as `KEY=VALUE`.
     pub(crate) fn read(path: &Path, set: &[String]) -> Result<Self> {
-        let text = source::text(path).map_err(|e| crate::io::Failure::io(path, e))?;
         let mut study: Self = if path.extension().is_some_and(|ending| ending == "json") {
+            let text = source::text(path).map_err(|e| crate::io::Failure::io(path, e))?;
             serde_json::from_str(&text).refuse_within(path.display())?
         } else {
-            toml::from_str(&text).refuse_within(path.display())?
+            Source::read(path)?.get()?
         };
         for assignment in set {
             let (key, value) = assignment.split_once('=').unwrap_or((assignment, ""));
@@ -457,10 +459,12 @@ impl Study {
                     .map(|(_, label)| label.as_str()),
             );
             if !known.contains(&label.as_str()) {
-                return refused(
-                    format!("\"reference.{axis}\" = \"{label}\" is no label of an axis"),
-                    format!("labels: {}", known.join(", ")),
-                );
+                let message = format!("\"reference.{axis}\" = \"{label}\" is no label of an axis");
+                let hint = match known.is_empty() {
+                    true => format!("there is no axis {axis}"),
+                    false => format!("labels: {}", known.join(", ")),
+                };
+                return refused(message, hint);
             }
         }
         Ok(())
@@ -716,9 +720,23 @@ fn nested(path: &str, value: Value) -> Table {
 }
 
 fn named_request(run: &Table) -> Result<Map<String, serde_json::Value>> {
+    // in JSON it would be null: not given
+    if let Some((key, value)) = run.iter().find(|(_, value)| !is_finite(value)) {
+        let message = format!("\"run.{key}\" = {value} is not finite");
+        return Err(Failure::input(message));
+    }
     serde_json::to_value(run)
         .and_then(serde_json::from_value)
         .refuse_within("[run]")
+}
+
+fn is_finite(value: &Value) -> bool {
+    match value {
+        Value::Float(x) => x.is_finite(),
+        Value::Array(list) => list.iter().all(is_finite),
+        Value::Table(table) => table.values().all(is_finite),
+        _ => true,
+    }
 }
 
 fn plus(labels: &Labels, axis: &str, label: &str) -> Labels {
