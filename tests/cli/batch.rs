@@ -315,6 +315,10 @@ fn lists_are_axes_where_a_run_takes_none() {
 fn without_sampling() {
     let place = place();
     let dir = place.path();
+    let dry = "batch study.toml -o out --set method=lincov --dry-run";
+    let said = command(dir, dry).output().unwrap();
+    // what takes no runs has no time of runs
+    assert!(said.status.success() && !String::from_utf8_lossy(&said.stdout).contains("time"));
     ended(dir, "batch study.toml -o out --set method=lincov", 0);
     ended(
         dir,

@@ -271,7 +271,7 @@ fn difference(there: &Manifest, wanted: &Manifest) -> String {
     }
 }
 
-/// Cells, passes, what is done, the processor time of the rest from eight timed runs, and its size.
+/// Cells, passes, what is done, and the processor time of the runs that are left, from eight of them.
 fn estimate(
     cells: &[Cell],
     units: &[Unit<'_>],
@@ -287,6 +287,12 @@ fn estimate(
         cells.len(),
         cells.len() - done
     );
+    // analyses are not timed
+    let sampled = |unit: &&&Unit<'_>| {
+        let scenario = unit.cells[0].asked.request.scenario();
+        scenario.is_ok_and(|scenario| scenario.run.method != Method::Lincov)
+    };
+    let left: Vec<_> = left.iter().filter(sampled).collect();
     if let Some(unit) = left.first() {
         let cell = unit.cells[0];
         let quiet = Context::new(&(), Some(cell.seed));
