@@ -64,9 +64,9 @@ impl Source {
             let kind = e.kind();
             let error = Failure::io(path, e);
             match kind {
-                ErrorKind::NotFound => error
-                    .or_hint("check the path")
-                    .or_hint("start from the files that nav-sim init makes"),
+                ErrorKind::NotFound => {
+                    error.or_hint("start from the files that nav-sim init makes")
+                }
                 ErrorKind::InvalidData => error.or_hint("a TOML file is text in UTF-8"),
                 _ => error,
             }
