@@ -499,11 +499,6 @@ impl<C: Command> Asked<C> {
         let inputs = || manifest.inputs.iter().map(|input| Path::new(&input.path));
         let mut claims = Claims::default();
         claims.note_missing(self.out.iter().chain(&self.plots));
-        let writes_models = matches!(C::NAME, "calibrate" | "datasheet" | "require" | "tune");
-        let outputs = self.out.iter().chain(&self.plots);
-        for path in outputs.filter(|_| !writes_models) {
-            atomic::guard_model(path)?;
-        }
         match (C::OUT, &self.out) {
             (Out::Directory { .. }, Some(out)) => {
                 let names = self.request.output_names();
@@ -526,16 +521,17 @@ impl<C: Command> Asked<C> {
                 let claim = claim_directory(out, &names, inputs(), force, recognise)?;
                 claims.own.push(claim);
             }
-            (Out::File { .. }, Some(out)) => {
+            (Out::File { name, .. }, Some(out)) => {
                 self.request.check_out()?;
                 let endings = self.request.endings();
                 let is_new = !out.exists() && !out.to_string_lossy().ends_with('/');
                 if endings.len() > 1 && (!is_new && !out.is_file() || out.as_os_str() == "-") {
                     let failure = Failure::input(format!("{} is not a file", out.display()));
-                    return Err(failure.hint("name a file, such as model.toml"));
+                    return Err(failure.hint(format!("name a file, such as {name}")));
                 }
                 for ending in endings {
-                    let claim = claim_file(&beside(out, &ending), inputs())?;
+                    let kind = if ending.is_empty() { name } else { &ending };
+                    let claim = claim_file(&beside(out, &ending), kind, inputs())?;
                     claims.own.push(claim);
                 }
             }
@@ -545,7 +541,8 @@ impl<C: Command> Asked<C> {
             if !is_page(path) {
                 form(path)?;
             }
-            claims.own.push(claim_file(path, inputs())?);
+            let kind = path.to_string_lossy().to_lowercase();
+            claims.own.push(claim_file(path, &kind, inputs())?);
         }
         Ok(claims)
     }
@@ -570,7 +567,8 @@ impl<C: Command> Asked<C> {
                 directory.commit()?;
                 // files of an earlier result that this one does not have
                 for old in before.iter().flat_map(|before| before.outputs.keys()) {
-                    if !manifest.outputs.contains_key(old) {
+                    let is_within = Path::new(old).file_name() == Some(OsStr::new(old));
+                    if is_within && !manifest.outputs.contains_key(old) {
                         drop(std::fs::remove_file(out.join(old)));
                     }
                 }

@@ -61,7 +61,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let force = session.common.force;
     let page = out.join("report.html");
-    let _page = atomic::claim_file(&page, [])?;
+    let _page = atomic::claim_file(&page, ".html", [])?;
     let there = std::fs::read_to_string(&study).unwrap_or_else(|_| text.clone());
     if there != text && !(force && there.starts_with(HEAD)) {
         let message = format!("{} is of another demo, or of others", study.display());

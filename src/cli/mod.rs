@@ -162,8 +162,11 @@ fn end(e: &clap::Error) -> ! {
     if !e.use_stderr() || e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         e.exit();
     }
-    let is_incomplete = e.kind() == ErrorKind::MissingRequiredArgument;
-    let help = is_incomplete.then(|| "--help shows usage and examples".to_owned());
+    let is_lost = matches!(
+        e.kind(),
+        ErrorKind::MissingRequiredArgument | ErrorKind::UnknownArgument
+    );
+    let help = is_lost.then(|| "--help shows usage and examples".to_owned());
     let failure = Failure::usage(e).or_hint_if(help);
     Session::default().failure(&failure);
     std::process::exit(failure.code().into())

@@ -422,12 +422,14 @@ fn resolved(path: &Path) -> PathBuf {
     own.unwrap_or_else(|| path.to_owned())
 }
 
-/// Claims a file that can be made, is none of the inputs, and replaces nothing but a file of nav-sim. A device is everybody's.
+/// Claims a file that can be made, is none of the inputs, and replaces nothing but a result of its kind, which the ending
+/// of `kind` tells. A device is everybody's.
 ///
 /// # Errors
-/// When it is an input, cannot be made, another command writes it, or nav-sim did not write what stands there.
+/// When it is an input, cannot be made, another command writes it, or what stands there is no such result.
 pub(crate) fn claim_file<'a>(
     output: &Path,
+    kind: &str,
     inputs: impl IntoIterator<Item = &'a Path>,
 ) -> Result<Claim, Failure> {
     guard_inputs(output, inputs)?;
@@ -442,20 +444,19 @@ pub(crate) fn claim_file<'a>(
     let output_at = resolved(output);
     let claim = Claim::new(output, &marker_beside(&output_at), vec![output_at.clone()])?;
     remove_abandoned(&output_at);
-    if output.exists() && !source::head(output).is_ok_and(|text| is_own(&text)) {
-        return Err(foreign(output));
-    }
+    guard_others(output, kind)?;
     Ok(claim)
 }
 
-/// Refuses a noise model of nav-sim: a result of another kind must not take its place.
+/// Refuses an output where what stands there is no result of its kind on its own.
 ///
 /// # Errors
-/// When it is one.
-pub(crate) fn guard_model(path: &Path) -> Result<(), Failure> {
-    match source::head(path).is_ok_and(|text| text.contains(MARKS[0])) {
-        true => Err(foreign(path)),
-        false => Ok(()),
+/// What is not replaced.
+pub(crate) fn guard_others(output: &Path, kind: &str) -> Result<(), Failure> {
+    let is_own = |text: String| is_own(&text, kind) && !is_part(&resolved(output));
+    match !output.exists() || source::head(output).is_ok_and(is_own) {
+        true => Ok(()),
+        false => Err(foreign(output)),
     }
 }
 
@@ -530,32 +531,58 @@ fn empty_or_new(directory: &Path) -> Found {
     }
 }
 
-/// Texts that tell files of nav-sim: models, exports, pages, figures, pictures.
-const MARKS: [&str; 5] = [
-    "program = \"nav-sim ",
-    "(nav-sim export)",
-    "<meta name=\"generator\" content=\"nav-sim\">",
-    "class=\"chart wide\"",
-    "Software\0nav-sim",
+/// Texts that tell files of nav-sim, by the ending of their kind: models, exports, pages, pictures, studies.
+const MARKS: [(&str, &str); 6] = [
+    (".toml", "program = \"nav-sim "),
+    (".txt", "(nav-sim export)"),
+    (".html", "<meta name=\"generator\" content=\"nav-sim\">"),
+    (".svg", "class=\"chart wide\""),
+    (".png", "Software\0nav-sim"),
+    (
+        "results.csv",
+        ",method,filter,runs,diverged,outage,start_s,end_s,",
+    ),
 ];
-const JSON: [&str; 2] = ["{\n  \"schema_version\"", "{\"schema_version\""];
+/// How studies, comparisons and curves begin, without blanks.
+const JSON: [(&str, &str); 3] = [
+    ("summary.json", "{\"schema_version\":1,\"complete\""),
+    ("comparison.json", "{\"schema_version\":1,\"reference\""),
+    (".json", "{\"schema_version\":1,\"rate_hz\""),
+];
 const TRAJECTORY: &str =
     "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n";
 
-/// True of a text that nav-sim wrote, and of an empty one. Other programs write tables with the same header, but not each
-/// number in its shortest form.
-fn is_own(text: &str) -> bool {
+/// True of a text of this kind that nav-sim wrote, and of an empty one. Other programs write tables with the same header,
+/// but not each number in its shortest form.
+fn is_own(text: &str, kind: &str) -> bool {
     let is_shortest = |cell: &str| cell.parse::<f64>().is_ok_and(|x| x.to_string() == cell);
     let mut rows = text
         .strip_prefix(TRAJECTORY)
+        .filter(|_| kind.ends_with("trajectory.csv"))
         .into_iter()
         .flat_map(str::lines);
+    let is_kind = |(ending, _): &&(&str, &str)| kind.ends_with(ending);
+    let start: String = text.split_whitespace().take(4).collect();
     text.is_empty()
-        || JSON.iter().any(|start| text.starts_with(start))
-        || MARKS.iter().any(|mark| text.contains(mark))
+        || JSON
+            .iter()
+            .find(is_kind)
+            .is_some_and(|(_, json)| start.starts_with(json))
+        || MARKS
+            .iter()
+            .find(is_kind)
+            .is_some_and(|(_, mark)| text.contains(mark))
         || rows
             .next()
             .is_some_and(|row| row.split(',').all(is_shortest))
+}
+
+/// True of a file that a manifest beside it tells of: the result would no longer be whole.
+fn is_part(path: &Path) -> bool {
+    let manifest = fs::read_to_string(path.with_file_name("manifest.json")).unwrap_or_default();
+    let name = name_of(path);
+    manifest.contains("\"schema_version\"")
+        && (name == "report.html" || manifest.contains(&format!("\"{name}\": \"")))
 }
 
 /// What stands in a directory of results, told by its last file, which appears when the others are whole.

@@ -31,7 +31,7 @@ fn what_killed_writers_left_goes_with_the_next_claim() {
     fs::create_dir(dir.path().join(".run.12345-7.partial")).unwrap();
     fs::write(dir.path().join(".a.csv.mine.partial"), "other").unwrap();
     let claims = (
-        claim_file(&path, []).unwrap(),
+        claim_file(&path, ".csv", []).unwrap(),
         claim_directory(
             &dir.path().join("run"),
             &["b.csv"],
@@ -211,8 +211,8 @@ fn a_claim_ends_with_its_holder() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("model.toml");
     fs::write(dir.path().join(".model.toml.claim"), "").unwrap();
-    let claim = claim_file(&path, []).unwrap();
-    let again = claim_file(&path, []).unwrap_err();
+    let claim = claim_file(&path, ".csv", []).unwrap();
+    let again = claim_file(&path, ".csv", []).unwrap_err();
     assert!(
         again
             .to_string()
@@ -221,7 +221,7 @@ fn a_claim_ends_with_its_holder() {
     );
     drop(claim);
     assert!(listing(dir.path()).is_empty());
-    drop(claim_file(&path, []).unwrap());
+    drop(claim_file(&path, ".csv", []).unwrap());
 }
 
 /// Where the system makes no file (of its own file systems, /proc): told so, with a remedy.

@@ -258,6 +258,13 @@ fn bad_studies_are_refused_before_anything_is_written() {
         ),
         ("seed = 5", "seed = 5\ngnss.rate = 5", "rate", "gnss"),
         (
+            "seed = 5",
+            "seed = 5\ngnss.rate_hz = [1, nan]",
+            "cell length_s=2_imu_rate_hz=nan",
+            "\"run.gnss\" = { rate_hz = nan } is not finite",
+        ),
+        ("seed = 5", "seed = ", "study.toml, line ", "column "),
+        (
             "wrong = {",
             "IMU = {",
             "two cells have the name length_s=2_IMU",
@@ -313,6 +320,10 @@ fn lists_are_axes_where_a_run_takes_none() {
 fn without_sampling() {
     let place = place();
     let dir = place.path();
+    let dry = "batch study.toml -o out --set method=lincov --dry-run";
+    let said = command(dir, dry).output().unwrap();
+    // what takes no runs has no time of runs
+    assert!(said.status.success() && !String::from_utf8_lossy(&said.stdout).contains("time"));
     ended(dir, "batch study.toml -o out --set method=lincov", 0);
     ended(
         dir,

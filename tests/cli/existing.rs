@@ -280,6 +280,57 @@ fn what_nav_sim_did_not_write_is_never_replaced() {
     done(place.path(), &format!("{calibrate} m.toml"));
 }
 
+/// A model, a page, curves or a trajectory do not give way to what is no such thing, nor does a part of a directory.
+#[test]
+fn results_of_another_kind_are_not_replaced() {
+    let place = place_with(DRIVE, MODEL);
+    let dir = place.path();
+    done(dir, "synthesize imu.toml --samples 4096 --seed 1 -o rec");
+    let run = "run drive.toml imu.toml --method lincov --outage none";
+    done(dir, &format!("{run} -o run"));
+    done(dir, "datasheet --unit stim300 -o m.toml");
+    done(dir, "trajectory convert drive.toml --rate-hz 1 -o d.csv");
+    done(dir, "wv rec -o wv.json");
+    let study = "[run]\ntrajectory = \"drive.toml\"\nmodel = \"imu.toml\"\nmethod = \"lincov\"\n";
+    fs::write(dir.join("study.toml"), study).unwrap();
+    for (command, file) in [
+        ("wv rec -o m.toml", "m.toml"),
+        ("export imu.toml --target kalibr -o m.toml", "m.toml"),
+        ("trajectory convert drive.toml -o m.toml", "m.toml"),
+        ("datasheet --unit stim300 -o d.csv", "d.csv"),
+        ("wv rec -o run/summary.json", "run/summary.json"),
+        ("wv rec --plot run/report.html", "run/report.html"),
+        ("compare run --reference run -o wv.json", "wv.json"),
+        ("batch study.toml -o run", "run/summary.json"),
+        ("batch study.toml -o rec", "rec/manifest.json"),
+    ] {
+        let before = fs::read(dir.join(file)).unwrap();
+        let ran = plain(dir, &format!("{command} --force"));
+        let told = format!("{file} is not of this command: it is not replaced");
+        assert_eq!(ran.code, 2, "{command}: {}", ran.stderr);
+        assert!(ran.stderr.contains(&told), "{command}: {}", ran.stderr);
+        assert!(fs::read(dir.join(file)).unwrap() == before, "{command}");
+    }
+}
+
+/// Where a manifest names files elsewhere, they stay.
+#[test]
+fn a_manifest_removes_nothing_outside_its_directory() {
+    let place = place_with(DRIVE, MODEL);
+    let at = |name: &str| place.path().join(name);
+    let run = "run drive.toml imu.toml --method lincov -o run --outage";
+    done(place.path(), &format!("{run} none"));
+    let text = fs::read_to_string(at("run/manifest.json")).unwrap();
+    let text = text.replace(
+        "\"outputs\": {",
+        "\"outputs\": {\n    \"../kept.txt\": \"\",",
+    );
+    fs::write(at("run/manifest.json"), text).unwrap();
+    fs::write(at("kept.txt"), "mine").unwrap();
+    done(place.path(), &format!("{run} 5:10"));
+    assert_eq!(fs::read_to_string(at("kept.txt")).unwrap(), "mine");
+}
+
 /// The default name has the newest, and what stands beside it is of the newest.
 #[test]
 fn a_second_calibration_takes_the_place_of_the_first() {

@@ -22,7 +22,7 @@ use nav_sim_document::{Importance, Note};
 use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::simulation::RunResult;
 use rayon::prelude::*;
-use results::{first_of, withdraw};
+use results::{first_of, guard, withdraw};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Map;
@@ -138,6 +138,7 @@ impl BatchRequest {
             answer.write(&place)?;
             Ok(Outcome::Merged(Box::new(answer)))
         };
+        guard(&place)?;
         if self.merge {
             return merged();
         }
@@ -270,7 +271,7 @@ fn difference(there: &Manifest, wanted: &Manifest) -> String {
     }
 }
 
-/// Cells, passes, what is done, the processor time of the rest from eight timed runs, and its size.
+/// Cells, passes, what is done, and the processor time of the runs that are left, from eight of them.
 fn estimate(
     cells: &[Cell],
     units: &[Unit<'_>],
@@ -286,6 +287,12 @@ fn estimate(
         cells.len(),
         cells.len() - done
     );
+    // analyses are not timed
+    let sampled = |unit: &&&Unit<'_>| {
+        let scenario = unit.cells[0].asked.request.scenario();
+        scenario.is_ok_and(|scenario| scenario.run.method != Method::Lincov)
+    };
+    let left: Vec<_> = left.iter().filter(sampled).collect();
     if let Some(unit) = left.first() {
         let cell = unit.cells[0];
         let quiet = Context::new(&(), Some(cell.seed));
@@ -461,10 +468,12 @@ impl Study {
                     .map(|(_, label)| label.as_str()),
             );
             if !known.contains(&label.as_str()) {
-                return refused(
-                    format!("\"reference.{axis}\" = \"{label}\" is no label of an axis"),
-                    format!("labels: {}", known.join(", ")),
-                );
+                let message = format!("\"reference.{axis}\" = \"{label}\" is no label of an axis");
+                let hint = match known.is_empty() {
+                    true => format!("there is no axis {axis}"),
+                    false => format!("labels: {}", known.join(", ")),
+                };
+                return refused(message, hint);
             }
         }
         Ok(())
@@ -720,9 +729,23 @@ fn nested(path: &str, value: Value) -> Table {
 }
 
 fn named_request(run: &Table) -> Result<Map<String, serde_json::Value>> {
+    // in JSON it would be null: not given
+    if let Some((key, value)) = run.iter().find(|(_, value)| !is_finite(value)) {
+        let message = format!("\"run.{key}\" = {value} is not finite");
+        return Err(Failure::input(message));
+    }
     serde_json::to_value(run)
         .and_then(serde_json::from_value)
         .refuse_within("[run]")
+}
+
+fn is_finite(value: &Value) -> bool {
+    match value {
+        Value::Float(x) => x.is_finite(),
+        Value::Array(list) => list.iter().all(is_finite),
+        Value::Table(table) => table.values().all(is_finite),
+        _ => true,
+    }
 }
 
 fn plus(labels: &Labels, axis: &str, label: &str) -> Labels {

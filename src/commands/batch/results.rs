@@ -4,7 +4,7 @@ use super::{Cell, Labels, Place, Study};
 use crate::app::{Answer, Context, Failure, Result};
 use crate::commands::compare::{Comparison, between};
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
-use crate::io::atomic::AtomicDir;
+use crate::io::atomic::{AtomicDir, guard_others};
 use crate::report::csv::{csv, flat};
 use crate::report::json;
 use crate::report::verdict::{tone, verdict_counts};
@@ -237,6 +237,15 @@ impl StudyAnswer {
         }
         files.commit()
     }
+}
+
+/// Refuses a directory of another command, and one where files of others have the names of results.
+///
+/// # Errors
+/// The file that would be lost.
+pub(super) fn guard(place: &Place<'_>) -> Result<()> {
+    let mut files = FILES.iter().chain(&["manifest.json"]);
+    files.try_for_each(|name| guard_others(&place.0.join(name), name))
 }
 
 /// Removes results of before, where a cell is missing.

@@ -384,7 +384,6 @@ impl FromStr for StartChoice {
 impl From<FusionError> for Failure {
     fn from(e: FusionError) -> Self {
         let hint = match &e {
-            FusionError::Clocks { .. } => e.delay_s().map(|s| format!("--gnss-delay {s}")),
             FusionError::Start { .. } => {
                 Some("give t_s of the initial state on the clock of the IMU".to_owned())
             }
@@ -723,11 +722,13 @@ impl Drive {
         let Err(apart) = check_clocks(&recorded) else {
             return Ok(None);
         };
-        let is_free = self.request.gnss_delay_s == 0.0;
-        let origin_s = is_free
-            .then(|| rough_origin(&recorded))
-            .flatten()
-            .ok_or(apart)?;
+        let given_s = self.request.gnss_delay_s;
+        let found = (given_s == 0.0).then(|| rough_origin(&recorded)).flatten();
+        let origin_s = found.ok_or_else(|| {
+            let more_s = apart.delay_s();
+            let hint = more_s.map(|s| format!("--gnss-delay={}", given_s + s));
+            Failure::from(apart).or_hint_if(hint)
+        })?;
         self.gnss = earlier(&self.gnss, origin_s);
         Ok(Some(origin_s))
     }
