@@ -27,8 +27,7 @@ use nav_sim_calibration::duration;
 use nav_sim_navigation::sensors::defects::{MAX_BIAS_M_S2, MAX_BIAS_RAD_S};
 use nav_sim_signal::imu::{Axis, Channel, MAX_RATE_HZ, Sensor};
 use nav_sim_signal::noise::{
-    Composite, Kind, Law, LognormalIntervals, Model, ParameterError, Process, Spread, SpreadError,
-    Variation,
+    Composite, Kind, Law, LognormalIntervals, Model, ParameterError, Process, Spread, Variation,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -687,7 +686,7 @@ fn read_laws(
                 parameter,
                 law,
             )
-            .map_err(|e| refuse_law(source, &key, &e))?;
+            .map_err(|e| source.refused(&format!("{key}.{}", e.key), format!("is refused: {e}")))?;
             if into
                 .iter()
                 .any(|v| (v.process.as_str(), v.of.parameter.name()) == (process, parameter))
@@ -699,16 +698,6 @@ fn read_laws(
         }
     }
     Ok(())
-}
-
-fn refuse_law(source: &Source, key: &str, e: &SpreadError) -> Failure {
-    let name = match e {
-        SpreadError::NoProcess { .. } => "process",
-        SpreadError::NoParameter { .. } => "parameter",
-        SpreadError::Constant { name, .. } => name,
-        SpreadError::Lognormal | SpreadError::Reaches(_) => "distribution",
-    };
-    source.refused(&format!("{key}.{name}"), format!("is refused: {e}"))
 }
 
 // Writing model files: numbers in the shortest form that reads back to the same bits.
