@@ -31,9 +31,7 @@ mod white;
 pub use ar1::{Ar1, GaussMarkov, Ma1};
 pub use flicker_noise::{Flicker, FlickerNoise, Ladder};
 pub use kind::{Composite, Kind, Parameter, ParameterRef, labels};
-pub use spread::{
-    Law, LognormalIntervals, ReplicateError, Spread, SpreadError, Variation, VirtualImu,
-};
+pub use spread::{Law, ReplicateError, Spread, SpreadError, Variation, VirtualImu};
 pub use synthesis::Synthesizer;
 pub use white::{Drift, Quantization, RandomWalk, White};
 

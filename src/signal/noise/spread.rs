@@ -36,6 +36,8 @@ use crate::imu::{Channel, Recording, Signal};
 use crate::rng::{Generator, StreamKey};
 use rand::RngExt;
 use rand_distr::{Beta, StandardNormal};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// A law that is refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -54,49 +56,44 @@ fn refused<T>(key: &'static str, message: impl ToString) -> Result<T, SpreadErro
 /// Largest standard deviation of a logarithm.
 const LARGEST_SD: f64 = 10.0;
 
-/// A distribution.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+/// A distribution, as in model files.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
+#[schemars(tag = "distribution", !deny_unknown_fields)]
 pub enum Law {
-    /// low + width·B, B ~ Beta(a, b).
+    /// low + width × a beta law
     Beta {
-        /// First shape.
+        /// First shape
         a: f64,
-        /// Second shape.
+        /// Second shape
         b: f64,
-        /// Least value (units of the parameter).
+        /// Least value (units of the parameter)
         low: f64,
-        /// Greatest less least value (units of the parameter).
+        /// Greatest less least value (units of the parameter)
         width: f64,
     },
-    /// Normal about the model's value, truncated to the parameter's domain.
+    /// A normal law about the parameter, truncated to its domain
     Normal {
-        /// Standard deviation before truncation (units of the parameter).
+        /// Standard deviation before truncation (units of the parameter)
         sd: f64,
     },
-    /// Normal on the scale of [`Parameter::scaled`]: of a variance or slope the logarithm, of phi and beta that of the correlation
-    /// time.
+    /// A normal law of the logarithm of the parameter, of phi and beta of that of the correlation time
     Lognormal {
-        /// Median (units of the parameter).
+        /// Median (units of the parameter)
         median: f64,
-        /// Standard deviation of the logarithm.
-        sd: f64,
-        /// 95 % intervals of the two, where they were estimated.
+        /// Its 95 % interval, where it was estimated
         #[serde(skip_serializing_if = "Option::is_none")]
-        ci95: Option<LognormalIntervals>,
+        median_ci95: Option<[f64; 2]>,
+        /// Standard deviation of the logarithm
+        sd: f64,
+        /// Its 95 % interval
+        #[serde(skip_serializing_if = "Option::is_none")]
+        sd_ci95: Option<[f64; 2]>,
     },
-}
-
-/// What recordings leave open of a lognormal law: 95 % intervals.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct LognormalIntervals {
-    /// Of the median (units of the parameter).
-    pub median: [f64; 2],
-    /// Of the standard deviation of the logarithm.
-    pub sd: [f64; 2],
 }
 
 /// The law of one parameter of one process of one axis.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Variation {
     /// Label of the process, as [`Composite::labels`].
     pub process: String,
