@@ -6,7 +6,7 @@ use nav_sim_navigation::sensors::imu::TruthError;
 use nav_sim_navigation::sensors::outage::OutageError;
 use nav_sim_navigation::simulation::ExperimentError;
 use nav_sim_signal::noise::ReplicateError;
-use nav_sim_signal::noise::continuous::RateError;
+use nav_sim_signal::units::Refused;
 use nav_sim_signal::wavelet::WaveletError;
 use std::borrow::Cow;
 use std::error::Error as _;
@@ -455,6 +455,6 @@ macro_rules! failures {
 }
 
 failures! {
-    input: ReplicateError, RateError;
+    input: ReplicateError, Refused;
     could_not: WaveletError;
 }

@@ -10,11 +10,12 @@ use crate::report::readable;
 use nav_sim_navigation::ekf::{BeliefError, FilterStates, InitialSettings};
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::defects::ImuSettings;
-use nav_sim_navigation::sensors::outage::{NotAnOutage, Outage};
+use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::plausibility::{Excess, LIMITS, examine};
 use nav_sim_signal::imu::{Recording, Sensor};
 use nav_sim_signal::noise::{Model, continuous};
+use nav_sim_signal::units::Refused;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -176,9 +177,9 @@ pub(crate) enum OutageFlag {
 }
 
 impl FromStr for OutageFlag {
-    type Err = NotAnOutage;
+    type Err = Refused;
 
-    fn from_str(text: &str) -> std::result::Result<Self, NotAnOutage> {
+    fn from_str(text: &str) -> std::result::Result<Self, Refused> {
         if text == "none" {
             Ok(Self::None)
         } else {

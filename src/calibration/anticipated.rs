@@ -406,7 +406,8 @@ mod tests {
         let law = crate::noise::Law::Lognormal {
             median: 1.0,
             sd: 0.3,
-            ci95: None,
+            median_ci95: None,
+            sd_ci95: None,
         };
         let axis = model().axes[0].clone();
         let vary = || vec![Variation::new(&axis, 1.0, "WN", "sigma2", law).unwrap()];

@@ -7,7 +7,7 @@ use crate::app::{
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::{self, ModelFile, PROGRAM, known};
 use crate::parse;
-use crate::report::{in_order, unexpected_line};
+use crate::report::in_order;
 use nav_sim_calibration::derived_interval;
 use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds, short_names};
 use nav_sim_navigation::ekf::{BeliefError, FilterStates};
@@ -208,8 +208,7 @@ impl Tune {
             };
             scenario.unexpected()
         };
-        let doubts = truths.errors.iter().flat_map(unexpected);
-        let doubts: Vec<String> = doubts.map(|doubt| unexpected_line(&doubt)).collect();
+        let doubts: Vec<String> = truths.errors.iter().flat_map(unexpected).collect();
         context.warn_each(in_order(doubts.iter().map(String::as_str)));
         Ok(truths)
     }

@@ -8,7 +8,7 @@ use crate::noise::Model;
 use crate::noise::reduction::{self, ReductionError};
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::check_bounds;
-use crate::sensors::defects::{Defect, ImuSettings};
+use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::{BaroSettings, GnssSettings};
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::{
@@ -282,31 +282,42 @@ impl Scenario {
         self.imu.is_ideal() && self.aiding.errors().is_empty() && self.unexpected().is_empty()
     }
 
-    /// Errors that the true IMU and receiver have and the filter does not expect: its own will be larger than it says.
-    pub fn unexpected(&self) -> Vec<Unexpected> {
+    /// Errors that the true IMU and receiver have and the filter does not expect, each with its remedy: the filter's own
+    /// will be larger than it says.
+    pub fn unexpected(&self) -> Vec<String> {
         let mut found = Vec::new();
         for sensor in Sensor::ALL {
             let (bias, ppm) = self.imu.deviations(sensor);
             // of half of what is there, errors may be twice as large as stated
             let expected = self.initial.bias_sigma(sensor).unwrap_or(0.0);
             if expected < 0.5 * bias {
-                found.push(Unexpected::TurnOnBias {
-                    sensor,
-                    sigma: bias,
-                    expected,
-                });
+                found.push(format!(
+                    "the true {sensor} has a turn-on bias of {bias} {}, the filter expects {expected}: initial.{} \
+                     gives it states",
+                    sensor.unit(),
+                    InitialSettings::bias_key(sensor)
+                ));
             }
             let by_default = self.filter.states.scale_sigma() * 1e6;
-            let expected_ppm = self.initial.scale_sigma_ppm(sensor).unwrap_or(by_default);
-            if expected_ppm < 0.5 * ppm {
-                found.push(Unexpected::Scale {
-                    sensor,
-                    ppm,
-                    expected_ppm,
-                });
+            let expected = self.initial.scale_sigma_ppm(sensor).unwrap_or(by_default);
+            if expected < 0.5 * ppm {
+                found.push(format!(
+                    "the true {sensor} has a scale-factor error of {ppm} ppm, the filter expects {expected}: --scale-ppm \
+                     (initial.{}) gives it states",
+                    InitialSettings::scale_key(sensor)
+                ));
             }
         }
-        found.extend(self.imu.without_states().map(Unexpected::Defect));
+        for (sensor, key, sigma, unit) in self.imu.without_states() {
+            // By gravity, by steady vibration, by what a warming ends with: most of what one sensor has is a bias.
+            let remedy = sensor.map_or("calibrate the IMU for it".to_owned(), |sensor| {
+                let key = InitialSettings::bias_key(sensor);
+                format!("initial.{key} gives what is constant of it states")
+            });
+            found.push(format!(
+                "imu.{key} = {sigma} {unit} is in no filter: {remedy}"
+            ));
+        }
         let GnssSettings {
             rate_hz,
             pos_sigma_m,
@@ -318,74 +329,24 @@ impl Scenario {
         // longer small beside their mean.
         let fixes = (rate_hz * correlation_time_s).max(1.0);
         if (0..3).any(|i| sigma_m[i] > 0.5 * pos_sigma_m[i] / fixes.sqrt()) {
-            found.push(Unexpected::CorrelatedPositions {
-                sigma_m,
-                correlation_time_s,
-            });
+            let [n, e, d] = sigma_m;
+            found.push(format!(
+                "the true receiver errs by {n}, {e}, {d} m over {correlation_time_s} s, the filter expects white errors: a \
+                 larger gnss.pos_sigma_m"
+            ));
         }
-        found.extend(
-            self.aiding
-                .unexpected()
-                .into_iter()
-                .map(|(source, key)| Unexpected::Aiding { source, key }),
-        );
+        for (source, key) in self.aiding.unexpected() {
+            let remedy = if key.ends_with("sigma_m_s") || key == "aiding.heading.sigma_deg" {
+                format!("a larger {key} (nav-sim tune --scenario FILE finds how much)")
+            } else {
+                format!("{key} gives it states")
+            };
+            found.push(format!(
+                "the truth has {source}, of which the filter expects less: {remedy}"
+            ));
+        }
         found
     }
-
-    /// The integration error of the strapdown, where the largest is a tenth of sigma: a hundredth of a mean square.
-    pub fn unexpected_integration(&self, over_sigma: f64) -> Option<Unexpected> {
-        let rate_hz = self.imu.rate_hz;
-        (over_sigma > 0.1).then_some(Unexpected::Integration {
-            rate_hz,
-            over_sigma,
-        })
-    }
-}
-
-/// An error that the true IMU or receiver has, and the filter does not expect.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Unexpected {
-    /// A constant bias (1 σ, m/s² or rad/s), and that of which the filter has states.
-    TurnOnBias {
-        /// Sensor.
-        sensor: Sensor,
-        /// Of the true IMU.
-        sigma: f64,
-        /// In the filter.
-        expected: f64,
-    },
-    /// A scale-factor error (1 σ, ppm), and that of which the filter has states.
-    Scale {
-        /// Sensor.
-        sensor: Sensor,
-        /// Of the true IMU.
-        ppm: f64,
-        /// In the filter.
-        expected_ppm: f64,
-    },
-    /// An error of the true IMU of which no filter has states.
-    Defect(Defect),
-    /// Position errors that last, of which no filter has states.
-    CorrelatedPositions {
-        /// North, east, down (1 σ, m).
-        sigma_m: [f64; 3],
-        /// How long they last (s).
-        correlation_time_s: f64,
-    },
-    /// An error of what the vehicle measures of itself.
-    Aiding {
-        /// Its name in a budget.
-        source: &'static str,
-        /// The key that makes a filter expect it.
-        key: &'static str,
-    },
-    /// A strapdown that is too slow for the motion.
-    Integration {
-        /// Rate of the IMU (Hz).
-        rate_hz: f64,
-        /// Its largest error over the sigma that the filter states.
-        over_sigma: f64,
-    },
 }
 
 #[cfg(test)]

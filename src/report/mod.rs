@@ -12,7 +12,7 @@ pub use nav_sim_document::readable;
 pub(crate) use nav_sim_document::{seconds, six_digits};
 pub(crate) use tables::{gnss_csv, imu_csv, initial_toml};
 
-pub(crate) use verdict::{reduction_doubt, reduction_line, tone, unexpected_line};
+pub(crate) use verdict::{integration_line, reduction_doubt, reduction_line, tone};
 
 #[cfg(test)]
 #[path = "sample_tests.rs"]

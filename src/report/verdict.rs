@@ -1,12 +1,9 @@
 //! Verdicts in words.
 
 use nav_sim_document::{Tone, percent, readable, short_names, window};
-use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::metrics::{
     ALL_STATES, Met, ReductionQuality, Summary, Verdict, VerdictKind,
 };
-use nav_sim_navigation::scenario::Unexpected;
-use nav_sim_navigation::sensors::defects::Defect;
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 use serde::Deserialize;
 use serde_json::Value;
@@ -270,82 +267,14 @@ pub(crate) const fn tone(kind: VerdictKind) -> Tone {
 
 // Words on what a filter does not expect, and on what a reduction costs it.
 
-/// An error that the filter does not expect: what it is, and what helps.
-pub(crate) fn unexpected_line(unexpected: &Unexpected) -> String {
-    let (what, remedy) = match unexpected {
-        Unexpected::TurnOnBias {
-            sensor,
-            sigma,
-            expected,
-        } => (
-            format!(
-                "the true {sensor} has a turn-on bias of {sigma} {}, the filter expects {expected}",
-                sensor.unit()
-            ),
-            format!(
-                "initial.{} gives it states",
-                InitialSettings::bias_key(*sensor)
-            ),
-        ),
-        Unexpected::Scale {
-            sensor,
-            ppm,
-            expected_ppm,
-        } => (
-            format!(
-                "the true {sensor} has a scale-factor error of {ppm} ppm, the filter expects {expected_ppm}"
-            ),
-            format!(
-                "--scale-ppm (initial.{}) gives it states",
-                InitialSettings::scale_key(*sensor)
-            ),
-        ),
-        Unexpected::Defect(Defect {
-            key,
-            sigma,
-            unit,
-            sensors,
-            ..
-        }) => (
-            format!("{key} = {sigma} {unit} is in no filter"),
-            match sensors {
-                // By gravity, by steady vibration, by what a warming ends with: most of it is a bias.
-                [sensor] => format!(
-                    "initial.{} gives what is constant of it states",
-                    InitialSettings::bias_key(*sensor)
-                ),
-                _ => "calibrate the IMU for it".to_owned(),
-            },
-        ),
-        Unexpected::CorrelatedPositions {
-            sigma_m: [n, e, d],
-            correlation_time_s,
-        } => (
-            format!(
-                "the true receiver errs by {n}, {e}, {d} m over {correlation_time_s} s, the filter expects white errors"
-            ),
-            "a larger gnss.pos_sigma_m".to_owned(),
-        ),
-        Unexpected::Aiding { source, key } => (
-            format!("the truth has {source}, of which the filter expects less"),
-            if key.ends_with("sigma_m_s") || *key == "aiding.heading.sigma_deg" {
-                format!("a larger {key} (nav-sim tune --scenario FILE finds how much)")
-            } else {
-                format!("{key} gives it states")
-            },
-        ),
-        Unexpected::Integration {
-            rate_hz,
-            over_sigma,
-        } => (
-            format!(
-                "at {rate_hz} Hz the strapdown alone errs by {} sigma on this motion",
-                readable(*over_sigma)
-            ),
-            "a larger imu.rate_hz".to_owned(),
-        ),
-    };
-    format!("{what}: {remedy}")
+/// The integration error of the strapdown, where the largest is a tenth of sigma: a hundredth of a mean square.
+pub(crate) fn integration_line(rate_hz: f64, over_sigma: f64) -> Option<String> {
+    let errs = readable(over_sigma);
+    (over_sigma > 0.1).then(|| {
+        format!(
+            "at {rate_hz} Hz the strapdown alone errs by {errs} sigma on this motion: a larger imu.rate_hz"
+        )
+    })
 }
 
 /// What a filter reduced to 15 states is like, in one line: its NEES, its errors above those of the full filter.

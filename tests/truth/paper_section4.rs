@@ -430,7 +430,8 @@ mod quadrature {
         let law = Law::Lognormal {
             median: 3.0,
             sd: 0.5,
-            ci95: None,
+            median_ci95: None,
+            sd_ci95: None,
         };
         for k in 1..4 {
             let exact = (3.0_f64.ln() * f64::from(k) + 0.125 * f64::from(k * k)).exp();
@@ -440,7 +441,8 @@ mod quadrature {
         let law = Law::Lognormal {
             median: 0.9,
             sd: 0.5,
-            ci95: None,
+            median_ci95: None,
+            sd_ci95: None,
         };
         let kappa = mean(law, 0.5, Parameter::Phi, |phi| -phi.ln());
         assert!(

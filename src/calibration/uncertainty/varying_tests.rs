@@ -22,7 +22,8 @@ fn laboratory(
     let law = Law::Lognormal {
         median: 1.0,
         sd,
-        ci95: None,
+        median_ci95: None,
+        sd_ci95: None,
     };
     let variation = Variation::new(&noise, 1.0, "WN", "sigma2", law).unwrap();
     let spread = Spread {

@@ -17,9 +17,7 @@ use nav_sim_document::{
 };
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::practical::Horizon;
-use nav_sim_signal::noise::{
-    Composite, Law, LognormalIntervals, Parameter, ParameterRef, Process, Spread, Variation,
-};
+use nav_sim_signal::noise::{Composite, Law, Parameter, ParameterRef, Process, Spread, Variation};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -1161,14 +1159,11 @@ fn spread(outcomes: &[&Outcome], rate_hz: f64) -> Option<Spread> {
     for outcome in outcomes {
         let (composite, labels) = (&outcome.fit.composite, outcome.fit.composite.labels());
         let variation = |found: &ParameterSpread| {
-            let ci95 = Some(LognormalIntervals {
-                median: found.median_ci95,
-                sd: found.sd_ci95,
-            });
             let law = Law::Lognormal {
                 median: found.median,
+                median_ci95: Some(found.median_ci95),
                 sd: found.sd,
-                ci95,
+                sd_ci95: Some(found.sd_ci95),
             };
             let (process, parameter) = (&labels[found.of.process], found.of.parameter.name());
             Variation::new(composite, rate_hz, process, parameter, law).ok()

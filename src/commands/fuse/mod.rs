@@ -18,8 +18,8 @@ use nav_sim_document::{Document, Importance, seconds, shortest, window};
 use nav_sim_navigation::earth::{GravityModel, radii};
 use nav_sim_navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
-use nav_sim_navigation::fusion::alignment::{Alignment, AlignmentError, coarse, towards};
-use nav_sim_navigation::fusion::mounting::{self, Mounting, MountingError};
+use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
+use nav_sim_navigation::fusion::mounting::{self, Mounting};
 use nav_sim_navigation::fusion::{
     Assessment, ClocksApart, Correlation, Displaced, Finding, Found, FusionError, Heading,
     Levelling, Outcome, Recorded, Row, Settings, Solution, Start, Weighed, WheelSpeed, Whiteness,
@@ -40,7 +40,7 @@ use nav_sim_navigation::simulation::{BIAS_NAMES, REPORTED_NAMES, lincov};
 use nav_sim_navigation::trajectory::reference::Reference;
 use nav_sim_signal::imu::ImuIncrement;
 use nav_sim_signal::noise::{Composite, Model, Process, continuous, reduction};
-use nav_sim_signal::units::DEG;
+use nav_sim_signal::units::{DEG, Refused};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -402,21 +402,6 @@ impl From<FusionError> for Failure {
     }
 }
 
-impl From<AlignmentError> for Failure {
-    fn from(e: AlignmentError) -> Self {
-        Self::input(e)
-            .hint("give the heading with --initial DEG:SD, or the whole start with --initial FILE")
-    }
-}
-
-impl From<MountingError> for Failure {
-    fn from(e: MountingError) -> Self {
-        Self::input(e).hint(
-            "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, and velocities in the fixes",
-        )
-    }
-}
-
 // From the files of a request to a solution and its figures.
 
 /// Solution of a recorded drive.
@@ -598,14 +583,19 @@ impl Drive {
                 "the clocks had nothing in common: fused with --gnss-delay={delay_s:.2}, from turns and innovations"
             ));
         }
-        let Alignment { start, doubts } = match (&self.initial, self.request.given_heading()) {
-            (Some(start), _) => Alignment {
+        let aligned = match (&self.initial, self.request.given_heading()) {
+            (Some(start), _) => Ok(Alignment {
                 start: beside_mounting(start.clone(), &settings),
                 doubts: Vec::new(),
-            },
-            (None, Some(heading)) => towards(&recorded, &settings, &belief, heading)?,
-            (None, None) => coarse(&recorded, &settings, &belief)?,
+            }),
+            (None, Some(heading)) => towards(&recorded, &settings, &belief, heading),
+            (None, None) => coarse(&recorded, &settings, &belief),
         };
+        let Alignment { start, doubts } = aligned.map_err(|e| {
+            Failure::input(e).hint(
+                "give the heading with --initial DEG:SD, or the whole start with --initial FILE",
+            )
+        })?;
         settings.outages.retain(|outage| {
             let is_early = outage.end_s <= start.t_s;
             if is_early {
@@ -758,7 +748,7 @@ impl Drive {
     /// Why the mounting is not found: the clocks, where they are apart.
     fn not_mounted(
         &self,
-        e: MountingError,
+        e: Refused,
         recorded: &Recorded<'_>,
         settings: &Settings,
         belief: &Belief,
@@ -779,7 +769,9 @@ impl Drive {
             .delay_s
         };
         let Some(mut clocks) = clocks_apart(recorded, rest) else {
-            return e.into();
+            return Failure::input(e).hint(
+                "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, and velocities in the fixes",
+            );
         };
         clocks.delay_s += self.request.gnss_delay_s;
         Failure::input(e).hint(document::apart(&clocks))
@@ -960,7 +952,7 @@ fn receiver(gnss: &[GnssFix], interval_s: f64) -> GnssSettings {
 
 /// At the rate of the recording, without quantization noise: the filter leaves it out, and it belongs to
 /// its own rate.
-fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, continuous::RateError> {
+fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, Refused> {
     let kept = |axis: &Composite| {
         Composite::new(
             axis.processes

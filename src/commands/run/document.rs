@@ -3,13 +3,13 @@
 use super::{Navigation, RunAnswer};
 use crate::report::trajectory::track_map;
 use crate::report::verdict::{requirement_line, verdict_lines, windows};
-use crate::report::{reduction_doubt, reduction_line, tone, unexpected_line};
+use crate::report::{integration_line, reduction_doubt, reduction_line, tone};
 use nav_sim_document::{
     Axis, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone, window,
 };
 use nav_sim_navigation::ekf::FixUpdate;
 use nav_sim_navigation::metrics::{EpochMetrics, OutageSummary, Summary, VerdictKind};
-use nav_sim_navigation::scenario::{Method, Unexpected};
+use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 
 /// Outages whose tables are shown: of more, those with the largest errors.
@@ -67,7 +67,10 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
 fn notes(summary: &Summary, answer: &RunAnswer, page: &mut Document) {
     let scenario = &answer.origin.configuration;
     let mut unexpected = scenario.unexpected();
-    unexpected.extend(scenario.unexpected_integration(summary.strapdown_over_sigma));
+    unexpected.extend(integration_line(
+        scenario.imu.rate_hz,
+        summary.strapdown_over_sigma,
+    ));
     let (own, analysed) = (summary.verdict.kind, summary.verdict.by_covariance_analysis);
     let is_undecided =
         own == VerdictKind::Undecided && analysed == Some(VerdictKind::Overconfident);
@@ -78,9 +81,9 @@ fn notes(summary: &Summary, answer: &RunAnswer, page: &mut Document) {
             format!("the filter is overconfident: {remedy}"),
         );
     }
-    unexpected
-        .iter()
-        .for_each(|found| page.note(Importance::Detail, unexpected_line(found)));
+    for found in unexpected {
+        page.note(Importance::Detail, found);
+    }
     if let Some(quality) = &summary.reduction {
         page.note(Importance::Detail, reduction_line(quality));
         reduction_doubt(quality)
@@ -338,7 +341,7 @@ pub(super) fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
 
 /// Advice by what the belief lacks, where linear analysis finds the filter wrong already; errors that are large are then its
 /// consequence.
-fn remedy(summary: &Summary, unexpected: &[Unexpected], answer: &RunAnswer) -> String {
+fn remedy(summary: &Summary, unexpected: &[String], answer: &RunAnswer) -> String {
     let verdict = &summary.verdict;
     let [is_recorded, is_modelled] = ["static", "truth"].map(|role| answer.has_input(role));
     let ratios = summary.reduction.iter().flat_map(|quality| {
@@ -354,7 +357,7 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], answer: &RunAnswer) -> S
     // what recordings contain is unknown, and so is whether linear analysis would find the filter wrong
     match unexpected.first() {
         _ if summary.is_contradicted || is_recorded && is_far => {}
-        Some(found) => return unexpected_line(found),
+        Some(found) => return found.clone(),
         // where the reduced filter is right about the errors of its own model, the errors are of something else
         None if ratios.fold(0.0, f64::max) > 1.0 + verdict.tolerance => {
             return "--filter full has a state for each process of the model".to_owned();

@@ -10,7 +10,7 @@ use crate::io::scenario_file;
 use crate::parse;
 use crate::report::tables::{epochs_csv, runs_csv};
 use crate::report::verdict::requirement_line;
-use crate::report::{json, reduction_doubt, reduction_line, trajectory, unexpected_line};
+use crate::report::{integration_line, json, reduction_doubt, reduction_line, trajectory};
 use nav_sim_calibration::derived_interval;
 use nav_sim_document::{Document, svg};
 use nav_sim_navigation::ekf::{Belief, FilterStates};
@@ -683,10 +683,7 @@ fn with_runs(
     navigation.summary.reduction = reduction.flatten();
     let over_sigma = strapdown_over_sigma(track, belief);
     navigation.summary.strapdown_over_sigma = over_sigma;
-    scenario
-        .unexpected_integration(over_sigma)
-        .iter()
-        .for_each(|found| context.warn(unexpected_line(found)));
+    context.warn_each(integration_line(scenario.imu.rate_hz, over_sigma));
     Analysis {
         track: &merged,
         ..analysis
@@ -721,10 +718,7 @@ fn doubt(inputs: &NavigateInputs, scenario: &Scenario, context: &Context<'_>) {
             .filter_map(motion)
             .for_each(|doubt| context.warn(doubt));
     }
-    scenario
-        .unexpected()
-        .into_iter()
-        .for_each(|found| context.warn(unexpected_line(&found)));
+    context.warn_each(scenario.unexpected());
 }
 
 /// Means over a second that differ so much are motion, not noise: m/s², rad/s.

@@ -27,8 +27,7 @@ use nav_sim_calibration::duration;
 use nav_sim_navigation::sensors::defects::{MAX_BIAS_M_S2, MAX_BIAS_RAD_S};
 use nav_sim_signal::imu::{Axis, Channel, MAX_RATE_HZ, Sensor};
 use nav_sim_signal::noise::{
-    Composite, Kind, Law, LognormalIntervals, Model, ParameterError, Process, Spread, SpreadError,
-    Variation,
+    Composite, Kind, Law, Model, ParameterError, Process, Spread, Variation,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -319,53 +318,7 @@ struct LawTable {
     process: String,
     parameter: String,
     #[schemars(flatten)]
-    distribution: Distribution,
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase", deny_unknown_fields)]
-#[schemars(tag = "distribution", !deny_unknown_fields)]
-enum Distribution {
-    /// low + width × a beta law
-    Beta {
-        a: Finite,
-        b: Finite,
-        low: Finite,
-        width: Finite,
-    },
-    /// A normal law about the parameter
-    Normal { sd: Finite },
-    /// A normal law of the logarithm of the parameter, of phi and beta of that of the correlation time
-    Lognormal {
-        median: Finite,
-        median_ci95: Option<Ends>,
-        sd: Finite,
-        sd_ci95: Option<Ends>,
-    },
-}
-
-impl Distribution {
-    fn law(&self) -> Law {
-        match *self {
-            Self::Beta {
-                a: Finite(a),
-                b: Finite(b),
-                low: Finite(low),
-                width: Finite(width),
-            } => Law::Beta { a, b, low, width },
-            Self::Normal { sd: Finite(sd) } => Law::Normal { sd },
-            Self::Lognormal {
-                median: Finite(median),
-                median_ci95,
-                sd: Finite(sd),
-                sd_ci95,
-            } => {
-                let ends = median_ci95.zip(sd_ci95);
-                let ci95 = ends.map(|(median, sd)| LognormalIntervals { median, sd });
-                Law::Lognormal { median, sd, ci95 }
-            }
-        }
-    }
+    distribution: Law,
 }
 
 /// The JSON schema of a model file, for editors and checkers.
@@ -679,7 +632,7 @@ fn read_laws(
         for (i, law) in (1..).zip(laws) {
             let key = format!("{key}[{i}]");
             let (process, parameter) = (law.process.as_str(), law.parameter.as_str());
-            let law = law.distribution.law();
+            let law = law.distribution;
             let variation = Variation::new(
                 file.model.axis(channel),
                 file.model.rate_hz,
@@ -687,7 +640,7 @@ fn read_laws(
                 parameter,
                 law,
             )
-            .map_err(|e| refuse_law(source, &key, &e))?;
+            .map_err(|e| source.refused(&format!("{key}.{}", e.key), format!("is refused: {e}")))?;
             if into
                 .iter()
                 .any(|v| (v.process.as_str(), v.of.parameter.name()) == (process, parameter))
@@ -699,16 +652,6 @@ fn read_laws(
         }
     }
     Ok(())
-}
-
-fn refuse_law(source: &Source, key: &str, e: &SpreadError) -> Failure {
-    let name = match e {
-        SpreadError::NoProcess { .. } => "process",
-        SpreadError::NoParameter { .. } => "parameter",
-        SpreadError::Constant { name, .. } => name,
-        SpreadError::Lognormal | SpreadError::Reaches(_) => "distribution",
-    };
-    source.refused(&format!("{key}.{name}"), format!("is refused: {e}"))
 }
 
 // Writing model files: numbers in the shortest form that reads back to the same bits.
@@ -833,19 +776,19 @@ fn law(v: &Variation) -> String {
         Law::Normal { sd } => format!("distribution = \"normal\"\nsd = {sd:?}"),
         Law::Lognormal {
             median,
+            median_ci95,
             sd,
-            ci95: None,
+            sd_ci95,
         } => {
-            format!("distribution = \"lognormal\"\nmedian = {median:?}\nsd = {sd:?}")
+            let ends = |name, ends: Option<[f64; 2]>| {
+                ends.map_or(String::new(), |ends| format!("\n{name}{CI} = {ends:?}"))
+            };
+            format!(
+                "distribution = \"lognormal\"\nmedian = {median:?}{}\nsd = {sd:?}{}",
+                ends("median", median_ci95),
+                ends("sd", sd_ci95)
+            )
         }
-        Law::Lognormal {
-            median,
-            sd,
-            ci95: Some(ci95),
-        } => format!(
-            "distribution = \"lognormal\"\nmedian = {median:?}\nmedian{CI} = {:?}\nsd = {sd:?}\nsd{CI} = {:?}",
-            ci95.median, ci95.sd
-        ),
     };
     format!(
         "process = \"{}\"\nparameter = \"{}\"\n{constants}\n",

@@ -2,7 +2,7 @@ use super::*;
 use crate::io::Failure;
 use crate::io::toml_file::Source;
 use nav_sim_signal::imu::{Axis, Sensor};
-use nav_sim_signal::noise::{Composite, Law, LognormalIntervals, Process, Variation};
+use nav_sim_signal::noise::{Composite, Law, Process, Variation};
 
 const ACCEL_X: Channel = Channel {
     sensor: Sensor::Accel,
@@ -77,20 +77,18 @@ fn what_is_written_reads_back_to_the_same_bits() {
     let pooled = Variation::new(&n2(), 100.0, "AR1_1", "phi", beta).unwrap();
     let normal = Variation::new(&n2(), 100.0, "WN", "sigma2", Law::Normal { sd: 1e-7 }).unwrap();
     let mut spread = Spread::default();
-    let intervals = LognormalIntervals {
-        median: [0.9998, 0.99995],
-        sd: [0.1 + 0.2, 0.7],
-    };
     let lognormal = Law::Lognormal {
         median: 0.9999,
         sd: 0.45,
-        ci95: Some(intervals),
+        median_ci95: Some([0.9998, 0.99995]),
+        sd_ci95: Some([0.1 + 0.2, 0.7]),
     };
     let lognormal = Variation::new(&n2(), 100.0, "AR1_2", "phi", lognormal).unwrap();
     let plain = Law::Lognormal {
         median: 2e-11,
         sd: 0.0,
-        ci95: None,
+        median_ci95: None,
+        sd_ci95: None,
     };
     let plain = Variation::new(&n2(), 100.0, "RW", "gamma2", plain).unwrap();
     spread.axes[..3].fill(vec![pooled, normal.clone(), lognormal, plain]);

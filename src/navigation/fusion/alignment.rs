@@ -15,7 +15,7 @@ use crate::frames::{NavState, RollPitchYaw, wrap_angle};
 use crate::gnss::GnssFix;
 use crate::imu::{ImuIncrement, Sensor};
 use crate::metrics::VerdictKind;
-use crate::units::DEG;
+use crate::units::{DEG, Refused};
 use glam::{DQuat, DVec3};
 use std::f64::consts::PI;
 
@@ -30,30 +30,6 @@ struct BiasSigma {
     accel: f64,
     /// Gyroscope (rad/s).
     gyro: f64,
-}
-
-/// Why a recording cannot be aligned.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum AlignmentError {
-    /// It never moves fast enough.
-    #[error(
-        "no course: no fix moves at {:.1} m/s and ten standard deviations{}",
-        SLOW.0,
-        .nearest.map_or_else(String::new, |(t, v, s)| format!(" (nearest: {v:.2} ± {s:.2} m/s at {t:.2} s)"))
-    )]
-    NoCourse {
-        /// The fix that comes nearest to it: when (s), its speed and the standard deviation of that (m/s).
-        nearest: Option<(f64, f64, f64)>,
-    },
-    /// A heading was given, and nothing to level with.
-    #[error("no fix with IMU samples around it to level with")]
-    NoLevel,
-    /// No specific force to level with.
-    #[error("no IMU samples after the first moving fix at {t_s:.2} s to level with")]
-    NoSamples {
-        /// The fix (s).
-        t_s: f64,
-    },
 }
 
 /// A start found in the recording.
@@ -73,14 +49,18 @@ pub fn coarse(
     recorded: &Recorded<'_>,
     settings: &Settings,
     belief: &Belief,
-) -> Result<Alignment, AlignmentError> {
+) -> Result<Alignment, Refused> {
     let gnss = settings.kept(recorded.gnss);
     let recorded = recorded.with_gnss(&gnss);
     let courses = courses(&gnss, recorded.imu);
     let Some(first) = first_fast(&courses, f64::NEG_INFINITY) else {
-        return Err(AlignmentError::NoCourse {
-            nearest: nearest_to_fast(&courses),
+        let nearest = nearest_to_fast(&courses).map_or_else(String::new, |(t, v, s)| {
+            format!(" (nearest: {v:.2} ± {s:.2} m/s at {t:.2} s)")
         });
+        return Err(Refused(format!(
+            "no course: no fix moves at {:.1} m/s and ten standard deviations{nearest}",
+            SLOW.0
+        )));
     };
     let first_s = courses[first].fix.t_s;
     let later = LATER_S
@@ -105,8 +85,11 @@ pub fn coarse(
             best.get_or_insert(candidate);
         }
     }
-    best.map(finished)
-        .ok_or(AlignmentError::NoSamples { t_s: first_s })
+    best.map(finished).ok_or_else(|| {
+        Refused(format!(
+            "no IMU samples after the first moving fix at {first_s:.2} s to level with"
+        ))
+    })
 }
 
 /// The start at the first fix where the IMU can be levelled, its heading given: it need not move.
@@ -118,7 +101,7 @@ pub fn towards(
     settings: &Settings,
     belief: &Belief,
     heading: Heading,
-) -> Result<Alignment, AlignmentError> {
+) -> Result<Alignment, Refused> {
     let gnss = settings.kept(recorded.gnss);
     let recorded = recorded.with_gnss(&gnss);
     let courses = courses(&gnss, recorded.imu);
@@ -137,7 +120,7 @@ pub fn towards(
     };
     let mut start = (0..courses.len())
         .find_map(start_at)
-        .ok_or(AlignmentError::NoLevel)?;
+        .ok_or_else(|| Refused("no fix with IMU samples around it to level with".to_owned()))?;
     let trial = alone(&recorded, belief, settings, &start);
     widen(&recorded, belief, settings, &mut start);
     Ok(Candidate { start, trial }.alignment())

@@ -6,16 +6,16 @@
 //! carries the attitude of the IMU through the whole drive, its biases estimated, and the mounting is the mean
 //! rotation from it to the track (`refined`).
 
-use super::alignment::{
-    Alignment, AlignmentError, Moving, Pace, between, carried, coarse, courses, steps,
-};
+use super::alignment::{Alignment, Moving, Pace, between, carried, coarse, courses, steps};
 use super::outcome::{is_contradicted, nis_per_component};
-use super::{FusionError, Recorded, Row, Settings, fuse};
+use super::{Recorded, Row, Settings, fuse};
 use crate::earth::gravity_down;
 use crate::ekf::Belief;
 use crate::frames::RollPitchYaw;
-use crate::units::DEG;
+use crate::units::{DEG, Refused};
 use glam::{DQuat, DVec3};
+use std::f64::consts::PI;
+use std::fmt::Display;
 
 /// Largest standard deviation of an angle that is still an answer (rad).
 const DETERMINED: f64 = 5.0 * DEG;
@@ -47,71 +47,6 @@ impl Mounting {
     }
 }
 
-/// A drive that does not show the mounting.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum MountingError {
-    /// Hardly any of it is fast enough to have a course.
-    #[error(
-        "the mounting is not found: {seconds:.0} s of the drive have a course, {needed:.0} s are needed"
-    )]
-    TooSlow {
-        /// Time with a course (s).
-        seconds: f64,
-        /// How much is needed (s).
-        needed: f64,
-    },
-    /// It goes as much backwards as forwards.
-    #[error("the mounting is not found: {:.0} % of the way goes against the direction of the rest", 100.0 * .share)]
-    Directions {
-        /// Share of the lesser direction.
-        share: f64,
-    },
-    /// It is no road vehicle.
-    #[error(
-        "the mounting is not found: the vehicle banks by {bank_deg:.0}° (rms) along its track, as aircraft do"
-    )]
-    Banks {
-        /// Root mean square of the angles about the way (degrees).
-        bank_deg: f64,
-    },
-    /// The angles scatter too much.
-    #[error(
-        "the mounting is not found: {axis} is known to ±{sigma_deg:.1}°, ±{limit_deg:.0}° is needed"
-    )]
-    NotDetermined {
-        /// `roll`, `pitch` or `yaw`.
-        axis: &'static str,
-        /// Its standard deviation (degrees).
-        sigma_deg: f64,
-        /// Largest that is taken (degrees).
-        limit_deg: f64,
-    },
-    /// The fixes contradict the filter that carries the attitude.
-    #[error(
-        "the mounting is not found: the fixes contradict the filter, NIS {nis_per_component:.1} per component"
-    )]
-    Contradicted {
-        /// Mean NIS of the fixes.
-        nis_per_component: f64,
-    },
-    /// The filter's yaw is not that of the accelerations.
-    #[error(
-        "the mounting is not found: the filter's yaw is {yaw_deg:.1} ± {sigma_deg:.1}° from that of accelerations"
-    )]
-    Disagree {
-        /// Difference (degrees).
-        yaw_deg: f64,
-        /// Its standard deviation (degrees).
-        sigma_deg: f64,
-    },
-    /// The filter found no start with what was found so far.
-    #[error("the mounting is not found: {0}")]
-    Alignment(#[from] AlignmentError),
-    /// The filter failed with what was found so far.
-    #[error("the mounting is not found: {0}")]
-    Fusion(#[from] FusionError),
-}
-
 /// Finds the mounting. The rotation of the settings is where the axes' names come from; fixes that are withheld are
 /// not looked at.
 ///
@@ -121,7 +56,7 @@ pub fn find(
     recorded: &Recorded<'_>,
     settings: &Settings,
     belief: &Belief,
-) -> Result<Mounting, MountingError> {
+) -> Result<Mounting, Refused> {
     let gnss = settings.kept(recorded.gnss);
     let recorded = recorded.with_gnss(&gnss);
     let rough = along(&recorded, settings)?;
@@ -134,14 +69,29 @@ pub fn find(
         .into_iter()
         .find(|(_, sigma)| sigma.is_nan() || *sigma > DETERMINED);
     if let Some((axis, sigma)) = worst {
-        let (sigma_deg, limit_deg) = (sigma / DEG, DETERMINED / DEG);
-        return Err(MountingError::NotDetermined {
-            axis,
-            sigma_deg,
-            limit_deg,
-        });
+        return Err(undetermined(axis, sigma, DETERMINED));
     }
     Ok(found)
+}
+
+fn not_found(why: impl Display) -> Refused {
+    Refused(format!("the mounting is not found: {why}"))
+}
+
+/// An angle that scatters too much (rad).
+fn undetermined(axis: &str, sigma: f64, limit: f64) -> Refused {
+    let (sigma_deg, limit_deg) = (sigma / DEG, limit / DEG);
+    not_found(format!(
+        "{axis} is known to ±{sigma_deg:.1}°, ±{limit_deg:.0}° is needed"
+    ))
+}
+
+/// Hardly any of the drive is fast enough to have a course.
+fn too_slow(seconds: f64) -> Refused {
+    let needed = FEWEST as f64 * BLOCK_S;
+    not_found(format!(
+        "{seconds:.0} s of the drive have a course, {needed:.0} s are needed"
+    ))
 }
 
 /// Most that the standard deviations of fixes are widened by: what contradicts more is not the receiver's word.
@@ -153,13 +103,11 @@ fn refined(
     settings: &Settings,
     belief: &Belief,
     rough: &Rough,
-) -> Result<Mounting, MountingError> {
+) -> Result<Mounting, Refused> {
     let (mut gnss, mut factor) = (recorded.gnss.to_vec(), 1.0);
     loop {
-        match through(&recorded.with_gnss(&gnss), settings, belief, rough) {
-            Err(MountingError::Contradicted {
-                nis_per_component: nis,
-            }) if nis > 1.0 && factor * nis.sqrt() <= MOST_WIDENED => {
+        match through(&recorded.with_gnss(&gnss), settings, belief, rough)? {
+            Err(nis) if nis > 1.0 && factor * nis.sqrt() <= MOST_WIDENED => {
                 factor *= nis.sqrt();
                 gnss = recorded
                     .gnss
@@ -168,10 +116,13 @@ fn refined(
                     .collect();
             }
             found => {
-                let sigma_factor = factor;
+                let found = found.map_err(|nis| {
+                    let why = "the fixes contradict the filter, NIS";
+                    not_found(format!("{why} {nis:.1} per component"))
+                })?;
                 return Ok(Mounting {
-                    sigma_factor,
-                    ..found?
+                    sigma_factor: factor,
+                    ..found
                 });
             }
         }
@@ -252,20 +203,18 @@ const BANKED: f64 = 8.0 * DEG;
 const UNDECIDED: f64 = 0.25;
 
 /// The filter's yaw must be that of the accelerations: biases, which a filter may not expect, do not touch the latter.
-fn agreeing(mean: DQuat, sigma: f64) -> Result<(), MountingError> {
+fn agreeing(mean: DQuat, sigma: f64) -> Result<(), Refused> {
     let turn = (if mean.w < 0.0 { -mean } else { mean })
         .to_scaled_axis()
         .z
         .abs();
-    let disagree = || MountingError::Disagree {
-        yaw_deg: turn / DEG,
-        sigma_deg: sigma / DEG,
-    };
     if turn <= APART * sigma {
-        Ok(())
-    } else {
-        Err(disagree())
+        return Ok(());
     }
+    let (yaw_deg, sigma_deg) = (turn / DEG, sigma / DEG);
+    Err(not_found(format!(
+        "the filter's yaw is {yaw_deg:.1} ± {sigma_deg:.1}° from that of accelerations"
+    )))
 }
 
 /// An instant in motion.
@@ -279,12 +228,13 @@ struct Moment {
     way_m: f64,
 }
 
+/// Refined by the filter, or the NIS per component of fixes that contradict it.
 fn through(
     recorded: &Recorded<'_>,
     settings: &Settings,
     belief: &Belief,
     rough: &Rough,
-) -> Result<Mounting, MountingError> {
+) -> Result<Result<Mounting, f64>, Refused> {
     let named = settings.q_s_b.inverse();
     let loose = DVec3::Z * (LOOSE * rough.yaw_sigma);
     let settings = Settings {
@@ -293,18 +243,16 @@ fn through(
         rows_hz: ROWS_HZ,
         ..settings.clone()
     };
-    let Alignment { start, doubts } = coarse(recorded, &settings, belief)?;
+    let Alignment { start, doubts } = coarse(recorded, &settings, belief).map_err(not_found)?;
     // what the rows state is then of the IMU's attitude
     let settings = Settings {
         mounting_sigma_b: DVec3::ZERO,
         ..settings
     };
-    let solution = fuse(recorded, belief, &start, &settings, None)?;
+    let solution = fuse(recorded, belief, &start, &settings, None).map_err(not_found)?;
     // attitudes of a filter that the fixes contradict are no worse than it states only by chance
     if is_contradicted(&solution, &doubts) {
-        return Err(MountingError::Contradicted {
-            nis_per_component: nis_per_component(&solution),
-        });
+        return Ok(Err(nis_per_component(&solution)));
     }
     let pace = courses(recorded.gnss, recorded.imu)
         .first()
@@ -319,11 +267,7 @@ fn through(
     upright(&moments, mean)?;
     let blocks = deviations(&moments, mean);
     if blocks[0].count() < FEWEST {
-        let seconds = moments.len() as f64 / ROWS_HZ;
-        return Err(MountingError::TooSlow {
-            seconds,
-            needed: FEWEST as f64 * BLOCK_S,
-        });
+        return Err(too_slow(moments.len() as f64 / ROWS_HZ));
     }
     // Three parts: what scatters over the drive, what the filter itself is wrong by all along, and what no
     // drive shows.
@@ -331,13 +275,13 @@ fn through(
     let sigma_b = (scatter.powf(2.0) + of_filter(&moments).powf(2.0) + UNSEEN.powf(2.0)).powf(0.5);
     agreeing(mean, rough.yaw_sigma.hypot(sigma_b.z))?;
     let q_s_b = (mean * rough.q_s_b).normalize();
-    Ok(Mounting {
+    Ok(Ok(Mounting {
         q_s_b,
         angles: RollPitchYaw::from_quat(q_s_b * named),
         sigma_b,
         way_m: moments.iter().map(|m| m.way_m).sum(),
         sigma_factor: 1.0,
-    })
+    }))
 }
 
 /// The vehicle beside its track at a row that moves fast enough for a course.
@@ -372,19 +316,22 @@ fn moment([before, row, after]: [&Row; 3], pace: Pace) -> Option<Moment> {
 }
 
 /// Where the vehicle goes backwards its front is behind the track's. More of the way is forwards.
-fn turn_to_front(moments: &mut [Moment]) -> Result<(), MountingError> {
+fn turn_to_front(moments: &mut [Moment]) -> Result<(), Refused> {
     let is_against = |m: &Moment| (m.q * DVec3::X).x < 0.0;
     let way =
         |of: &dyn Fn(&&Moment) -> bool| moments.iter().filter(of).map(|m| m.way_m).sum::<f64>();
     let (against, all) = (way(&|m| is_against(m)), way(&|_| true));
     let share = against.min(all - against) / all;
     if share > UNDECIDED {
-        return Err(MountingError::Directions { share });
+        let percent = 100.0 * share;
+        return Err(not_found(format!(
+            "{percent:.0} % of the way goes against the direction of the rest"
+        )));
     }
     let front_is_behind = against > all - against;
     for m in moments {
         if is_against(m) != front_is_behind {
-            m.q = DQuat::from_rotation_z(std::f64::consts::PI) * m.q;
+            m.q = DQuat::from_rotation_z(PI) * m.q;
         }
     }
     Ok(())
@@ -402,7 +349,7 @@ fn mean(moments: &[Moment]) -> DQuat {
 }
 
 /// What banks into its turns is an aircraft, whose way says little of its attitude.
-fn upright(moments: &[Moment], mean: DQuat) -> Result<(), MountingError> {
+fn upright(moments: &[Moment], mean: DQuat) -> Result<(), Refused> {
     let square = moments
         .iter()
         .map(|m| deviation(m, mean).x.powi(2))
@@ -410,9 +357,10 @@ fn upright(moments: &[Moment], mean: DQuat) -> Result<(), MountingError> {
         / moments.len().max(1) as f64;
     let bank = square.sqrt();
     if bank > BANKED {
-        Err(MountingError::Banks {
-            bank_deg: bank / DEG,
-        })
+        let bank_deg = bank / DEG;
+        Err(not_found(format!(
+            "the vehicle banks by {bank_deg:.0}° (rms) along its track, as aircraft do"
+        )))
     } else {
         Ok(())
     }
@@ -487,7 +435,7 @@ fn track_attitude(v_n: DVec3, sigma_down: f64) -> DQuat {
 }
 
 /// The rotation from the IMU to the track.
-fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<Rough, MountingError> {
+fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<Rough, Refused> {
     let stretches = stretches(recorded, settings);
     let mut seen = Blocks::default();
     stretches.iter().for_each(|s| seen.add(s.t_s, 0.0, 1.0));
@@ -497,10 +445,7 @@ fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<Rough, Mounting
             .windows(2)
             .map(|w| (w[1].t_s - w[0].t_s).min(APART_S.1))
             .fold(0.0, |a, b| a + b);
-        return Err(MountingError::TooSlow {
-            seconds,
-            needed: FEWEST as f64 * BLOCK_S,
-        });
+        return Err(too_slow(seconds));
     }
     let weights: f64 = stretches.iter().map(|s| s.weight).sum();
     let mean = |of: fn(&Stretch) -> DVec3| {
@@ -534,18 +479,8 @@ fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<Rough, Mounting
             yaw_sigma,
         })
     } else {
-        let degrees = |angle: f64| {
-            if angle.is_finite() {
-                (angle / DEG).min(180.0)
-            } else {
-                180.0
-            }
-        };
-        Err(MountingError::NotDetermined {
-            axis: "yaw",
-            sigma_deg: degrees(yaw_sigma),
-            limit_deg: ROUGH / DEG,
-        })
+        // NaN is not less than half a turn
+        Err(undetermined("yaw", yaw_sigma.min(PI), ROUGH))
     }
 }
 

@@ -47,21 +47,6 @@ pub struct ImuSettings {
     pub temperature: Option<Temperature>,
 }
 
-/// An error of the true IMU of which no filter has states.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Defect {
-    /// What a budget calls it, behind the name of the sensor.
-    pub source: &'static str,
-    /// Sensors that have it.
-    pub sensors: &'static [Sensor],
-    /// Its key in a scenario.
-    pub key: &'static str,
-    /// Standard deviation.
-    pub sigma: f64,
-    /// Unit of the standard deviation.
-    pub unit: &'static str,
-}
-
 /// Largest scale-factor error (parts per million) and misalignment (rad).
 const MAX_SCALE_PPM: f64 = 1e5;
 const MAX_ANGLE_RAD: f64 = 0.1;
@@ -112,62 +97,29 @@ impl ImuSettings {
         [self.turn_on_bias_accel_m_s2, self.turn_on_bias_gyro_rad_s][sensor as usize]
     }
 
-    /// Its errors of which no filter has states.
-    pub fn without_states(&self) -> impl Iterator<Item = Defect> + use<> {
-        let rectification = self
-            .vibration
-            .as_ref()
-            .map_or(0.0, |v| v.rectification_s2_m);
+    /// Its errors of which no filter has states: the sensor if it is one alone, key, standard deviation, and unit of that.
+    pub fn without_states(
+        &self,
+    ) -> impl Iterator<Item = (Option<Sensor>, &'static str, f64, &'static str)> + use<> {
+        let vibration = self.vibration.as_ref();
+        let rectification = vibration.map_or(0.0, |v| v.rectification_s2_m);
         let [accel_k, gyro_k] =
             Sensor::ALL.map(|s| self.temperature.as_ref().map_or(0.0, |t| t.sigma(s)));
-        let defect = |source, sensors, key, sigma, unit| Defect {
-            source,
-            sensors,
-            key,
-            sigma,
-            unit,
-        };
-        let (both, accel, gyro): (&[Sensor], &[Sensor], &[Sensor]) =
-            (&Sensor::ALL, &[Sensor::Accel], &[Sensor::Gyro]);
+        let (accel, gyro) = (Some(Sensor::Accel), Some(Sensor::Gyro));
         let sensitivity = self.g_sensitivity_rad_s_per_m_s2;
         let all = [
-            defect(
-                "misalignment",
-                both,
-                "imu.misalignment_rad",
-                self.misalignment_rad,
-                "rad",
-            ),
-            defect(
-                "g_sensitivity",
+            (None, "misalignment_rad", self.misalignment_rad, "rad"),
+            (
                 gyro,
-                "imu.g_sensitivity_rad_s_per_m_s2",
+                "g_sensitivity_rad_s_per_m_s2",
                 sensitivity,
                 "rad/s per m/s²",
             ),
-            defect(
-                "rectification",
-                accel,
-                "imu.vibration.rectification_s2_m",
-                rectification,
-                "s²/m",
-            ),
-            defect(
-                "temperature",
-                accel,
-                "imu.temperature.accel_m_s2_k",
-                accel_k,
-                "m/s² per K",
-            ),
-            defect(
-                "temperature",
-                gyro,
-                "imu.temperature.gyro_rad_s_k",
-                gyro_k,
-                "rad/s per K",
-            ),
+            (accel, "vibration.rectification_s2_m", rectification, "s²/m"),
+            (accel, "temperature.accel_m_s2_k", accel_k, "m/s² per K"),
+            (gyro, "temperature.gyro_rad_s_k", gyro_k, "rad/s per K"),
         ];
-        all.into_iter().filter(|defect| defect.sigma > 0.0)
+        all.into_iter().filter(|(_, _, sigma, _)| *sigma > 0.0)
     }
 
     /// Whether the true IMU has no error beside its noise.

@@ -3,7 +3,7 @@
 //! A fix at t is missing when start ≤ t < end of any outage. Times are on the trajectory's own clock.
 
 use crate::rng::StreamKey;
-use crate::units::{Positive, SettingError};
+use crate::units::{Positive, Refused, SettingError};
 use rand_distr::{Distribution, Exp};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -71,32 +71,24 @@ impl fmt::Display for Outage {
     }
 }
 
-/// A text that is no outage.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum NotAnOutage {
-    /// It does not have two times.
-    #[error("expected START:END in seconds, such as 300:390")]
-    Form,
-    /// They are refused.
-    #[error(transparent)]
-    Times(#[from] SettingError),
-}
-
 impl FromStr for Outage {
-    type Err = NotAnOutage;
+    type Err = Refused;
 
     /// `START:END` or `START:+DURATION`, in seconds.
-    fn from_str(text: &str) -> Result<Self, NotAnOutage> {
-        let time = |text: &str| text.trim().parse::<f64>().map_err(|_| NotAnOutage::Form);
-        let (start, end) = text.split_once(':').ok_or(NotAnOutage::Form)?;
+    fn from_str(text: &str) -> Result<Self, Refused> {
+        let form = || Refused("expected START:END in seconds, such as 300:390".to_owned());
+        let time = |text: &str| text.trim().parse::<f64>().map_err(|_| form());
+        let (start, end) = text.split_once(':').ok_or_else(form)?;
         let start_s = time(start)?;
         let end_s = match end.trim().strip_prefix('+') {
             Some(duration) => start_s + time(duration)?,
             None => time(end)?,
         };
         let outage = Self { start_s, end_s };
-        outage.validate()?;
-        Ok(outage)
+        match outage.validate() {
+            Ok(()) => Ok(outage),
+            Err(e) => Err(Refused(e.to_string())),
+        }
     }
 }
 

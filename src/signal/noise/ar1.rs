@@ -1,6 +1,6 @@
 //! First-order autoregressive process: X_t = phi X_{t−1} + W_t, W white with variance sigma2.
 
-use super::{ParameterError, non_negative};
+use super::{Kind, ParameterError, checked};
 use std::f64::consts::LN_2;
 
 /// First-order autoregressive process, stationary: |phi| < 1.
@@ -11,25 +11,14 @@ pub struct Ar1 {
 }
 
 impl Ar1 {
-    /// Code in model files.
-    pub(crate) const CODE: &'static str = "AR1";
-
     /// From the coefficient (dimensionless) and the innovation variance (units²).
     ///
     /// # Errors
     /// When |phi| ≥ 1, the variance is negative, or either is not finite.
     pub fn new(phi: f64, sigma2: f64) -> Result<Self, ParameterError> {
-        if !(phi.is_finite() && phi.abs() < 1.0) {
-            return Err(ParameterError {
-                process: Self::CODE,
-                parameter: "phi",
-                value: phi,
-                domain: "between −1 and 1 (exclusive)",
-            });
-        }
         Ok(Self {
-            phi,
-            sigma2: non_negative(Self::CODE, "sigma2", sigma2)?,
+            phi: checked(Kind::Ar1, "phi", phi)?,
+            sigma2: checked(Kind::Ar1, "sigma2", sigma2)?,
         })
     }
 
@@ -255,25 +244,14 @@ pub struct Ma1 {
 }
 
 impl Ma1 {
-    /// Code in model files.
-    pub(crate) const CODE: &'static str = "MA1";
-
     /// From the coefficient (dimensionless) and the innovation variance (units²).
     ///
     /// # Errors
     /// When |theta| > 1, the variance is negative, or either is not finite.
     pub fn new(theta: f64, sigma2: f64) -> Result<Self, ParameterError> {
-        if !(theta.is_finite() && theta.abs() <= 1.0) {
-            return Err(ParameterError {
-                process: Self::CODE,
-                parameter: "theta",
-                value: theta,
-                domain: "between −1 and 1",
-            });
-        }
         Ok(Self {
-            theta,
-            sigma2: non_negative(Self::CODE, "sigma2", sigma2)?,
+            theta: checked(Kind::Ma1, "theta", theta)?,
+            sigma2: checked(Kind::Ma1, "sigma2", sigma2)?,
         })
     }
 
@@ -310,8 +288,6 @@ pub struct GaussMarkov {
 }
 
 impl GaussMarkov {
-    /// Code in model files.
-    pub(crate) const CODE: &'static str = "GM";
     /// Largest Allan deviation over standard deviation, reached with averages of [`Self::ALLAN_PEAK_AT`]
     /// correlation times: with averages of x correlation times the Allan variance is
     /// s2·(2/x)·[1 − (3 − 4e^(−x) + e^(−2x))/(2x)].
@@ -324,20 +300,9 @@ impl GaussMarkov {
     /// # Errors
     /// When beta or the rate is not positive, the variance is negative, or one is not finite.
     pub fn new(beta: f64, s2: f64, rate_hz: f64) -> Result<Self, ParameterError> {
-        let positive = |parameter, value: f64| {
-            if value.is_finite() && value > 0.0 {
-                Ok(value)
-            } else {
-                Err(ParameterError {
-                    process: Self::CODE,
-                    parameter,
-                    value,
-                    domain: "a finite number > 0",
-                })
-            }
-        };
+        let positive = |parameter, value| checked(Kind::GaussMarkov, parameter, value);
         let x = positive("beta", beta)? / positive("rate_hz", rate_hz)?;
-        let s2 = non_negative(Self::CODE, "s2", s2)?;
+        let s2 = checked(Kind::GaussMarkov, "s2", s2)?;
         // sigma2 = s2 (1 − phi²) by expm1: of a slow process phi² is next to 1 and the difference would lose
         // its digits.
         let ar1 = Ar1::new((-x).exp(), s2 * -(-2.0 * x).exp_m1())?;

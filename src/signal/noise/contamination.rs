@@ -7,6 +7,7 @@
 use super::{Ar1, Composite, Process, Synthesizer};
 use crate::imu::{Channel, Sensor};
 use crate::rng::StreamKey;
+use crate::units::Refused;
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal, StudentT};
 use serde::Serialize;
@@ -112,40 +113,7 @@ pub struct RefusedRule {
     /// Place of the rule.
     pub place: String,
     /// Why.
-    pub source: ContaminationError,
-}
-
-/// Why a rule cannot be applied.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ContaminationError {
-    /// The record is too short for it.
-    #[error("{what} needs {needed} samples, the record has {samples}")]
-    TooShort {
-        /// The operation.
-        what: &'static str,
-        /// Samples it reaches to.
-        needed: usize,
-        /// Samples of the record.
-        samples: usize,
-    },
-    /// The model has no such process or parameter.
-    #[error("{channel} has no {process} {parameter} to scale, only {}", known.join(", "))]
-    NothingToScale {
-        /// The axis.
-        channel: Channel,
-        /// Label asked for.
-        process: String,
-        /// Parameter asked for.
-        parameter: String,
-        /// Processes and parameters that the axis has.
-        known: Vec<String>,
-    },
-    /// A law that does not exist.
-    #[error("heavy tails of {0} degrees of freedom: more than 2 are needed")]
-    Freedom(f64),
-    /// The scaled parameter leaves its domain.
-    #[error("scaled: {0}")]
-    Scaled(#[from] super::ParameterError),
+    pub source: Refused,
 }
 
 /// A named set of rules.
@@ -247,7 +215,7 @@ impl Contamination {
 }
 
 impl Rule {
-    fn refused(&self, source: ContaminationError) -> RefusedRule {
+    fn refused(&self, source: Refused) -> RefusedRule {
         RefusedRule {
             place: self.place.clone(),
             source,
@@ -281,26 +249,23 @@ impl Operation {
         }
     }
 
-    fn apply(
-        &self,
-        x: &mut [f64],
-        rate_hz: f64,
-        key: StreamKey<'_>,
-    ) -> Result<(), ContaminationError> {
+    fn apply(&self, x: &mut [f64], rate_hz: f64, key: StreamKey<'_>) -> Result<(), Refused> {
         let fits = |what, needed| match needed <= x.len() {
             true => Ok(()),
-            false => Err(ContaminationError::TooShort {
-                what,
-                needed,
-                samples: x.len(),
-            }),
+            false => Err(Refused(format!(
+                "{what} needs {needed} samples, the record has {}",
+                x.len()
+            ))),
         };
         match self {
             Self::Scale { .. } => {}
             Self::Ar1(ar1) => add_ar1(x, *ar1, key),
             Self::HeavyTails { freedom, sigma } => {
-                let law =
-                    StudentT::new(*freedom).map_err(|_| ContaminationError::Freedom(*freedom))?;
+                let law = StudentT::new(*freedom).map_err(|_| {
+                    Refused(format!(
+                        "heavy tails of {freedom} degrees of freedom: more than 2 are needed"
+                    ))
+                })?;
                 let mut g = key.generator();
                 x.iter_mut().for_each(|v| *v += sigma * law.sample(&mut g));
             }
@@ -361,21 +326,20 @@ fn scale(
     (label, parameter): (&str, &str),
     factor: f64,
     rate_hz: f64,
-) -> Result<(), ContaminationError> {
+) -> Result<(), Refused> {
     let named = format!("{label} {parameter}");
     let found = noise
         .parameters()
         .find(|(of, _)| noise.name_of(*of) == named);
     let Some((of, value)) = found else {
         let known = noise.parameters().map(|(of, _)| noise.name_of(of));
-        return Err(ContaminationError::NothingToScale {
-            channel,
-            process: label.to_owned(),
-            parameter: parameter.to_owned(),
-            known: known.collect(),
-        });
+        let known = known.collect::<Vec<_>>().join(", ");
+        return Err(Refused(format!(
+            "{channel} has no {named} to scale, only {known}"
+        )));
     };
-    Ok(noise.set(of, factor * value, rate_hz)?)
+    let scaled = noise.set(of, factor * value, rate_hz);
+    scaled.map_err(|e| Refused(format!("scaled: {e}")))
 }
 
 fn add_ar1(x: &mut [f64], ar1: Ar1, key: StreamKey<'_>) {

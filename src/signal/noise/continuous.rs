@@ -4,9 +4,8 @@
 //! a Gauss-Markov process its correlation time and variance. Quantization noise belongs to the
 //! quantiser's own rate and cannot be converted.
 
-use super::{
-    Ar1, Composite, Drift, GaussMarkov, Model, ParameterError, Process, RandomWalk, White,
-};
+use super::{Ar1, Composite, Drift, GaussMarkov, Model, Process, RandomWalk, White};
+use crate::units::Refused;
 
 /// White noise density N = sigma √dt (units/√Hz).
 pub(crate) fn white_density(sigma2: f64, rate_hz: f64) -> f64 {
@@ -45,31 +44,11 @@ impl Process {
     }
 }
 
-/// Why a model cannot be used at another rate.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum RateError {
-    /// The process is tied to its own rate.
-    #[error("{code} at {from_hz} Hz cannot be converted to {to_hz} Hz: {why}")]
-    Tied {
-        /// Process code.
-        code: &'static str,
-        /// Rate of the model (Hz).
-        from_hz: f64,
-        /// Rate asked for (Hz).
-        to_hz: f64,
-        /// Why not.
-        why: &'static str,
-    },
-    /// A converted parameter left its domain.
-    #[error(transparent)]
-    Parameter(#[from] ParameterError),
-}
-
 /// The same noise sampled at another rate.
 ///
 /// # Errors
 /// When a process is tied to its own rate: QN, MA1, an AR1 with phi ≤ 0.
-pub fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, RateError> {
+pub fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, Refused> {
     let mut axes = model.axes.clone();
     if same_rate(model.rate_hz, rate_hz) {
         return Ok(model.clone());
@@ -90,13 +69,13 @@ pub fn same_rate(a_hz: f64, b_hz: f64) -> bool {
     (a_hz / b_hz - 1.0).abs() < 1e-6
 }
 
-fn process_at_rate(process: &Process, from_hz: f64, to_hz: f64) -> Result<Process, RateError> {
+fn process_at_rate(process: &Process, from_hz: f64, to_hz: f64) -> Result<Process, Refused> {
     let ratio = to_hz / from_hz;
-    let tied = |why| RateError::Tied {
-        code: process.code(),
-        from_hz,
-        to_hz,
-        why,
+    let tied = |why| {
+        Refused(format!(
+            "{} at {from_hz} Hz cannot be converted to {to_hz} Hz: {why}",
+            process.code()
+        ))
     };
     Ok(match process {
         // What is kept: N² = sigma2/f, K² = gamma2·f, and the slope per second.

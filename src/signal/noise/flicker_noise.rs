@@ -16,7 +16,7 @@
 //! AR1 whose correlation times are a factor e^h apart, each of stationary variance B²h/π or less; its spectrum is off by at most
 //! 2 sech(π²/h) between the ends (the transform of sech): 5e-4 for a factor of 3, 3.5 % for a factor of 8.
 
-use super::{Ar1, GaussMarkov, ParameterError, Process, White, non_negative};
+use super::{Ar1, GaussMarkov, Kind, ParameterError, Process, White, checked};
 use std::f64::consts::{LN_2, PI};
 use std::sync::OnceLock;
 
@@ -53,8 +53,6 @@ impl Ladder {
 }
 
 impl FlickerNoise {
-    /// Code in model files.
-    pub(crate) const CODE: &'static str = "FN";
     /// Averages up to which the Allan variance is summed; beyond, its distance from the limit falls with their square
     /// (but for a logarithm, 2e-8 of the limit).
     const SUMMED: u32 = 2048;
@@ -67,7 +65,7 @@ impl FlickerNoise {
     /// When it is negative or not finite.
     pub fn new(b2: f64) -> Result<Self, ParameterError> {
         Ok(Self {
-            b2: non_negative(Self::CODE, "b2", b2)?,
+            b2: checked(Kind::Flicker, "b2", b2)?,
         })
     }
 

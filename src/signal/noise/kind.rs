@@ -70,42 +70,42 @@ struct Row {
 /// One row a kind, in the order of [`Kind::ALL`].
 const TABLE: [Row; 8] = [
     Row {
-        code: White::CODE,
+        code: "WN",
         parameters: &[Parameter::Sigma2],
         units: "({u})², per sample",
     },
     Row {
-        code: Quantization::CODE,
+        code: "QN",
         parameters: &[Parameter::Q2],
         units: "({u})²",
     },
     Row {
-        code: Ar1::CODE,
+        code: "AR1",
         parameters: &[Parameter::Phi, Parameter::Sigma2],
         units: "({u})², innovation variance per sample",
     },
     Row {
-        code: GaussMarkov::CODE,
+        code: "GM",
         parameters: &[Parameter::Beta, Parameter::S2],
         units: "1/s, ({u})²",
     },
     Row {
-        code: Ma1::CODE,
+        code: "MA1",
         parameters: &[Parameter::Theta, Parameter::Sigma2],
         units: "({u})², innovation variance per sample",
     },
     Row {
-        code: FlickerNoise::CODE,
+        code: "FN",
         parameters: &[Parameter::B2],
         units: "({u})²",
     },
     Row {
-        code: RandomWalk::CODE,
+        code: "RW",
         parameters: &[Parameter::Gamma2],
         units: "({u})², increment variance per sample",
     },
     Row {
-        code: Drift::CODE,
+        code: "DR",
         parameters: &[Parameter::Slope],
         units: "{u} per sample",
     },

@@ -31,13 +31,12 @@ mod white;
 pub use ar1::{Ar1, GaussMarkov, Ma1};
 pub use flicker_noise::{Flicker, FlickerNoise, Ladder};
 pub use kind::{Composite, Kind, Parameter, ParameterRef, labels};
-pub use spread::{
-    Law, LognormalIntervals, ReplicateError, Spread, SpreadError, Variation, VirtualImu,
-};
+pub use spread::{Law, ReplicateError, Spread, SpreadError, Variation, VirtualImu};
 pub use synthesis::Synthesizer;
 pub use white::{Drift, Quantization, RandomWalk, White};
 
 use crate::imu::{Channel, Sensor};
+use crate::units::Refused;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 /// A parameter outside its domain.
@@ -54,22 +53,30 @@ pub struct ParameterError {
     pub domain: &'static str,
 }
 
-/// Accepts a finite, non-negative value.
-fn non_negative(
-    process: &'static str,
-    parameter: &'static str,
-    value: f64,
-) -> Result<f64, ParameterError> {
-    if value.is_finite() && value >= 0.0 {
-        Ok(value)
-    } else {
-        Err(ParameterError {
-            process,
-            parameter,
-            value,
-            domain: "a finite number ≥ 0",
-        })
+impl From<ParameterError> for Refused {
+    fn from(e: ParameterError) -> Self {
+        Self(e.to_string())
     }
+}
+
+/// Accepts a value that the parameter of this name may take.
+fn checked(kind: Kind, parameter: &'static str, value: f64) -> Result<f64, ParameterError> {
+    let (is_inside, domain) = match parameter {
+        "phi" => (value.abs() < 1.0, "between −1 and 1 (exclusive)"),
+        "theta" => (value.abs() <= 1.0, "between −1 and 1"),
+        "beta" | "rate_hz" => (value > 0.0, "a finite number > 0"),
+        "slope" => (true, "a finite number"),
+        _ => (value >= 0.0, "a finite number ≥ 0"),
+    };
+    if is_inside && value.is_finite() {
+        return Ok(value);
+    }
+    Err(ParameterError {
+        process: kind.code(),
+        parameter,
+        value,
+        domain,
+    })
 }
 
 /// One latent process.

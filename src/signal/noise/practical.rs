@@ -26,6 +26,7 @@
 
 use super::continuous::{walk_density, white_density};
 use super::{Composite, Kind, Process};
+use crate::units::Refused;
 
 /// Allan deviation over B of pure flicker noise: √(2 ln 2/π) = 0.664.
 const FLICKER_FLOOR: f64 = 0.664_282_8;
@@ -195,56 +196,21 @@ struct Point {
     carried: f64,
 }
 
-/// Why there is no curve.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum CurveError {
-    /// Too few averaging times.
-    #[error(
-        "the horizon {from_s} s to {to_s} s is refused: at {rate_hz} Hz it must begin at {shortest_s} s or later, span a \
-         factor of four and end below {longest_s:.0} s"
-    )]
-    Horizon {
-        /// Begin (s).
-        from_s: f64,
-        /// End (s).
-        to_s: f64,
-        /// Sample rate (Hz).
-        rate_hz: f64,
-        /// One sample (s).
-        shortest_s: f64,
-        /// Longest averaging time that a count of samples holds (s).
-        longest_s: f64,
-    },
-    /// The Allan variance vanishes.
-    #[error("the model has no noise at an averaging time of {tau_s} s")]
-    NoNoise {
-        /// Averaging time (s).
-        tau_s: f64,
-    },
-}
-
 impl Curve {
     /// The Allan variance of the largest of some axes at each averaging time of the horizon.
     ///
     /// # Errors
     /// When the horizon is too short or too long for the rate, or the axes have no noise there.
-    pub fn largest(
-        axes: &[&Composite],
-        rate_hz: f64,
-        horizon: Horizon,
-    ) -> Result<Self, CurveError> {
+    pub fn largest(axes: &[&Composite], rate_hz: f64, horizon: Horizon) -> Result<Self, Refused> {
         let Horizon { from_s, to_s } = horizon;
         let (shortest_s, longest_s) = (1.0 / rate_hz, f64::from(1_u32 << 30) / rate_hz);
         let usable =
             from_s >= shortest_s * (1.0 - 1e-9) && to_s >= 4.0 * from_s && to_s <= longest_s;
         if !usable {
-            return Err(CurveError::Horizon {
-                from_s,
-                to_s,
-                rate_hz,
-                shortest_s,
-                longest_s,
-            });
+            return Err(Refused(format!(
+                "the horizon {from_s} s to {to_s} s is refused: at {rate_hz} Hz it must begin at {shortest_s} s or \
+                 later, span a factor of four and end below {longest_s:.0} s"
+            )));
         }
         let point = |samples| point(axes, samples);
         let points: Vec<Point> = averages(from_s * rate_hz, to_s * rate_hz)
@@ -252,9 +218,10 @@ impl Curve {
             .map(point)
             .collect();
         if let Some(p) = points.iter().find(|p| p.whole <= 0.0) {
-            return Err(CurveError::NoNoise {
-                tau_s: f64::from(p.samples) / rate_hz,
-            });
+            let tau_s = f64::from(p.samples) / rate_hz;
+            return Err(Refused(format!(
+                "the model has no noise at an averaging time of {tau_s} s"
+            )));
         }
         // N is read at 1 s, where N²/τ is N².
         let reference = point((rate_hz.round() as u32).max(1));
@@ -617,7 +584,7 @@ impl AxisParameters {
         horizon: Horizon,
         policy: Policy,
         range_s: f64,
-    ) -> Result<Self, CurveError> {
+    ) -> Result<Self, Refused> {
         let curve = Curve::largest(axes, rate_hz, horizon)?;
         Ok(Self {
             walk: curve.pair(policy, Bias::Walk),

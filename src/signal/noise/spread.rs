@@ -31,97 +31,69 @@
 //! where one law stands for three axes.
 
 use super::contamination::{Contamination, RefusedRule};
-use super::{Composite, Model, Parameter, ParameterError, ParameterRef, Synthesizer};
+use super::{Composite, Model, Parameter, ParameterRef, Synthesizer};
 use crate::imu::{Channel, Recording, Signal};
 use crate::rng::{Generator, StreamKey};
 use rand::RngExt;
 use rand_distr::{Beta, StandardNormal};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-/// Why a law is refused.
+/// A law that is refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SpreadError {
-    /// The model has no process of that label.
-    #[error("the model has no process \"{label}\" there, only {}", known.join(", "))]
-    NoProcess {
-        /// Label asked for.
-        label: String,
-        /// Labels of the processes of the model.
-        known: Vec<String>,
-    },
-    /// The process has no parameter of that name.
-    #[error("{process} has no parameter \"{parameter}\", only {}", known.join(", "))]
-    NoParameter {
-        /// Code of the process.
-        process: &'static str,
-        /// Name asked for.
-        parameter: String,
-        /// Names of the parameters of the process.
-        known: Vec<&'static str>,
-    },
-    /// A constant of the law is outside its domain.
-    #[error("{name} = {value} is not {domain}")]
-    Constant {
-        /// Name of the constant.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What would be accepted.
-        domain: &'static str,
-    },
-    /// Theta may be negative.
-    #[error("theta has no logarithm: a lognormal law is of variances, slopes, phi and beta")]
-    Lognormal,
-    /// The law would draw values that the process cannot have.
-    #[error("the law reaches values that are refused: {0}")]
-    Reaches(ParameterError),
+#[error("{message}")]
+pub struct SpreadError {
+    /// Its key in files.
+    pub key: &'static str,
+    message: String,
+}
+
+fn refused<T>(key: &'static str, message: impl ToString) -> Result<T, SpreadError> {
+    let message = message.to_string();
+    Err(SpreadError { key, message })
 }
 
 /// Largest standard deviation of a logarithm.
 const LARGEST_SD: f64 = 10.0;
 
-/// A distribution.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+/// A distribution, as in model files.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
+#[schemars(tag = "distribution", !deny_unknown_fields)]
 pub enum Law {
-    /// low + width·B, B ~ Beta(a, b).
+    /// low + width × a beta law
     Beta {
-        /// First shape.
+        /// First shape
         a: f64,
-        /// Second shape.
+        /// Second shape
         b: f64,
-        /// Least value (units of the parameter).
+        /// Least value (units of the parameter)
         low: f64,
-        /// Greatest less least value (units of the parameter).
+        /// Greatest less least value (units of the parameter)
         width: f64,
     },
-    /// Normal about the model's value, truncated to the parameter's domain.
+    /// A normal law about the parameter, truncated to its domain
     Normal {
-        /// Standard deviation before truncation (units of the parameter).
+        /// Standard deviation before truncation (units of the parameter)
         sd: f64,
     },
-    /// Normal on the scale of [`Parameter::scaled`]: of a variance or slope the logarithm, of phi and beta that of the correlation
-    /// time.
+    /// A normal law of the logarithm of the parameter, of phi and beta of that of the correlation time
     Lognormal {
-        /// Median (units of the parameter).
+        /// Median (units of the parameter)
         median: f64,
-        /// Standard deviation of the logarithm.
-        sd: f64,
-        /// 95 % intervals of the two, where they were estimated.
+        /// Its 95 % interval, where it was estimated
         #[serde(skip_serializing_if = "Option::is_none")]
-        ci95: Option<LognormalIntervals>,
+        median_ci95: Option<[f64; 2]>,
+        /// Standard deviation of the logarithm
+        sd: f64,
+        /// Its 95 % interval
+        #[serde(skip_serializing_if = "Option::is_none")]
+        sd_ci95: Option<[f64; 2]>,
     },
-}
-
-/// What recordings leave open of a lognormal law: 95 % intervals.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct LognormalIntervals {
-    /// Of the median (units of the parameter).
-    pub median: [f64; 2],
-    /// Of the standard deviation of the logarithm.
-    pub sd: [f64; 2],
 }
 
 /// The law of one parameter of one process of one axis.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Variation {
     /// Label of the process, as [`Composite::labels`].
     pub process: String,
@@ -146,19 +118,21 @@ impl Variation {
     ) -> Result<Self, SpreadError> {
         let labels = noise.labels();
         let Some(at) = labels.iter().position(|l| l == process) else {
-            return Err(SpreadError::NoProcess {
-                label: process.to_owned(),
-                known: labels,
-            });
+            let known = labels.join(", ");
+            return refused(
+                "process",
+                format!("the model has no process \"{process}\" there, only {known}"),
+            );
         };
         let mut own = noise.parameters().filter(|(of, _)| of.process == at);
         let Some((of, value)) = own.find(|(of, _)| of.parameter.name() == parameter) else {
-            let known = noise.processes[at].parameters();
-            return Err(SpreadError::NoParameter {
-                process: noise.processes[at].code(),
-                parameter: parameter.to_owned(),
-                known: known.into_iter().map(|(name, _)| name).collect(),
-            });
+            let process = &noise.processes[at];
+            let known: Vec<_> = process.parameters().into_iter().map(|(n, _)| n).collect();
+            let (code, known) = (process.code(), known.join(", "));
+            return refused(
+                "parameter",
+                format!("{code} has no parameter \"{parameter}\", only {known}"),
+            );
         };
         let variation = Self {
             process: process.to_owned(),
@@ -174,10 +148,10 @@ impl Variation {
             Law::Lognormal { median, .. } => [median; 2],
         };
         for end in ends {
-            noise
-                .clone()
-                .set(of, end, rate_hz)
-                .map_err(SpreadError::Reaches)?;
+            if let Err(e) = noise.clone().set(of, end, rate_hz) {
+                let message = format!("the law reaches values that are refused: {e}");
+                return refused("distribution", message);
+            }
         }
         Ok(variation)
     }
@@ -187,11 +161,7 @@ impl Variation {
             if value.is_finite() && ok {
                 Ok(())
             } else {
-                Err(SpreadError::Constant {
-                    name,
-                    value,
-                    domain,
-                })
+                refused(name, format!("{name} = {value} is not {domain}"))
             }
         };
         match self.law {
@@ -208,9 +178,10 @@ impl Variation {
                 check("sd", sd, (0.0..=1.0).contains(&sd), "between 0 and 1")
             }
             Law::Normal { sd } => check("sd", sd, sd >= 0.0, "a finite number ≥ 0"),
-            Law::Lognormal { .. } if self.of.parameter == Parameter::Theta => {
-                Err(SpreadError::Lognormal)
-            }
+            Law::Lognormal { .. } if self.of.parameter == Parameter::Theta => refused(
+                "distribution",
+                "theta has no logarithm: a lognormal law is of variances, slopes, phi and beta",
+            ),
             Law::Lognormal { median, sd, .. } => {
                 check("median", median, median > 0.0, "a finite number > 0")?;
                 // ±8 standard deviations of 10 are 1e±35: more is a slip, and would leave the range of numbers.

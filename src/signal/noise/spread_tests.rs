@@ -75,7 +75,8 @@ fn lognormal_is_of_variances_and_of_correlation_times() {
     let law = |median| Law::Lognormal {
         median,
         sd: 0.3,
-        ci95: None,
+        median_ci95: None,
+        sd_ci95: None,
     };
     let time = |phi: f64| -1.0 / phi.ln();
     for (process, parameter, at, median, of) in [
@@ -129,7 +130,8 @@ fn draws_move_with_their_centre() {
     let phi = Law::Lognormal {
         median: 0.98,
         sd: 0.3,
-        ci95: None,
+        median_ci95: None,
+        sd_ci95: None,
     };
     s.axes[0].push(Variation::new(&n1(), RATE, "AR1", "phi", phi).unwrap());
     let model = Model::pooled(RATE, &n1(), &n1());
@@ -188,7 +190,8 @@ fn impossible_laws_are_refused_in_words() {
     let lognormal = |median, sd| Law::Lognormal {
         median,
         sd,
-        ci95: None,
+        median_ci95: None,
+        sd_ci95: None,
     };
     assert_eq!(
         refusal("WN", "sigma2", lognormal(0.0, 0.1)),

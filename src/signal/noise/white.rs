@@ -1,7 +1,7 @@
 //! White noise: independent samples.
 
 use super::ar1::half_scale;
-use super::{ParameterError, non_negative};
+use super::{Kind, ParameterError, checked};
 
 /// White noise: independent samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -10,16 +10,13 @@ pub struct White {
 }
 
 impl White {
-    /// Code in model files.
-    pub(crate) const CODE: &'static str = "WN";
-
     /// Variance of a sample (units²).
     ///
     /// # Errors
     /// When it is negative or not finite.
     pub fn new(sigma2: f64) -> Result<Self, ParameterError> {
         Ok(Self {
-            sigma2: non_negative(Self::CODE, "sigma2", sigma2)?,
+            sigma2: checked(Kind::White, "sigma2", sigma2)?,
         })
     }
 
@@ -43,16 +40,13 @@ pub struct Quantization {
 }
 
 impl Quantization {
-    /// Code in model files.
-    pub(crate) const CODE: &'static str = "QN";
-
     /// Q² (units²).
     ///
     /// # Errors
     /// When it is negative or not finite.
     pub fn new(q2: f64) -> Result<Self, ParameterError> {
         Ok(Self {
-            q2: non_negative(Self::CODE, "q2", q2)?,
+            q2: checked(Kind::Quantization, "q2", q2)?,
         })
     }
 
@@ -77,16 +71,13 @@ pub struct RandomWalk {
 }
 
 impl RandomWalk {
-    /// Code in model files.
-    pub(crate) const CODE: &'static str = "RW";
-
     /// Variance of an increment (units²).
     ///
     /// # Errors
     /// When it is negative or not finite.
     pub fn new(gamma2: f64) -> Result<Self, ParameterError> {
         Ok(Self {
-            gamma2: non_negative(Self::CODE, "gamma2", gamma2)?,
+            gamma2: checked(Kind::RandomWalk, "gamma2", gamma2)?,
         })
     }
 
@@ -111,24 +102,14 @@ pub struct Drift {
 }
 
 impl Drift {
-    /// Code in model files.
-    pub(crate) const CODE: &'static str = "DR";
-
     /// Slope (units per sample).
     ///
     /// # Errors
     /// When it is not finite.
     pub fn new(slope: f64) -> Result<Self, ParameterError> {
-        if slope.is_finite() {
-            Ok(Self { slope })
-        } else {
-            Err(ParameterError {
-                process: Self::CODE,
-                parameter: "slope",
-                value: slope,
-                domain: "a finite number",
-            })
-        }
+        Ok(Self {
+            slope: checked(Kind::Drift, "slope", slope)?,
+        })
     }
 
     /// Slope (units per sample).
