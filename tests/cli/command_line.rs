@@ -313,7 +313,11 @@ fn an_unknown_option_is_refused() {
     let output = nav_sim().args(words).output().unwrap();
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2), "{said}");
-    assert_eq!(said, "error: unexpected argument --gains found\n");
+    let hint = "hint: --help shows usage and examples\n";
+    assert_eq!(
+        said,
+        format!("error: unexpected argument --gains found\n\n{hint}")
+    );
 }
 
 /// Commands that only write files tell them in JSON too.
