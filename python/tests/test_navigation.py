@@ -176,7 +176,7 @@ def test_local_coordinates_ask_for_an_origin() -> None:
 
 
 WRONG: list[tuple[dict[str, Any], str]] = [
-    ({"filter": 16}, 'filter=\'16\': expected "15", "21" or "full"'),
+    ({"filter": 16}, 'filter=\'16\': "16" is not one of 15, 21, full'),
     ({"require": "p95<5"}, 'require=\'p95<5\': expected "consistent" or NAME'),
     ({"require": 5.0}, "require='5.0': expected"),
     ({"turn_on_bias": (1,)}, "turn_on_bias="),
