@@ -3,7 +3,6 @@
 mod command;
 mod context;
 pub(crate) mod inputs;
-
 pub mod reading;
 
 pub use crate::failure::{Failure, Result};

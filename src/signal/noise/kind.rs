@@ -359,7 +359,9 @@ impl Composite {
         value: f64,
         rate_hz: f64,
     ) -> Result<(), ParameterError> {
-        let process = &mut self.processes[of.process];
+        let Some(process) = self.processes.get_mut(of.process) else {
+            return Ok(());
+        };
         let parameters = process.kind().parameters().iter();
         let values = parameters.zip(process.values());
         let values: Vec<f64> = values

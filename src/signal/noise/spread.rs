@@ -202,9 +202,8 @@ impl Variation {
         loop {
             let value = match self.law {
                 Law::Beta { a, b, low, width } => {
-                    // its shapes were checked
-                    let share = Beta::new(a, b).map_or(0.5, |law| g.sample(law));
-                    low + width * share
+                    let share = Beta::new(a, b).expect("shapes > 0, by Variation::new");
+                    low + width * g.sample(share)
                 }
                 Law::Normal { sd } => centre + sd * g.sample::<f64, _>(StandardNormal),
                 Law::Lognormal {
