@@ -56,7 +56,7 @@ struct Temporary {
 }
 
 /// Ending of what is being written.
-const PARTIAL: &str = ".partial";
+pub(crate) const PARTIAL: &str = ".partial";
 
 impl Temporary {
     fn new(path: PathBuf, lock: Option<File>) -> Self {

@@ -84,6 +84,19 @@ fn cells_are_known_by_what_they_hold() {
     );
 }
 
+/// A cell that another worker is writing is whole before it has its name: nobody else gives it one.
+#[test]
+fn cells_in_work_are_left_to_their_workers() {
+    let place = place();
+    let dir = place.path();
+    ended(dir, "batch study.toml -o out", 0);
+    let all = dir.join("out/cells");
+    let in_work = all.join(".length_s=4_imu.1-0.partial");
+    fs::rename(all.join("length_s=4_imu"), &in_work).unwrap();
+    ended(dir, "batch study.toml -o out", 0);
+    assert!(in_work.join("manifest.json").exists() && all.join("length_s=4_imu").exists());
+}
+
 #[test]
 fn damaged_cells_are_set_aside_and_computed_again() {
     let place = place();

@@ -216,7 +216,8 @@ fn adopt(
         .flatten()
         .flatten()
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
-        .filter(|name| !name.ends_with(".damaged"))
+        // what another worker is writing has a manifest before it has its name
+        .filter(|name| !name.ends_with(".damaged") && !name.ends_with(atomic::PARTIAL))
         .filter_map(|name| Some((place.manifest(&name)?.key, name)));
     let there: HashMap<String, String> = keyed.collect();
     let named = |name: &str| cells.iter().find(|cell| cell.name == name);
