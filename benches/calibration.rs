@@ -5,7 +5,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 
 use nav_sim::calibration::{ModelSpec, Weighting, fit};
-use nav_sim::signal::noise::{Ar1, Process, Quantization, RandomWalk, White};
+use nav_sim::signal::noise::Process;
 use nav_sim::signal::rng::StreamKey;
 use nav_sim::signal::wavelet;
 use nav_sim::signal::wavelet::{Curve, Tuning};
@@ -77,11 +77,11 @@ fn wavelet_variance(c: &mut Criterion) {
 fn noisy_curve() -> Curve {
     let levels: Vec<u32> = (1..=LEVELS).collect();
     let n2 = [
-        Process::White(White::new(5.2e-5).unwrap()),
-        Process::Quantization(Quantization::new(1e-7).unwrap()),
-        Process::Ar1(Ar1::new(0.9835, 1.3e-8).unwrap()),
-        Process::Ar1(Ar1::new(0.9999, 1e-11).unwrap()),
-        Process::RandomWalk(RandomWalk::new(2.9e-11).unwrap()),
+        Process::white(5.2e-5).unwrap(),
+        Process::quantization(1e-7).unwrap(),
+        Process::ar1(0.9835, 1.3e-8).unwrap(),
+        Process::ar1(0.9999, 1e-11).unwrap(),
+        Process::random_walk(2.9e-11).unwrap(),
     ];
     let edof: Vec<f64> = levels
         .iter()

@@ -20,9 +20,7 @@ fn synthesizer(processes: Vec<Process>, source: &str) -> Synthesizer {
 }
 
 fn process(code: &str, values: &[f64]) -> Process {
-    Process::from_values(code, values, 100.0)
-        .expect("known")
-        .expect("sound")
+    Process::of_values(Kind::named(code).expect("known"), values, 100.0).expect("sound")
 }
 
 fn single_processes(c: &mut Criterion) {

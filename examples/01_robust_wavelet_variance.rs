@@ -1,16 +1,16 @@
 //! The effect of one shock on the classical wavelet variance, and its absence in the robust one.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
-use nav_sim::signal::noise::{Ar1, Composite, Process, RandomWalk, Synthesizer, White};
+use nav_sim::signal::noise::{Composite, Process, Synthesizer};
 use nav_sim::signal::rng::StreamKey;
 use nav_sim::signal::wavelet::{Tuning, both};
 
 pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     // N1 of Minaretzis et al. 2024 for an accelerometer, per sample at 100 Hz
     let noise = Composite::new(vec![
-        Process::White(White::new(5.2e-5)?),
-        Process::Ar1(Ar1::new(0.986, 1.5e-8)?),
-        Process::RandomWalk(RandomWalk::new(3.3e-11)?),
+        Process::white(5.2e-5)?,
+        Process::ar1(0.986, 1.5e-8)?,
+        Process::random_walk(3.3e-11)?,
     ]);
     let key = StreamKey {
         seed: 1,

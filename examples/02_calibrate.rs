@@ -2,7 +2,7 @@
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 use nav_sim::calibration::{Estimator, ModelSpec, Replicate, Trim, Weighting, average, fit};
-use nav_sim::signal::noise::{Ar1, Composite, Process, RandomWalk, Synthesizer, White};
+use nav_sim::signal::noise::{Composite, Kind, Process, Synthesizer};
 use nav_sim::signal::rng::StreamKey;
 use nav_sim::signal::wavelet::{Tuning, both};
 
@@ -11,9 +11,9 @@ const LEVELS: u32 = 15;
 
 fn n1(gamma2: f64) -> Result<Composite, Box<dyn std::error::Error>> {
     Ok(Composite::new(vec![
-        Process::White(White::new(5.2e-5)?),
-        Process::Ar1(Ar1::new(0.986, 1.5e-8)?),
-        Process::RandomWalk(RandomWalk::new(gamma2)?),
+        Process::white(5.2e-5)?,
+        Process::ar1(0.986, 1.5e-8)?,
+        Process::random_walk(gamma2)?,
     ]))
 }
 
@@ -52,12 +52,9 @@ pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     for estimator in [Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv] {
         let curve = average(&replicates, estimator, Trim::Count(2), &tuning)?;
         let fitted = fit(&curve, &ModelSpec::n1(), 100.0, Weighting::Edof)?;
-        let walk = fitted.composite.processes.iter().find_map(|p| match p {
-            Process::RandomWalk(walk) => Some(walk.gamma2()),
-            _ => None,
-        });
-        println!("{:8} finds {:.1e}", estimator.name(), walk.unwrap_or(0.0));
-        gamma2.push(walk.unwrap_or(0.0));
+        let walk = fitted.composite.amplitude_of(Kind::RandomWalk);
+        println!("{:8} finds {:.1e}", estimator.name(), walk);
+        gamma2.push(walk);
     }
     // The mean over replicates is pulled away by the abnormal one, the trimmed mean is not.
     assert!(gamma2[0] > 1e-10 && gamma2[2] < 1e-10);

@@ -9,17 +9,14 @@ use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
-use nav_sim::signal::noise::{Ar1, Composite, Model, Process, White};
+use nav_sim::signal::noise::{Composite, Model, Process};
 use std::path::Path;
 
 fn model(gyro_bias_sigma: f64) -> Result<Model, Box<dyn std::error::Error>> {
     let phi = 0.9999_f64; // a correlation time of 100 s at 100 Hz
-    let bias = |sigma: f64| Ar1::new(phi, sigma * sigma * (1.0 - phi * phi)).map(Process::Ar1);
-    let accel = Composite::new(vec![Process::White(White::new(1e-4)?), bias(5e-3)?]);
-    let gyro = Composite::new(vec![
-        Process::White(White::new(1e-6)?),
-        bias(gyro_bias_sigma)?,
-    ]);
+    let bias = |sigma: f64| Process::ar1(phi, sigma * sigma * (1.0 - phi * phi));
+    let accel = Composite::new(vec![Process::white(1e-4)?, bias(5e-3)?]);
+    let gyro = Composite::new(vec![Process::white(1e-6)?, bias(gyro_bias_sigma)?]);
     Ok(Model::pooled(100.0, &accel, &gyro))
 }
 

@@ -13,9 +13,7 @@ use nav_sim_navigation::lanes::{LANES, Lanes, Level, Vec3};
 use nav_sim_navigation::sensors::imu::{ErrorSource, ImuErrors, LaneErrors};
 use nav_sim_navigation::strapdown::Strapdown;
 use nav_sim_signal::imu::ImuSample;
-use nav_sim_signal::noise::{
-    Ar1, Composite, Model, ParameterError, Process, Quantization, RandomWalk, White,
-};
+use nav_sim_signal::noise::{Composite, Model, ParameterError, Process};
 use nav_sim_signal::rng::StreamKey;
 
 /// IMU samples of one round.
@@ -30,11 +28,11 @@ pub(crate) const RUN_EPOCHS: usize = SAMPLES * LANES;
 pub(crate) fn model() -> Result<Model, ParameterError> {
     let axis = |scale: f64| -> Result<Composite, ParameterError> {
         Ok(Composite::new(vec![
-            Process::White(White::new(scale * 5e-5)?),
-            Process::Quantization(Quantization::new(scale * 1e-7)?),
-            Process::Ar1(Ar1::new(0.9835, scale * 1.3e-8)?),
-            Process::Ar1(Ar1::new(0.9999, scale * 1e-11)?),
-            Process::RandomWalk(RandomWalk::new(scale * 2.9e-11)?),
+            Process::white(scale * 5e-5)?,
+            Process::quantization(scale * 1e-7)?,
+            Process::ar1(0.9835, scale * 1.3e-8)?,
+            Process::ar1(0.9999, scale * 1e-11)?,
+            Process::random_walk(scale * 2.9e-11)?,
         ]))
     };
     Ok(Model::pooled(100.0, &axis(1.0)?, &axis(1e-2)?))

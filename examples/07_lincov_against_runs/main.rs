@@ -66,7 +66,7 @@ fn stronger(model: &Model, kind: Kind, which: usize) -> Result<Model, Failure> {
             .iter_mut()
             .filter(|p| p.kind() == kind);
         let process = own.nth(which).ok_or("the model has no such process")?;
-        *process = process.times(4.0, model.rate_hz)?;
+        *process = process.times(4.0)?;
     }
     Ok(stronger)
 }

@@ -12,6 +12,7 @@ use nav_sim::calibration::{Estimator, Trim, Weighting};
 use nav_sim::document::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg};
 use nav_sim::io::contamination_file;
 use nav_sim::prelude::*;
+use nav_sim::signal::noise::Kind;
 use nav_sim::signal::noise::contamination::Contamination;
 use nav_sim::signal::wavelet::{Tuning, default_levels};
 use rayon::prelude::*;
@@ -226,10 +227,8 @@ fn figure2(design: &Design, rows: &[Row]) -> String {
 pub(crate) fn sensitivity(design: &Design) -> Result<String, Failure> {
     let names = Design::parameters(&target(design)?.fit.composite);
     let noise = design.model.axis(design.channel);
-    let white = noise.processes.iter().find_map(|p| match p {
-        Process::White(white) => Some(white.sigma2()),
-        _ => None,
-    });
+    let mut white = noise.processes.iter().filter(|p| p.kind() == Kind::White);
+    let white = white.next().map(Process::amplitude);
     // An outlier's unit: the standard deviation of the white noise, or of what the first scale sees.
     let unit = white.unwrap_or_else(|| 2.0 * noise.haar_wv(1)).sqrt();
     let outliers: Vec<f64> = (0..=9).map(|k| 10_f64.powi(k)).collect();

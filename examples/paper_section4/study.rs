@@ -98,12 +98,7 @@ impl Design {
                 let (channel, rate_hz) = (self.channel, self.model.rate_hz);
                 // The model's own values stand for those drawn: a scaled parameter that leaves its domain
                 // only for some draw is found when it is drawn.
-                scenario.scale(
-                    &mut self.model.axis(channel).clone(),
-                    channel,
-                    replicate,
-                    rate_hz,
-                )?;
+                scenario.scale(&mut self.model.axis(channel).clone(), channel, replicate)?;
                 scenario.apply(&mut nothing, channel, replicate, rate_hz, 0)?;
             }
         }
@@ -197,7 +192,6 @@ impl Design {
             &mut model.axes[self.channel.index()],
             self.channel,
             replicate,
-            rate_hz,
         )?;
         let mut samples = self.synthesized(set, replicate, &model);
         how.apply(
@@ -295,7 +289,7 @@ pub fn target(design: &Design) -> Result<Target, Failure> {
     let edof = |j| design.replicates as f64 * interval::edof_eta3(design.samples, j);
     let levels: Vec<u32> = (1..=design.levels).collect();
     let curve = Curve {
-        wv: expected_wv(noise, laws, rate_hz, design.levels)?,
+        wv: expected_wv(noise, laws, design.levels)?,
         edof: levels.iter().map(|j| edof(*j)).collect(),
         levels,
         ..Curve::default()
@@ -311,13 +305,12 @@ pub fn target(design: &Design) -> Result<Target, Failure> {
 pub fn expected_wv(
     noise: &Composite,
     laws: &[Variation],
-    rate_hz: f64,
     levels: u32,
 ) -> Result<Vec<f64>, ParameterError> {
     let mut expected = vec![0.0; levels as usize];
     for (at, process) in noise.processes.iter().enumerate() {
         let own = laws.iter().filter(|l| l.of.process == at);
-        for (process, weight) in weighted(process, own, rate_hz)? {
+        for (process, weight) in weighted(process, own)? {
             for (nu, level) in expected.iter_mut().zip(1..) {
                 // nu is a sum over the processes, and so is its expectation: laws of different processes need
                 // no common quadrature.
@@ -332,7 +325,6 @@ pub fn expected_wv(
 fn weighted<'a>(
     process: &Process,
     laws: impl Iterator<Item = &'a Variation>,
-    rate_hz: f64,
 ) -> Result<Vec<(Process, f64)>, ParameterError> {
     let mut all = vec![(Composite::new(vec![*process]), 1.0)];
     for law in laws {
@@ -345,7 +337,7 @@ fn weighted<'a>(
         for (noise, weight) in &all {
             for (value, node) in &nodes {
                 let mut noise = noise.clone();
-                noise.set(of, *value, rate_hz)?;
+                noise.set(of, *value)?;
                 next.push((noise, weight * node));
             }
         }
@@ -589,14 +581,13 @@ pub fn abnormal_curve(
         (1 + design.replicates.saturating_sub(count)..=design.replicates).collect();
     curve(design, &abnormal, factors, |replicate, factor| {
         let mut model = design.drawn(0, replicate);
-        let rate_hz = model.rate_hz;
         let processes = &mut model.axes[design.channel.index()].processes;
         let mut walks = processes
             .iter_mut()
             .filter(|p| p.kind() == Kind::RandomWalk);
         let walk = walks.next();
         let walk = walk.ok_or("no random walk whose variance could be made abnormal")?;
-        *walk = walk.times(factor, rate_hz)?;
+        *walk = walk.times(factor)?;
         design.measure(&design.synthesized(0, replicate, &model))
     })
 }

@@ -12,7 +12,7 @@ use crate::curve::{CalibrationError, Estimator, Group, Replicate, Scope, average
 use crate::fit::Fit;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::model::ModelSpec;
-use crate::noise::{Composite, Model, Process, Spread};
+use crate::noise::{Composite, Kind, Model, Process, Spread};
 use crate::outcome::{Bootstrap, Inference, ModelChoice, Outcome, Settings};
 use crate::pipeline::fit_curve;
 use crate::uncertainty::bootstrap::{CurveSampler, Scattering, like};
@@ -249,10 +249,10 @@ impl Anticipated<'_> {
 fn in_order(composite: &Composite) -> Composite {
     let mut processes = composite.processes.clone();
     processes.sort_by(|a, b| {
-        let time = |p: &Process| match p {
-            // phi rises with the correlation time, beta falls.
-            Process::GaussMarkov(p) => -p.beta(),
-            other => other.kind().shape().map_or(0.0, |_| other.values()[0]),
+        // phi rises with the correlation time, beta falls.
+        let time = |p: &Process| match p.kind() {
+            Kind::GaussMarkov => -p.shape(),
+            _ => p.shape(),
         };
         a.kind().cmp(&b.kind()).then(time(a).total_cmp(&time(b)))
     });
@@ -262,15 +262,15 @@ fn in_order(composite: &Composite) -> Composite {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::{RandomWalk, Variation, VirtualImu, White};
+    use crate::noise::{Process, Variation, VirtualImu};
     use crate::{Pool, calibrate, grouped, replicates};
 
     const RECORDINGS: usize = 4;
     const SAMPLES: usize = 2048;
 
     fn model() -> Model {
-        let white = Process::White(White::new(1.0).unwrap());
-        let walk = Process::RandomWalk(RandomWalk::new(1e-3).unwrap());
+        let white = Process::white(1.0).unwrap();
+        let walk = Process::random_walk(1e-3).unwrap();
         let axis = Composite::new(vec![white, walk]);
         Model::pooled(1.0, &axis, &axis)
     }
@@ -355,7 +355,7 @@ mod tests {
     fn endless_recordings_leave_what_they_differ_by() {
         let law = crate::noise::Law::Normal { sd: 0.1 };
         let axis = model().axes[0].clone();
-        let vary = || vec![Variation::new(&axis, 1.0, "WN", "sigma2", law).unwrap()];
+        let vary = || vec![Variation::new(&axis, "WN", "sigma2", law).unwrap()];
         let spread = Spread {
             axes: std::array::from_fn(|_| vary()),
         };
@@ -376,7 +376,7 @@ mod tests {
         let axis = model().axes[0].clone();
         let vary = || {
             [("WN", "sigma2"), ("RW", "gamma2")]
-                .map(|(p, key)| Variation::new(&axis, 1.0, p, key, law).unwrap())
+                .map(|(p, key)| Variation::new(&axis, p, key, law).unwrap())
         };
         let spread = Spread {
             axes: std::array::from_fn(|_| vary().to_vec()),
@@ -410,7 +410,7 @@ mod tests {
             sd_ci95: None,
         };
         let axis = model().axes[0].clone();
-        let vary = || vec![Variation::new(&axis, 1.0, "WN", "sigma2", law).unwrap()];
+        let vary = || vec![Variation::new(&axis, "WN", "sigma2", law).unwrap()];
         let spread = Spread {
             axes: std::array::from_fn(|_| vary()),
         };

@@ -6,11 +6,11 @@
 //!
 //! ```
 //! use nav_sim_calibration::{ModelSpec, Weighting, fit};
-//! use nav_sim_signal::noise::{Composite, Process, RandomWalk, White};
+//! use nav_sim_signal::noise::{Composite, Process};
 //! use nav_sim_signal::wavelet::Curve;
 //!
-//! let (white, walk) = (White::new(4e-6)?, RandomWalk::new(1e-12)?);
-//! let truth = Composite::new(vec![Process::White(white), Process::RandomWalk(walk)]);
+//! let (white, walk) = (Process::white(4e-6)?, Process::random_walk(1e-12)?);
+//! let truth = Composite::new(vec![white, walk]);
 //! let levels: Vec<u32> = (1..=14).collect();
 //! let wv = levels.iter().map(|level| truth.haar_wv(*level)).collect();
 //! let curve = Curve { wv, edof: vec![100.0; levels.len()], levels, ..Curve::default() };

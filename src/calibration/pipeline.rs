@@ -150,7 +150,7 @@ mod tests {
     use super::*;
     use crate::curve::Scope;
     use crate::imu::Sensor;
-    use crate::noise::{Ar1, Composite, Process, RandomWalk, White};
+    use crate::noise::{Composite, Process};
     use crate::outcome::FitRange;
     use approx::assert_relative_eq;
 
@@ -159,8 +159,8 @@ mod tests {
     #[test]
     fn a_scale_without_a_root_bounds_the_fit() {
         let model = Composite::new(vec![
-            Process::White(White::new(1.0).unwrap()),
-            Process::RandomWalk(RandomWalk::new(1e-4).unwrap()),
+            Process::white(1.0).unwrap(),
+            Process::random_walk(1e-4).unwrap(),
         ]);
         let levels: Vec<u32> = (1..=12).collect();
         let wv = levels.iter().map(|l| {
@@ -199,9 +199,9 @@ mod tests {
     #[test]
     fn a_range_of_scales_is_the_curve_without_the_others() {
         let model = Composite::new(vec![
-            Process::White(White::new(1.0).unwrap()),
-            Process::Ar1(Ar1::new(0.99, 1e-3).unwrap()),
-            Process::RandomWalk(RandomWalk::new(1e-7).unwrap()),
+            Process::white(1.0).unwrap(),
+            Process::ar1(0.99, 1e-3).unwrap(),
+            Process::random_walk(1e-7).unwrap(),
         ]);
         let levels: Vec<u32> = (1..=16).collect();
         // Off by a few per cent from scale to scale, and by a factor of two at the first one.

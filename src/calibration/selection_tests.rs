@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::imu::{Axis, Channel, Sensor};
-use crate::noise::{Ar1, Composite, Process, RandomWalk, Synthesizer, White};
+use crate::noise::{Composite, Process, Synthesizer};
 use crate::rng::StreamKey;
 use crate::wavelet::{Tuning, both};
 use crate::{
@@ -80,9 +80,9 @@ fn the_truth_is_chosen_in_seventy_two_sets() {
 
 fn chosen_as_often_as_said(sets: u64, least: usize) {
     let mut right = 0;
-    let white = Process::White(White::new(1.0).unwrap());
-    let walk = Process::RandomWalk(RandomWalk::new(1e-3).unwrap());
-    let correlated = Process::Ar1(Ar1::new(0.95, 0.05).unwrap());
+    let white = Process::white(1.0).unwrap();
+    let walk = Process::random_walk(1e-3).unwrap();
+    let correlated = Process::ar1(0.95, 0.05).unwrap();
     for truth in [vec![white], vec![white, walk], vec![white, correlated]] {
         let noise = Composite::new(truth);
         let name = noise
@@ -103,8 +103,8 @@ fn chosen_as_often_as_said(sets: u64, least: usize) {
 #[test]
 fn candidates_are_ranked() {
     let noise = Composite::new(vec![
-        Process::White(White::new(1.0).unwrap()),
-        Process::RandomWalk(RandomWalk::new(1e-3).unwrap()),
+        Process::white(1.0).unwrap(),
+        Process::random_walk(1e-3).unwrap(),
     ]);
     let ranking = outcome(3, &noise).ranking.unwrap();
     assert!(
@@ -125,9 +125,9 @@ fn candidates_are_ranked() {
 #[test]
 fn a_rejected_model_is_not_preferred_to_one_that_passes() {
     let noise = Composite::new(vec![
-        Process::White(White::new(1.0).unwrap()),
-        Process::Ar1(Ar1::new(0.9, 0.02).unwrap()),
-        Process::RandomWalk(RandomWalk::new(1e-4).unwrap()),
+        Process::white(1.0).unwrap(),
+        Process::ar1(0.9, 0.02).unwrap(),
+        Process::random_walk(1e-4).unwrap(),
     ]);
     for set in 0..6 {
         let ranking = outcome(set, &noise).ranking.unwrap();
@@ -161,8 +161,8 @@ fn the_chosen_model_passes_the_test_of_its_own_fit() {
     let noise = |run: u64| {
         let gamma2 = [3e-7, 1e-6, 3e-6, 3e-4][run as usize];
         Composite::new(vec![
-            Process::White(White::new(1.0).unwrap()),
-            Process::RandomWalk(RandomWalk::new(gamma2).unwrap()),
+            Process::white(1.0).unwrap(),
+            Process::random_walk(gamma2).unwrap(),
         ])
     };
     let settings = Settings {
@@ -211,7 +211,7 @@ fn candidates_are_sums_that_the_counted_scales_can_carry() {
         fit_range,
         ..settings()
     };
-    let white = Composite::new(vec![Process::White(White::new(1.0).unwrap())]);
+    let white = Composite::new(vec![Process::white(1.0).unwrap()]);
     let outcome = calibrate(&[recordings(1, |_| white.clone(), &settings)], &settings)
         .unwrap()
         .remove(0);

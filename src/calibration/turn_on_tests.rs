@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::curve::{Pool, grouped, replicates};
-use crate::noise::{Ar1, Composite, Model, Process, RandomWalk, VirtualImu, White};
+use crate::noise::{Composite, Model, Process, VirtualImu};
 use crate::outcome::{ModelChoice, Settings};
 use crate::pipeline::calibrate;
 use crate::rng::StreamKey;
@@ -18,7 +18,7 @@ fn model(processes: Vec<Process>) -> Model {
 }
 
 fn white() -> Process {
-    Process::White(White::new(1e-4).unwrap())
+    Process::white(1e-4).unwrap()
 }
 
 /// The gyroscopes of six recordings, their biases of a standard deviation; fitted with a sum of processes.
@@ -72,7 +72,7 @@ fn laboratories(count: u64, noise: &Model, bias: f64, spec: &str) -> Vec<TurnOnS
 /// √(2/15/200) = 2.6 % over 200.
 #[test]
 fn the_spread_is_the_turn_on_bias_and_what_the_noise_adds() {
-    let walk = Process::RandomWalk(RandomWalk::new(1e-9).unwrap());
+    let walk = Process::random_walk(1e-9).unwrap();
     let noise = model(vec![white(), walk]);
     let bias = 3e-3;
     let found = laboratories(200, &noise, bias, "WN+RW");
@@ -94,8 +94,8 @@ fn the_spread_is_the_turn_on_bias_and_what_the_noise_adds() {
 /// At most 1 % of 400 laboratories; twelve have a probability below 1e-3 even at exactly 1 %.
 #[test]
 fn noise_alone_is_no_turn_on_bias() {
-    let walk = Process::RandomWalk(RandomWalk::new(1e-8).unwrap());
-    let slow = Process::Ar1(Ar1::new(0.9995, 1e-8).unwrap());
+    let walk = Process::random_walk(1e-8).unwrap();
+    let slow = Process::ar1(0.9995, 1e-8).unwrap();
     let cases = [
         ("WN", vec![white()]),
         ("WN+RW", vec![white(), walk]),

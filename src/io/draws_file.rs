@@ -7,7 +7,7 @@ use super::model_file::ModelFile;
 use super::{Failure, source};
 use nav_sim_calibration::Outcome;
 use nav_sim_signal::imu::Channel;
-use nav_sim_signal::noise::{Composite, Model, Spread, continuous};
+use nav_sim_signal::noise::{Composite, Model, Process, Spread, continuous};
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -197,7 +197,7 @@ fn with_values(axis: &Composite, values: &[f64], rate_hz: f64) -> Option<Composi
     let mut processes = Vec::new();
     for process in &axis.processes {
         let (own, others) = rest.split_at_checked(process.values().len())?;
-        processes.push(process.kind().process(own, rate_hz)?.ok()?);
+        processes.push(Process::of_values(process.kind(), own, rate_hz).ok()?);
         rest = others;
     }
     rest.is_empty().then(|| Composite::new(processes))
@@ -206,14 +206,11 @@ fn with_values(axis: &Composite, values: &[f64], rate_hz: f64) -> Option<Composi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nav_sim_signal::noise::{Ar1, Process, White};
+    use nav_sim_signal::noise::Process;
 
     fn axis(scale: f64) -> Composite {
-        let ar1 = Ar1::new(1.0 - 1e-4 * scale, 1e-9 * scale).unwrap();
-        Composite::new(vec![
-            Process::White(White::new(1e-6 * scale).unwrap()),
-            Process::Ar1(ar1),
-        ])
+        let ar1 = Process::ar1(1.0 - 1e-4 * scale, 1e-9 * scale).unwrap();
+        Composite::new(vec![Process::white(1e-6 * scale).unwrap(), ar1])
     }
 
     fn file() -> (Model, DrawsFile) {

@@ -6,7 +6,7 @@ use super::model_file::{self, ModelFile, TurnOn};
 use super::recordings::{ReadOptions, csv, read};
 use super::trajectory_file::{self, Instants, Options};
 use nav_sim_signal::imu::Channel;
-use nav_sim_signal::noise::{Ar1, Composite, Model, Process, Quantization, RandomWalk, White};
+use nav_sim_signal::noise::{Composite, Model, Process};
 use proptest::prelude::*;
 use std::fs;
 use std::path::PathBuf;
@@ -43,11 +43,11 @@ fn variance() -> impl Strategy<Value = f64> {
 }
 
 fn composite() -> impl Strategy<Value = Composite> {
-    let white = variance().prop_map(|v| Process::White(White::new(v).unwrap()));
-    let ar1 = (0.01..0.999_999_9_f64, variance())
-        .prop_map(|(phi, v)| Process::Ar1(Ar1::new(phi, v).unwrap()));
-    let walk = variance().prop_map(|v| Process::RandomWalk(RandomWalk::new(v).unwrap()));
-    let steps = variance().prop_map(|v| Process::Quantization(Quantization::new(v).unwrap()));
+    let white = variance().prop_map(|v| Process::white(v).unwrap());
+    let ar1 =
+        (0.01..0.999_999_9_f64, variance()).prop_map(|(phi, v)| Process::ar1(phi, v).unwrap());
+    let walk = variance().prop_map(|v| Process::random_walk(v).unwrap());
+    let steps = variance().prop_map(|v| Process::quantization(v).unwrap());
     (white, ar1, walk, steps)
         .prop_map(|(white, ar1, walk, steps)| Composite::new(vec![white, ar1, walk, steps]))
 }

@@ -15,7 +15,7 @@
 use crate::ekf::{Belief, BeliefError};
 use crate::imu::Sensor;
 use crate::metrics::QuadraticForm;
-use crate::noise::{Composite, Flicker, Kind, Model, Process, White, continuous};
+use crate::noise::{Composite, Flicker, Kind, Model, Process, continuous};
 use crate::scenario::Scenario;
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
@@ -528,18 +528,14 @@ impl ImuParameters {
     pub fn model(&self, rate_hz: f64) -> Model {
         let [accel_white, accel_bias, gyro_white, gyro_bias] = self.values;
         let axis = |density: f64, bias: f64| {
-            let white = White::new(continuous::white_sigma2(density, rate_hz));
+            let white = Process::white(continuous::white_sigma2(density, rate_hz));
             let bias = Flicker {
                 floor: bias,
                 t_corr_s: self.t_corr_s,
             }
             .processes(rate_hz);
-            let mut processes = vec![Process::White(white.expect("a finite variance"))];
-            processes.extend(
-                bias.expect("finite variances")
-                    .into_iter()
-                    .map(Process::GaussMarkov),
-            );
+            let mut processes = vec![white.expect("a finite variance")];
+            processes.extend(bias.expect("finite variances"));
             Composite::new(processes)
         };
         Model::pooled(

@@ -3,7 +3,7 @@
 use super::Scenario;
 use crate::ekf::FilterStates;
 use crate::monte_carlo::run;
-use crate::noise::{Ar1, Composite, Model, Process, White};
+use crate::noise::{Composite, Model, Process};
 use crate::sensors::aiding::{
     AidingSettings, HeadingErrors, HeadingSettings, HeadingSource, NhcErrors, NhcSettings,
     OdometerErrors, OdometerSettings, ZuptErrors, ZuptSettings,
@@ -81,11 +81,8 @@ pub(crate) fn consumer() -> Model {
 fn model(white: [f64; 2], bias: [f64; 2]) -> Model {
     let axis = |white: f64, deviation: f64| {
         let phi = (-1.0 / (RATE_HZ * 200.0)).exp();
-        let bias = Ar1::new(phi, deviation * deviation * (1.0 - phi * phi)).unwrap();
-        Composite::new(vec![
-            Process::White(White::new(white).unwrap()),
-            Process::Ar1(bias),
-        ])
+        let bias = Process::ar1(phi, deviation * deviation * (1.0 - phi * phi)).unwrap();
+        Composite::new(vec![Process::white(white).unwrap(), bias])
     };
     Model::pooled(RATE_HZ, &axis(white[0], bias[0]), &axis(white[1], bias[1]))
 }

@@ -1,7 +1,7 @@
 //! Scenarios as files have them.
 
 use super::*;
-use crate::noise::{Ar1, Composite, Drift, Process, RandomWalk, White};
+use crate::noise::{Composite, Process};
 use crate::simulation::lincov::FilterPass;
 use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
 
@@ -141,8 +141,8 @@ fn standing() -> Trajectory {
 #[test]
 fn what_is_expected_beside_the_model_adds_states_to_any_filter() {
     let axis = Composite::new(vec![
-        Process::Ar1(Ar1::new(0.99, 1e-8).unwrap()),
-        Process::RandomWalk(RandomWalk::new(1e-12).unwrap()),
+        Process::ar1(0.99, 1e-8).unwrap(),
+        Process::random_walk(1e-12).unwrap(),
     ]);
     let model = Model::pooled(100.0, &axis, &axis);
     let states = |text: &str| {
@@ -198,8 +198,11 @@ fn a_rate_is_accepted_where_it_is_simulated() {
 fn a_drift_that_a_filter_knows_grows_with_time() {
     let (slope, rate_hz, t_s) = (1e-6, 100.0, 10.0);
     let axis = |slope: f64, white: f64| {
-        let (drift, white) = (Drift::new(slope).unwrap(), White::new(white).unwrap());
-        Composite::new(vec![Process::White(white), Process::Drift(drift)])
+        let (drift, white) = (
+            Process::drift(slope).unwrap(),
+            Process::white(white).unwrap(),
+        );
+        Composite::new(vec![white, drift])
     };
     let model = Model::pooled(rate_hz, &axis(slope, 1e-20), &axis(1e-20, 1e-24));
     let text = "filter.states = 'full'\n[initial]\npos_sigma_m = [1e-6, 1e-6, 1e-6]\n\

@@ -2,10 +2,10 @@
 //! where it is drawn. The same key gives the same numbers on any number of threads, lanes or shards.
 //!
 //! ```
-//! use nav_sim_signal::noise::{Composite, Process, Synthesizer, White};
+//! use nav_sim_signal::noise::{Composite, Process, Synthesizer};
 //! use nav_sim_signal::rng::StreamKey;
 //!
-//! let noise = Composite::new(vec![Process::White(White::new(4e-6)?)]);
+//! let noise = Composite::new(vec![Process::white(4e-6)?]);
 //! let key = StreamKey { seed: 1, scenario: "", run: 0, source: "gyro.x", process: "" };
 //! let mut signals = [vec![0.0; 1 << 16], vec![0.0; 1 << 16]];
 //! signals.iter_mut().for_each(|signal| Synthesizer::new(&noise, key).fill(signal));

@@ -3,7 +3,7 @@
 mod requests;
 
 use assert_cmd::Command;
-use nav_sim::signal::noise::{Ar1, Composite, Process, RandomWalk, White};
+use nav_sim::signal::noise::{Composite, Process};
 use nav_sim::signal::rng::StreamKey;
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -16,9 +16,9 @@ pub(super) const SAMPLES: usize = 1 << 14;
 /// WN + AR1 + RW whose parts lead at different scales of 2^14 samples.
 pub(super) fn truth() -> [Process; 3] {
     [
-        Process::White(White::new(4e-6).unwrap()),
-        Process::Ar1(Ar1::new(0.98, 4e-8).unwrap()),
-        Process::RandomWalk(RandomWalk::new(1e-11).unwrap()),
+        Process::white(4e-6).unwrap(),
+        Process::ar1(0.98, 4e-8).unwrap(),
+        Process::random_walk(1e-11).unwrap(),
     ]
 }
 

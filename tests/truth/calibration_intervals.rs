@@ -14,7 +14,7 @@ use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::simulation::REPORTED_NAMES;
 use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::signal::imu::Channel;
-use nav_sim::signal::noise::{Ar1, Composite, Model, Process, VirtualImu, White};
+use nav_sim::signal::noise::{Composite, Model, Process, VirtualImu};
 
 /// What every laboratory has.
 struct World {
@@ -125,11 +125,8 @@ impl World {
 /// Two minutes with an outage of 40 s, at 10 Hz.
 fn short(states: &str) -> World {
     let axis = |unit: f64| {
-        let ar1 = Ar1::new(0.99, 2e-7 * unit).unwrap();
-        Composite::new(vec![
-            Process::White(White::new(2e-5 * unit).unwrap()),
-            Process::Ar1(ar1),
-        ])
+        let ar1 = Process::ar1(0.99, 2e-7 * unit).unwrap();
+        Composite::new(vec![Process::white(2e-5 * unit).unwrap(), ar1])
     };
     let scenario = format!(
         "run.method = \"lincov\"\nfilter.states = \"{states}\"\nimu.rate_hz = 10\noutage = [{{ start_s = 70, end_s = 110 }}]"

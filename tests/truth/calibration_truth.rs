@@ -1,9 +1,7 @@
 //! Theory and estimators against numbers from independent implementations (`tests/data/README.md`).
 
 use nav_sim::calibration::{Termination, Weighting, fit};
-use nav_sim::signal::noise::{
-    Ar1, Composite, Drift, GaussMarkov, Ma1, Process, Quantization, RandomWalk, White,
-};
+use nav_sim::signal::noise::{Composite, Process};
 use nav_sim::signal::wavelet;
 use nav_sim::signal::wavelet::{Curve, Tuning};
 use nav_sim_signal::wavelet::{coefficient_count, interval};
@@ -27,13 +25,13 @@ fn composite(components: &Value, theta: &[f64], rate_hz: f64) -> Composite {
     let mut parameters = theta.iter().copied();
     let mut next = || parameters.next().unwrap();
     let process = |code: &Value| match code.as_str().unwrap() {
-        "WN" => Process::White(White::new(next()).unwrap()),
-        "QN" => Process::Quantization(Quantization::new(next()).unwrap()),
-        "AR1" => Process::Ar1(Ar1::new(next(), next()).unwrap()),
-        "RW" => Process::RandomWalk(RandomWalk::new(next()).unwrap()),
-        "DR" => Process::Drift(Drift::new(next()).unwrap()),
-        "GM" => Process::GaussMarkov(GaussMarkov::new(next(), next(), rate_hz).unwrap()),
-        "MA1" => Process::Ma1(Ma1::new(next(), next()).unwrap()),
+        "WN" => Process::white(next()).unwrap(),
+        "QN" => Process::quantization(next()).unwrap(),
+        "AR1" => Process::ar1(next(), next()).unwrap(),
+        "RW" => Process::random_walk(next()).unwrap(),
+        "DR" => Process::drift(next()).unwrap(),
+        "GM" => Process::gauss_markov(next(), next(), rate_hz).unwrap(),
+        "MA1" => Process::ma1(next(), next()).unwrap(),
         other => panic!("{other}"),
     };
     let composite = Composite::new(components.as_array().unwrap().iter().map(process).collect());

@@ -11,7 +11,7 @@ use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::{NEES_DOF, RunResult};
 use nav_sim::navigation::trajectory::Trajectory;
-use nav_sim::signal::noise::{Ar1, Composite, Model, Process, RandomWalk, White};
+use nav_sim::signal::noise::{Composite, Model, Process};
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF};
 use std::path::Path;
 
@@ -34,11 +34,8 @@ fn trajectory(name: &str) -> Trajectory {
 /// White noise and a Gauss-Markov process of standard deviation s and correlation time t_s, at 100 Hz.
 fn axis(sigma2: f64, s: f64, t_s: f64) -> Composite {
     let phi = (-0.01 / t_s).exp();
-    let bias = Ar1::new(phi, s * s * (1.0 - phi * phi)).unwrap();
-    Composite::new(vec![
-        Process::White(White::new(sigma2).unwrap()),
-        Process::Ar1(bias),
-    ])
+    let bias = Process::ar1(phi, s * s * (1.0 - phi * phi)).unwrap();
+    Composite::new(vec![Process::white(sigma2).unwrap(), bias])
 }
 
 /// Scales: accelerometer white, bias variance, correlation time; the same of the gyroscope.
@@ -158,10 +155,8 @@ fn the_full_filter_of_a_larger_model_is_inside() {
     let larger = |small: &Composite, slow_s: f64, gamma2: f64| {
         let phi = (-0.01_f64 / 700.0).exp();
         let mut processes = small.processes.clone();
-        processes.push(Process::Ar1(
-            Ar1::new(phi, slow_s * slow_s * (1.0 - phi * phi)).unwrap(),
-        ));
-        processes.push(Process::RandomWalk(RandomWalk::new(gamma2).unwrap()));
+        processes.push(Process::ar1(phi, slow_s * slow_s * (1.0 - phi * phi)).unwrap());
+        processes.push(Process::random_walk(gamma2).unwrap());
         Composite::new(processes)
     };
     let small = model([1.0; 6]);

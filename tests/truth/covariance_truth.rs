@@ -5,7 +5,7 @@ use nav_sim::navigation::earth::GravityModel;
 use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim::navigation::frames::{NavState, RollPitchYaw};
 use nav_sim::signal::imu::ImuSample;
-use nav_sim::signal::noise::{Composite, GaussMarkov, Model, Process, White};
+use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::ekf::{Ekf, Fix, advance, settle, update};
 use nav_sim_navigation::lanes::{Lanes, Vec3};
@@ -54,10 +54,8 @@ fn state(row: &[f64]) -> NavState {
 
 fn axis(density: f64, deviation: f64) -> Composite {
     Composite::new(vec![
-        Process::White(White::new(white_sigma2(density, RATE_HZ)).unwrap()),
-        Process::GaussMarkov(
-            GaussMarkov::new(1.0 / 600.0, deviation * deviation, RATE_HZ).unwrap(),
-        ),
+        Process::white(white_sigma2(density, RATE_HZ)).unwrap(),
+        Process::gauss_markov(1.0 / 600.0, deviation * deviation, RATE_HZ).unwrap(),
     ])
 }
 

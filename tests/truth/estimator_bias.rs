@@ -4,9 +4,7 @@
 use nav_sim::calibration::{
     Estimator, ModelSpec, Replicate, Trim, Weighting, average, fit, implied,
 };
-use nav_sim::signal::noise::{
-    Ar1, Composite, Process, Quantization, RandomWalk, Synthesizer, White,
-};
+use nav_sim::signal::noise::{Composite, Process, Synthesizer};
 use nav_sim::signal::rng::StreamKey;
 use nav_sim::signal::wavelet::{Curve, Tuning, both};
 use nav_sim_calibration::trend;
@@ -19,9 +17,9 @@ fn tuning() -> Tuning {
 /// WN + QN + RW with a share of quantization noise at the first scale: 1.5 q2 of 1.5 q2 + sigma2/2.
 fn model(share: f64) -> Composite {
     Composite::new(vec![
-        Process::White(White::new(1.0).unwrap()),
-        Process::Quantization(Quantization::new(share / (1.0 - share) / 3.0).unwrap()),
-        Process::RandomWalk(RandomWalk::new(1e-5).unwrap()),
+        Process::white(1.0).unwrap(),
+        Process::quantization(share / (1.0 - share) / 3.0).unwrap(),
+        Process::random_walk(1e-5).unwrap(),
     ])
 }
 
@@ -99,8 +97,8 @@ fn estimates_are_unbiased_however_much_quantization_noise_there_is() {
 #[test]
 fn a_scale_that_is_low_by_chance_does_not_rule() {
     let truth = Composite::new(vec![
-        Process::White(White::new(1.0).unwrap()),
-        Process::RandomWalk(RandomWalk::new(1e-5).unwrap()),
+        Process::white(1.0).unwrap(),
+        Process::random_walk(1e-5).unwrap(),
     ]);
     let spec: ModelSpec = "WN+RW".parse().unwrap();
     for (estimator, allowed, most) in [(Estimator::Gmwm, 0.0, 0), (Estimator::Rgmwm, 0.05, 7)] {
@@ -144,11 +142,11 @@ fn exact_robust_curves_give_their_parameters_back() {
         (3e-5, 1e-6),
     ] {
         let truth = Composite::new(vec![
-            Process::White(White::new(sigma2).unwrap()),
-            Process::Quantization(Quantization::new(q2).unwrap()),
-            Process::Ar1(Ar1::new(0.97, 2e-7).unwrap()),
-            Process::Ar1(Ar1::new(0.9995, 1e-9).unwrap()),
-            Process::RandomWalk(RandomWalk::new(1e-10).unwrap()),
+            Process::white(sigma2).unwrap(),
+            Process::quantization(q2).unwrap(),
+            Process::ar1(0.97, 2e-7).unwrap(),
+            Process::ar1(0.9995, 1e-9).unwrap(),
+            Process::random_walk(1e-10).unwrap(),
         ]);
         let edof = levels
             .iter()

@@ -4,7 +4,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use nav_sim::calibration::{ModelSpec, Weighting, fit};
-use nav_sim::signal::noise::{Ar1, Composite, Process, Quantization, RandomWalk, White};
+use nav_sim::signal::noise::{Composite, Kind, Process};
 use nav_sim::signal::rng::{Generator, StreamKey};
 use nav_sim::signal::wavelet::{Curve, Tuning, both};
 use nav_sim_signal::wavelet::interval;
@@ -56,17 +56,18 @@ fn reduced(curve: &Curve, quantization: bool, log_kappas: &[f64]) -> f64 {
             .zip(&curve.edof)
             .map(|(nu, eta)| (0.5 * eta).sqrt() / nu),
     );
-    let column = |shape: &dyn Fn(u32) -> f64| {
-        let c = DVector::from_iterator(weights.len(), curve.levels.iter().map(|j| shape(*j)));
+    let column = |kind: Kind, kappa: f64| {
+        let shape = |level: &u32| kind.haar_shape_of_kappa(kappa, *level).0;
+        let c = DVector::from_iterator(weights.len(), curve.levels.iter().map(shape));
         let norm = c.component_mul(&weights).norm();
         c / norm
     };
-    let mut columns = vec![column(&White::haar_shape), column(&RandomWalk::haar_shape)];
+    let mut columns = vec![column(Kind::White, 0.0), column(Kind::RandomWalk, 0.0)];
     for u in log_kappas {
-        columns.push(column(&|j| Ar1::haar_shape_of_kappa(u.exp(), j).0));
+        columns.push(column(Kind::Ar1, u.exp()));
     }
     if quantization {
-        columns.push(column(&Quantization::haar_shape));
+        columns.push(column(Kind::Quantization, 0.0));
     }
     let target = DVector::from_column_slice(&curve.wv).component_mul(&weights);
     let mut factors = DVector::repeat(weights.len(), 1.0);
@@ -158,17 +159,14 @@ fn simplex(f: &dyn Fn(&[f64]) -> f64, start: &[f64]) -> f64 {
 fn draw(generator: &mut Generator, n2: bool) -> Composite {
     let mut log_uniform = |low: f64, high: f64| low * (high / low).powf(generator.random::<f64>());
     let mut processes = vec![
-        Process::White(White::new(log_uniform(2e-5, 1e-4)).unwrap()),
-        Process::Ar1(Ar1::new(1.0 - log_uniform(5e-3, 5e-2), log_uniform(3e-9, 3e-7)).unwrap()),
-        Process::RandomWalk(RandomWalk::new(log_uniform(1e-12, 1e-10)).unwrap()),
+        Process::white(log_uniform(2e-5, 1e-4)).unwrap(),
+        Process::ar1(1.0 - log_uniform(5e-3, 5e-2), log_uniform(3e-9, 3e-7)).unwrap(),
+        Process::random_walk(log_uniform(1e-12, 1e-10)).unwrap(),
     ];
     if n2 {
-        processes.push(Process::Quantization(
-            Quantization::new(log_uniform(1e-7, 1e-4)).unwrap(),
-        ));
-        processes.push(Process::Ar1(
-            Ar1::new(1.0 - log_uniform(5e-5, 2e-3), log_uniform(1e-11, 1e-9)).unwrap(),
-        ));
+        processes.push(Process::quantization(log_uniform(1e-7, 1e-4)).unwrap());
+        processes
+            .push(Process::ar1(1.0 - log_uniform(5e-5, 2e-3), log_uniform(1e-11, 1e-9)).unwrap());
     }
     Composite::new(processes)
 }
@@ -177,29 +175,28 @@ fn simulate(model: &Composite, samples: usize, generator: &mut Generator) -> Vec
     let mut x = vec![0.0; samples];
     for process in &model.processes {
         let mut normal = || generator.sample::<f64, _>(StandardNormal);
-        match process {
-            Process::White(p) => x
-                .iter_mut()
-                .for_each(|x| *x += p.sigma2().sqrt() * normal()),
-            Process::RandomWalk(p) => {
+        let size = process.amplitude().sqrt();
+        match process.kind() {
+            Kind::White => x.iter_mut().for_each(|x| *x += size * normal()),
+            Kind::RandomWalk => {
                 let mut level = 0.0;
                 x.iter_mut().for_each(|x| {
-                    level += p.gamma2().sqrt() * normal();
+                    level += size * normal();
                     *x += level;
                 });
             }
-            Process::Ar1(p) => {
-                let mut state = p.variance().sqrt() * normal();
+            Kind::Ar1 => {
+                let mut state = process.initial_variance().sqrt() * normal();
                 x.iter_mut().for_each(|x| {
-                    state = p.phi() * state + p.sigma2().sqrt() * normal();
+                    state = process.shape() * state + size * normal();
                     *x += state;
                 });
             }
-            Process::Quantization(p) => {
+            Kind::Quantization => {
                 let mut last = generator.random::<f64>();
                 x.iter_mut().for_each(|x| {
                     let u = generator.random::<f64>();
-                    *x += (12.0 * p.q2()).sqrt() * (u - last);
+                    *x += 12.0_f64.sqrt() * size * (u - last);
                     last = u;
                 });
             }

@@ -10,7 +10,7 @@ use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::{NEES_DOF, RunResult};
 use nav_sim::navigation::trajectory::Trajectory;
-use nav_sim::signal::noise::{Ar1, Composite, Drift, Model, Process, White};
+use nav_sim::signal::noise::{Composite, Model, Process};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::fs;
 use std::path::Path;
@@ -32,9 +32,9 @@ fn trajectory() -> Trajectory {
 fn axis(sigma2: f64, biases: &[(f64, f64)]) -> Composite {
     let ar1 = |(s, t_s): &(f64, f64)| {
         let phi = (-0.01 / t_s).exp();
-        Process::Ar1(Ar1::new(phi, s * s * (1.0 - phi * phi)).unwrap())
+        Process::ar1(phi, s * s * (1.0 - phi * phi)).unwrap()
     };
-    let white = Process::White(White::new(sigma2).unwrap());
+    let white = Process::white(sigma2).unwrap();
     Composite::new(
         std::iter::once(white)
             .chain(biases.iter().map(ar1))
@@ -178,8 +178,7 @@ fn a_drift_is_as_uncertain_as_its_magnitude() {
     let drifting = |signs: [f64; 6]| {
         let mut model = tactical();
         for ((axis, slope), sign) in model.axes.iter_mut().zip(slopes).zip(signs) {
-            axis.processes
-                .push(Process::Drift(Drift::new(sign * slope).unwrap()));
+            axis.processes.push(Process::drift(sign * slope).unwrap());
         }
         model
     };

@@ -11,9 +11,7 @@ use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::navigation::trajectory::profile::{
     Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
 };
-use nav_sim::signal::noise::{
-    Ar1, Composite, Drift, Ma1, Model, Process, Quantization, RandomWalk, White,
-};
+use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::simulation::lincov::{DRIFT, FilterPass, TruthSide, assess};
 
 const RATE_HZ: f64 = 100.0;
@@ -66,7 +64,7 @@ fn standing(process: Process) -> [f64; 2] {
         end_s: 20.0,
     }];
     let track = scenario.track(&trajectory, &model, &outages).unwrap();
-    let white = Composite::new(vec![Process::White(White::new(1e-4).unwrap())]);
+    let white = Composite::new(vec![Process::white(1e-4).unwrap()]);
     let belief = Model::pooled(RATE_HZ, &white, &white);
     let belief = Belief::new(&belief, FilterStates::Reduced15, 1.0, 800.0).unwrap();
     let end = assess(&track, &belief, &model).outage_ends[0];
@@ -78,10 +76,10 @@ fn standing(process: Process) -> [f64; 2] {
 #[test]
 fn a_filter_that_is_right_is_so_after_hours() {
     let noise = Composite::new(vec![
-        Process::White(White::new(1e-6).unwrap()),
-        Process::RandomWalk(RandomWalk::new(1e-12).unwrap()),
+        Process::white(1e-6).unwrap(),
+        Process::random_walk(1e-12).unwrap(),
     ]);
-    let gyro = Composite::new(vec![Process::White(White::new(1e-10).unwrap())]);
+    let gyro = Composite::new(vec![Process::white(1e-10).unwrap()]);
     let model = Model::pooled(5.0, &noise, &gyro);
     let path = trajectory(vec![
         Kind::Accelerate {
@@ -119,23 +117,23 @@ fn a_vehicle_that_stands_has_the_closed_forms_of_each_process() {
             variance.sqrt()
         );
     };
-    let [v, r] = standing(Process::White(White::new(1e-4).unwrap()));
+    let [v, r] = standing(Process::white(1e-4).unwrap());
     near(v, 1e-4 * dt * dt * n);
     near(r, 1e-4 * dt * t * t * t / 3.0);
-    let [v, r] = standing(Process::RandomWalk(RandomWalk::new(1e-10).unwrap()));
+    let [v, r] = standing(Process::random_walk(1e-10).unwrap());
     near(v, 1e-10 * RATE_HZ * t.powi(3) / 3.0);
     near(r, 1e-10 * RATE_HZ * t.powi(5) / 20.0);
-    let [v, _] = standing(Process::Quantization(Quantization::new(1e-4).unwrap()));
+    let [v, _] = standing(Process::quantization(1e-4).unwrap());
     near(v, 2e-4 * dt * dt);
     let theta = -0.6_f64;
-    let [v, _] = standing(Process::Ma1(Ma1::new(theta, 1e-4).unwrap()));
+    let [v, _] = standing(Process::ma1(theta, 1e-4).unwrap());
     near(
         v,
         1e-4 * dt * dt * ((1.0 + theta).powi(2) * (n - 1.0) + theta * theta + 1.0),
     );
     // of a Gauss-Markov process that starts anywhere: 2 s² T² (t/T − 1 + e^{−t/T})
     let (time, phi) = (5.0_f64, (-dt / 5.0).exp());
-    let [v, _] = standing(Process::Ar1(Ar1::new(phi, 1e-8).unwrap()));
+    let [v, _] = standing(Process::ar1(phi, 1e-8).unwrap());
     let variance = 1e-8 / (1.0 - phi * phi);
     near(
         v,
@@ -150,7 +148,7 @@ fn a_vehicle_that_stands_has_the_closed_forms_of_each_process() {
 #[test]
 fn a_drift_of_the_gyroscope_is_felt_at_the_end_of_a_lever_arm() {
     let (slope, arm_m, n) = (1e-6, 2.0, 2000.0);
-    let gyro = Composite::new(vec![Process::Drift(Drift::new(slope).unwrap())]);
+    let gyro = Composite::new(vec![Process::drift(slope).unwrap()]);
     let truth = Model::pooled(RATE_HZ, &Composite::default(), &gyro);
     let path = trajectory(vec![still(21.0)]);
     let mut scenario = Scenario::default();
@@ -162,7 +160,7 @@ fn a_drift_of_the_gyroscope_is_felt_at_the_end_of_a_lever_arm() {
         end_s: n / RATE_HZ,
     }];
     let track = scenario.track(&path, &truth, &outages).unwrap();
-    let white = |sigma2| Composite::new(vec![Process::White(White::new(sigma2).unwrap())]);
+    let white = |sigma2| Composite::new(vec![Process::white(sigma2).unwrap()]);
     let believed = Model::pooled(RATE_HZ, &white(1e-4), &white(1e-8));
     let beliefs = [Belief::new(&believed, FilterStates::Reduced15, 1.0, 800.0).unwrap()];
     let experiment = scenario.experiment(&path, Truth::Model(&truth), &beliefs, &outages, 1);
@@ -188,16 +186,14 @@ fn wrong() -> (Model, Belief) {
     let axis = |scale: f64, belief: bool| {
         let share = if belief { 0.25 } else { 1.0 };
         let mut processes = vec![
-            Process::White(White::new(share * 1e-4 * scale).unwrap()),
-            Process::Ar1(Ar1::new(0.9995, share * 4e-8 * scale).unwrap()),
+            Process::white(share * 1e-4 * scale).unwrap(),
+            Process::ar1(0.9995, share * 4e-8 * scale).unwrap(),
         ];
         if !belief {
-            processes.push(Process::RandomWalk(RandomWalk::new(2e-9 * scale).unwrap()));
-            processes.push(Process::Ar1(Ar1::new(0.98, 1e-6 * scale).unwrap()));
-            processes.push(Process::Quantization(
-                Quantization::new(1e-4 * scale).unwrap(),
-            ));
-            processes.push(Process::Ma1(Ma1::new(0.4, 3e-5 * scale).unwrap()));
+            processes.push(Process::random_walk(2e-9 * scale).unwrap());
+            processes.push(Process::ar1(0.98, 1e-6 * scale).unwrap());
+            processes.push(Process::quantization(1e-4 * scale).unwrap());
+            processes.push(Process::ma1(0.4, 3e-5 * scale).unwrap());
         }
         Composite::new(processes)
     };
@@ -298,12 +294,12 @@ fn sampled_runs_scatter_as_computed() {
 #[test]
 fn a_matched_filter_is_right() {
     let processes = vec![
-        Process::White(White::new(1e-4).unwrap()),
-        Process::Ar1(Ar1::new(0.99, 1e-7).unwrap()),
-        Process::RandomWalk(RandomWalk::new(1e-10).unwrap()),
+        Process::white(1e-4).unwrap(),
+        Process::ar1(0.99, 1e-7).unwrap(),
+        Process::random_walk(1e-10).unwrap(),
     ];
     let noise = Composite::new(processes);
-    let gyro = Composite::new(vec![Process::White(White::new(1e-7).unwrap())]);
+    let gyro = Composite::new(vec![Process::white(1e-7).unwrap()]);
     let model = Model::pooled(RATE_HZ, &noise, &gyro);
     let path = trajectory(vec![
         still(10.0),

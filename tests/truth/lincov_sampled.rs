@@ -13,9 +13,7 @@ use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::navigation::trajectory::profile::{
     Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
 };
-use nav_sim::signal::noise::{
-    Ar1, Composite, Drift, Model, Process, Quantization, RandomWalk, White,
-};
+use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::earth::gravity_down;
 use nav_sim_navigation::metrics::Budget;
 use nav_sim_navigation::simulation::lincov::{FilterPass, TruthSide};
@@ -86,11 +84,11 @@ fn model(scale: f64) -> Model {
     let axis = |unit: f64| {
         let s = scale * unit;
         Composite::new(vec![
-            Process::White(White::new(5e-5 * s).unwrap()),
-            Process::Quantization(Quantization::new(1e-6 * s).unwrap()),
-            Process::Ar1(Ar1::new(0.98, 1e-7 * s).unwrap()),
-            Process::Ar1(Ar1::new(0.9997, 6e-9 * s).unwrap()),
-            Process::RandomWalk(RandomWalk::new(1e-10 * s).unwrap()),
+            Process::white(5e-5 * s).unwrap(),
+            Process::quantization(1e-6 * s).unwrap(),
+            Process::ar1(0.98, 1e-7 * s).unwrap(),
+            Process::ar1(0.9997, 6e-9 * s).unwrap(),
+            Process::random_walk(1e-10 * s).unwrap(),
         ])
     };
     Model::pooled(RATE_HZ, &axis(1.0), &axis(1e-3))
@@ -287,7 +285,7 @@ fn drifts_are_in_the_mean_of_the_errors() {
     for (axis, slope) in [(0, 2e-6), (1, -3e-6), (4, 3e-9), (5, -5e-9)] {
         truth.axes[axis]
             .processes
-            .push(Process::Drift(Drift::new(slope).unwrap()));
+            .push(Process::drift(slope).unwrap());
     }
     assert_agree("drift", "", &truth);
     assert_agree("drift full", "filter.states = 'full'", &truth);
@@ -323,7 +321,7 @@ fn constants_of_the_true_imu_have_their_closed_forms() {
         start_s: 0.0,
         end_s: 20.0,
     }];
-    let white = Composite::new(vec![Process::White(White::new(1e-4).unwrap())]);
+    let white = Composite::new(vec![Process::white(1e-4).unwrap()]);
     let believed = Model::pooled(RATE_HZ, &white, &white);
     let down = |imu: &str, truth: &Model| {
         let scenario: Scenario = toml::from_str(&format!("initial.perfect = true\n{imu}")).unwrap();
@@ -348,7 +346,7 @@ fn constants_of_the_true_imu_have_their_closed_forms() {
     let mut drifting = none.clone();
     drifting.axes[2]
         .processes
-        .push(Process::Drift(Drift::new(1e-6).unwrap()));
+        .push(Process::drift(1e-6).unwrap());
     let (rmse, mean) = down("", &drifting);
     // 100 a second, each a hundredth of a second later: k f t³/6 (1 + 3/(2n))
     assert!(
@@ -372,9 +370,7 @@ fn budgets_add_up_to_the_true_errors() {
     let scenario: Scenario = toml::from_str(text).unwrap();
     let (path, believed, outages) = (drive(), model(1.0), [OUTAGE]);
     let mut truth = model(4.0);
-    truth.axes[3]
-        .processes
-        .push(Process::Drift(Drift::new(1e-9).unwrap()));
+    truth.axes[3].processes.push(Process::drift(1e-9).unwrap());
     let track = scenario.track(&path, &believed, &outages).unwrap();
     let beliefs = [scenario.belief(&believed, &outages, &track).unwrap()];
     let experiment = scenario.experiment(&path, Truth::Model(&truth), &beliefs, &outages, 1);

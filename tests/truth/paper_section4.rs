@@ -22,8 +22,9 @@ mod design {
 
     /// WN + AR1 + RW whose parts lead at different scales of 2^12 samples and more; five replicates.
     pub(super) fn design(samples: usize) -> Design {
-        let process =
-            |code, values: &[f64]| Process::from_values(code, values, RATE).unwrap().unwrap();
+        let process = |code, values: &[f64]| {
+            Process::of_values(Kind::named(code).unwrap(), values, RATE).unwrap()
+        };
         let noise = Composite::new(vec![
             process("WN", &[1.0]),
             process("AR1", &[0.97, 0.01]),
@@ -35,7 +36,7 @@ mod design {
             low: 0.9,
             width: 0.2,
         };
-        let laws = vec![Variation::new(&noise, RATE, "WN", "sigma2", law).unwrap()];
+        let laws = vec![Variation::new(&noise, "WN", "sigma2", law).unwrap()];
         Design {
             seed: 5,
             model: Model::pooled(RATE, &noise, &noise),
@@ -200,7 +201,7 @@ mod target {
     use nav_sim::signal::imu::*;
     use nav_sim::signal::noise::contamination::*;
     use nav_sim::signal::noise::*;
-    use nav_sim::signal::noise::{Law, Ma1, Model, Spread, Synthesizer};
+    use nav_sim::signal::noise::{Law, Model, Process, Spread, Synthesizer};
     use nav_sim::signal::rng::StreamKey;
     use nav_sim::signal::rng::*;
     use nav_sim::signal::wavelet::*;
@@ -209,14 +210,15 @@ mod target {
     const RATE: f64 = 100.0;
 
     fn law(noise: &Composite, process: &str, parameter: &str, law: Law) -> Variation {
-        Variation::new(noise, RATE, process, parameter, law).unwrap()
+        Variation::new(noise, process, parameter, law).unwrap()
     }
 
     /// The mean over 20000 drawn models is within 5 of its standard errors of the quadrature.
     #[test]
     fn expectation_is_the_mean_over_drawn_models() {
-        let process =
-            |code, values: &[f64]| Process::from_values(code, values, RATE).unwrap().unwrap();
+        let process = |code, values: &[f64]| {
+            Process::of_values(Kind::named(code).unwrap(), values, RATE).unwrap()
+        };
         let noise = Composite::new(vec![
             process("AR1", &[0.9, 1.0]),
             process("GM", &[2.0, 3.0]),
@@ -249,7 +251,7 @@ mod target {
             ),
             law(&noise, "DR", "slope", Law::Normal { sd: 0.02 }),
         ];
-        let exact = expected_wv(&noise, &laws, RATE, 12).unwrap();
+        let exact = expected_wv(&noise, &laws, 12).unwrap();
         let model = Model::pooled(RATE, &noise, &noise);
         let spread = Spread {
             axes: [laws, vec![], vec![], vec![], vec![], vec![]],
@@ -277,7 +279,7 @@ mod target {
 
     impl Example1 {
         fn noise() -> Composite {
-            Composite::new(vec![Process::Ma1(Ma1::new(0.1, 1.0).unwrap())])
+            Composite::new(vec![Process::ma1(0.1, 1.0).unwrap()])
         }
 
         fn laws(&self) -> Vec<Variation> {
@@ -300,7 +302,7 @@ mod target {
             let (mut low, mut high) = (0.0, 0.5);
             for _ in 0..60 {
                 let middle = 0.5 * (low + high);
-                if Ma1::haar_shape(middle, 1).0 > nu {
+                if Kind::Ma1.haar_shape(middle, 1).0 > nu {
                     low = middle
                 } else {
                     high = middle
@@ -314,7 +316,7 @@ mod target {
     fn example_1_of_the_paper_in_closed_form() {
         for b in [0.1, 0.3, 0.49] {
             let example = Example1 { b };
-            let nu_0 = expected_wv(&Example1::noise(), &example.laws(), RATE, 1).unwrap()[0];
+            let nu_0 = expected_wv(&Example1::noise(), &example.laws(), 1).unwrap()[0];
             assert!((nu_0 - 0.5 * (b * b / 3.0 - 0.5 * b + 1.0)).abs() < 1e-14);
             let theta_0 = Example1::nearest(nu_0);
             // nu_1 has slope ½ − theta there, at least 0.01: 1e-14 in nu are 1e-12 in theta.

@@ -6,7 +6,7 @@ use nav_sim::io::trajectory_file::{Options, load};
 use nav_sim::navigation::scenario::{Reduction, Scenario};
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{Assessment, assess};
-use nav_sim_signal::noise::{Composite, Model, Process, RandomWalk, White};
+use nav_sim_signal::noise::{Composite, Model, Process};
 use std::path::Path;
 
 /// What the filter of a model does on a trajectory with outages.
@@ -80,8 +80,8 @@ fn the_default_filter_is_honest_and_that_by_wavelet_variance_is_not() {
 fn a_model_of_fifteen_states_is_its_own_reduction() {
     let axis = |white: f64, walk: f64| {
         Composite::new(vec![
-            Process::White(White::new(white).unwrap()),
-            Process::RandomWalk(RandomWalk::new(walk).unwrap()),
+            Process::white(white).unwrap(),
+            Process::random_walk(walk).unwrap(),
         ])
     };
     let model = Model::pooled(100.0, &axis(5.4e-5, 3.3e-11), &axis(1e-8, 1e-14));

@@ -13,7 +13,7 @@ use nav_sim::navigation::trajectory::profile::{
     Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
 };
 use nav_sim::signal::imu::Sensor;
-use nav_sim::signal::noise::{Ar1, Composite, GaussMarkov, Model, Process, White};
+use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::simulation::REPORTED;
 use nav_sim_navigation::simulation::lincov::{FilterPass, Track, TruthSide};
 
@@ -219,7 +219,7 @@ fn the_imu_that_is_named_keeps_the_limit_in_the_steps_of_a_run() {
 #[test]
 fn white_noise_does_not_know_the_length_of_steps() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
-    let white = |sigma2| Composite::new(vec![Process::White(White::new(sigma2).unwrap())]);
+    let white = |sigma2| Composite::new(vec![Process::white(sigma2).unwrap()]);
     let model = Model::pooled(scenario.imu.rate_hz, &white(1e-3), &white(1e-7));
     let outages = [Outage {
         start_s: 133.0,
@@ -259,8 +259,8 @@ fn outages_beside_one_another_are_as_each_alone() {
     for scenario in [Scenario::default(), toml::from_str(settings).unwrap()] {
         let trajectory = trajectory();
         let axis = Composite::new(vec![
-            Process::White(White::new(1e-5).unwrap()),
-            Process::Ar1(Ar1::new(0.9999, 1e-10).unwrap()),
+            Process::white(1e-5).unwrap(),
+            Process::ar1(0.9999, 1e-10).unwrap(),
         ]);
         let model = Model::pooled(scenario.imu.rate_hz, &axis, &axis);
         let end_s = trajectory.end_s();
@@ -350,7 +350,7 @@ fn quantiles_of_a_horizontal_error_have_their_closed_forms() {
 #[test]
 fn an_imu_without_errors_leaves_what_gnss_and_start_leave() {
     let (mut scenario, trajectory) = (Scenario::default(), trajectory());
-    let axis = |sigma2| Composite::new(vec![Process::White(White::new(sigma2).unwrap())]);
+    let axis = |sigma2| Composite::new(vec![Process::white(sigma2).unwrap()]);
     let model = Model::pooled(scenario.imu.rate_hz, &axis(1e-8), &axis(1e-14));
     // before the first fix nothing is known of the bias: 0.1 m/s² moves by 20 m in 20 s on each axis
     let start = [Outage {
@@ -392,9 +392,8 @@ fn an_imu_without_errors_leaves_what_gnss_and_start_leave() {
 /// processes of one variance, a factor of four apart from 0.25 s on, are level to 4 % from 2 s to 568 s.
 fn flicker_noise(density: f64, floor: f64) -> Composite {
     let noise = |s2: f64| {
-        let process =
-            |k: i32| Process::GaussMarkov(GaussMarkov::new(0.25_f64.powi(k), s2, 100.0).unwrap());
-        let white = Process::White(White::new(density * density * 100.0).unwrap());
+        let process = |k: i32| Process::gauss_markov(0.25_f64.powi(k), s2, 100.0).unwrap();
+        let white = Process::white(density * density * 100.0).unwrap();
         Composite::new(std::iter::once(white).chain((-1..7).map(process)).collect())
     };
     let lowest = |s2: f64| {

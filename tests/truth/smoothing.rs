@@ -15,7 +15,7 @@ use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::{Plan, Recording, record};
 use nav_sim::navigation::trajectory::Trajectory;
-use nav_sim::signal::noise::{Ar1, Composite, Model, Process, White};
+use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::earth::radii;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -62,7 +62,7 @@ fn at_rest_the_smoothed_position_is_the_closed_form_of_an_integrated_wiener_proc
         rate_hz: 100.0,
         axes: Default::default(),
     };
-    let white = Composite::new(vec![Process::White(White::new(SIGMA2).unwrap())]);
+    let white = Composite::new(vec![Process::white(SIGMA2).unwrap()]);
     let believed = Model::pooled(100.0, &white, &Composite::new(Vec::new()));
     let belief = Belief::new(&believed, FilterStates::Full, 1.0, 800.0).unwrap();
     let truth = trajectory.state(trajectory.start_s());
@@ -177,10 +177,10 @@ const EXPERIMENTS: [Experiment; 3] = [
 fn axis(white: f64, biases: impl Iterator<Item = (f64, f64)>) -> Composite {
     let ar1 = |(sigma, t_corr_s): (f64, f64)| {
         let phi = (-0.01 / t_corr_s).exp();
-        Process::Ar1(Ar1::new(phi, sigma * sigma * (1.0 - phi * phi)).unwrap())
+        Process::ar1(phi, sigma * sigma * (1.0 - phi * phi)).unwrap()
     };
     Composite::new(
-        std::iter::once(Process::White(White::new(white).unwrap()))
+        std::iter::once(Process::white(white).unwrap())
             .chain(biases.map(ar1))
             .collect(),
     )

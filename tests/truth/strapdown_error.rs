@@ -7,7 +7,7 @@ use nav_sim::navigation::metrics::VerdictKind;
 use nav_sim::navigation::scenario::{Method, Scenario};
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::trajectory::{Trajectory, TrajectorySample};
-use nav_sim::signal::noise::{Composite, Model, Process, RandomWalk, White};
+use nav_sim::signal::noise::{Composite, Model, Process};
 
 /// 300 s northwards at 15 m/s, roll and pitch of 3° at 1.5 Hz, a quarter of a period apart: coning, of which ten samples a
 /// second see a part.
@@ -38,8 +38,8 @@ fn coning() -> Trajectory {
 fn coning_that_the_rate_does_not_resolve_is_in_the_verdict() {
     let axis = |white: f64, walk: f64| {
         Composite::new(vec![
-            Process::White(White::new(white).unwrap()),
-            Process::RandomWalk(RandomWalk::new(walk).unwrap()),
+            Process::white(white).unwrap(),
+            Process::random_walk(walk).unwrap(),
         ])
     };
     let outages = [Outage {

@@ -11,7 +11,7 @@ use nav_sim::navigation::trajectory::profile::{
     Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
 };
 use nav_sim::signal::imu::Sensor;
-use nav_sim::signal::noise::{Composite, Model, Process, RandomWalk, White};
+use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::simulation::lincov::{
     Aim, Factor, Filter, Task, Track, TrueErrors, scaled,
 };
@@ -25,8 +25,8 @@ const OUTAGES: [Outage; 1] = [Outage {
 fn model(accel: f64, gyro: f64) -> Model {
     let axis = |white: f64, walk: f64| {
         Composite::new(vec![
-            Process::White(White::new(white).unwrap()),
-            Process::RandomWalk(RandomWalk::new(walk).unwrap()),
+            Process::white(white).unwrap(),
+            Process::random_walk(walk).unwrap(),
         ])
     };
     Model::pooled(100.0, &axis(1e-4, accel * 1e-10), &axis(1e-8, gyro * 1e-12))
@@ -195,8 +195,8 @@ fn a_tuned_filter_is_honest_over_the_run_as_a_verdict_judges_it() {
     let drive = drive();
     let axis = |white: f64, walk: f64| {
         Composite::new(vec![
-            Process::White(White::new(white).unwrap()),
-            Process::RandomWalk(RandomWalk::new(walk).unwrap()),
+            Process::white(white).unwrap(),
+            Process::random_walk(walk).unwrap(),
         ])
     };
     let truth = Model::pooled(100.0, &axis(1e-4, 1e-10), &axis(1e-6, 1e-12));

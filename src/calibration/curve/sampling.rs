@@ -8,7 +8,7 @@
 //! the mean of the coefficients, not to its scatter. Quantization noise is not Gaussian: what that leaves of the scatter
 //! of a robust variance is in [`SamplingLaw::robust_edof`].
 
-use crate::noise::{Composite, Process};
+use crate::noise::{Composite, Kind, Process};
 use crate::rng::Generator;
 use crate::wavelet::interval::edof_robust;
 use crate::wavelet::{Curve, QuantizationResponse, Tuning};
@@ -217,7 +217,7 @@ fn gain(model: &Composite, f: f64, m: f64) -> f64 {
     let density = model
         .processes
         .iter()
-        .map(|p| spectrum(p, sin2))
+        .map(|p| p.spectrum(sin2))
         .sum::<f64>();
     density * (PI * f * m).sin().powi(4) / (m * m * sin2)
 }
@@ -263,7 +263,7 @@ fn products(model: &Composite, levels: usize) -> DMatrix<f64> {
         let density = model
             .processes
             .iter()
-            .map(|p| spectrum(p, base))
+            .map(|p| p.spectrum(base))
             .sum::<f64>();
         let mut sin2 = base;
         for (i, gain) in gains.iter_mut().enumerate() {
@@ -283,22 +283,6 @@ fn products(model: &Composite, levels: usize) -> DMatrix<f64> {
     sums /= half as f64;
     sums.fill_upper_triangle_with_lower_triangle();
     sums
-}
-
-/// Two-sided spectral density per sample (units²), at the frequency whose sin²(πf) is given.
-fn spectrum(process: &Process, sin2: f64) -> f64 {
-    // |1 − r e^(−2πif)|²
-    let distance = |r: f64| (1.0 - r) * (1.0 - r) + 4.0 * r * sin2;
-    match process {
-        Process::White(p) => p.sigma2(),
-        Process::Quantization(p) => 4.0 * p.q2() * sin2,
-        Process::Ar1(p) => p.sigma2() / distance(p.phi()),
-        Process::GaussMarkov(p) => p.ar1().sigma2() / distance(p.ar1().phi()),
-        Process::Ma1(p) => p.sigma2() * distance(-p.theta()),
-        Process::Flicker(p) => p.b2() / (2.0 * sin2.sqrt()),
-        Process::RandomWalk(p) => p.gamma2() / (4.0 * sin2),
-        Process::Drift(_) => 0.0,
-    }
 }
 
 // Shape of the law of one wavelet variance: a mean of squares of correlated Gaussian coefficients.
@@ -478,7 +462,7 @@ fn quantization_share(model: &Composite, level: u32) -> f64 {
 
 /// The part of a model's wavelet variance that is drift, at a level.
 pub(crate) fn drift_share(model: &Composite, level: u32) -> f64 {
-    share(model, level, |p| matches!(p, Process::Drift(_)))
+    share(model, level, |p| p.kind() == Kind::Drift)
 }
 
 fn share(model: &Composite, level: u32, is_counted: impl Fn(&Process) -> bool) -> f64 {
@@ -495,8 +479,8 @@ fn share(model: &Composite, level: u32, is_counted: impl Fn(&Process) -> bool) -
     }
 }
 
-const fn is_quantization(process: &Process) -> bool {
-    matches!(process, Process::Quantization(_))
+fn is_quantization(process: &Process) -> bool {
+    process.kind() == Kind::Quantization
 }
 
 /// The curve a model implies, at the levels and of the kind (classical or robust) of a given one.
@@ -585,15 +569,15 @@ mod shape_tests {
 #[cfg(test)]
 mod implied_tests {
     use super::*;
-    use crate::noise::{Ar1, Quantization, RandomWalk, White};
+    use crate::noise::Process;
     use crate::wavelet::Tuning;
 
     fn model(values: [f64; 5]) -> Composite {
         Composite::new(vec![
-            Process::White(White::new(values[0]).unwrap()),
-            Process::Quantization(Quantization::new(values[1]).unwrap()),
-            Process::Ar1(Ar1::new(values[2], values[3]).unwrap()),
-            Process::RandomWalk(RandomWalk::new(values[4]).unwrap()),
+            Process::white(values[0]).unwrap(),
+            Process::quantization(values[1]).unwrap(),
+            Process::ar1(values[2], values[3]).unwrap(),
+            Process::random_walk(values[4]).unwrap(),
         ])
     }
 

@@ -1,7 +1,7 @@
 //! The law against signals that are made, and against closed forms.
 
 use super::*;
-use crate::noise::{Ar1, Quantization, RandomWalk, White};
+use crate::noise::Process;
 use crate::wavelet::classical;
 use approx::assert_relative_eq;
 use rand::SeedableRng;
@@ -11,7 +11,7 @@ use rand::SeedableRng;
 /// autocovariances are (4, 1, −2, −1)/16, Σ s² = (16 + 2·6)/256, per coefficient (1/16)/(28/256) = 4/7.
 #[test]
 fn white_noise_by_hand() {
-    let model = Composite::new(vec![Process::White(White::new(1.0).unwrap())]);
+    let model = Composite::new(vec![Process::white(1.0).unwrap()]);
     let law = SamplingLaw::new(&model, 6);
     assert_relative_eq!(law.per_coefficient[0], 2.0 / 3.0, max_relative = 1e-12);
     assert_relative_eq!(law.per_coefficient[1], 4.0 / 7.0, max_relative = 1e-12);
@@ -22,12 +22,12 @@ fn white_noise_by_hand() {
 #[test]
 fn spectra_integrate_to_the_wavelet_variance() {
     let processes = [
-        Process::White(White::new(2.0).unwrap()),
-        Process::Quantization(Quantization::new(3.0).unwrap()),
-        Process::Ar1(Ar1::new(0.9, 0.5).unwrap()),
-        Process::RandomWalk(RandomWalk::new(0.1).unwrap()),
-        Process::Ma1(crate::noise::Ma1::new(0.5, 1.0).unwrap()),
-        Process::GaussMarkov(crate::noise::GaussMarkov::new(10.0, 0.3, 100.0).unwrap()),
+        Process::white(2.0).unwrap(),
+        Process::quantization(3.0).unwrap(),
+        Process::ar1(0.9, 0.5).unwrap(),
+        Process::random_walk(0.1).unwrap(),
+        Process::ma1(0.5, 1.0).unwrap(),
+        Process::gauss_markov(10.0, 0.3, 100.0).unwrap(),
     ];
     let half = 1 << 14;
     for process in &processes {
@@ -35,7 +35,7 @@ fn spectra_integrate_to_the_wavelet_variance() {
             let m = f64::from(level - 1).exp2();
             let term = |k: usize| {
                 let x = 0.5 * PI * (k as f64 + 0.5) / half as f64;
-                spectrum(process, x.sin().powi(2)) * (m * x).sin().powi(4) / (m * x.sin()).powi(2)
+                process.spectrum(x.sin().powi(2)) * (m * x).sin().powi(4) / (m * x.sin()).powi(2)
             };
             let integral = (0..half).map(term).sum::<f64>() / half as f64;
             assert_relative_eq!(integral, process.haar_wv(level), max_relative = 1e-9);
@@ -52,15 +52,15 @@ fn few_coefficients_scatter_as_said() {
     const RECORDS: usize = 2000;
     let mut generator = Generator::seed_from_u64(4);
     let processes = [
-        Process::White(White::new(1.0).unwrap()),
-        Process::RandomWalk(RandomWalk::new(1.0).unwrap()),
+        Process::white(1.0).unwrap(),
+        Process::random_walk(1.0).unwrap(),
     ];
     for process in processes {
         let law = SamplingLaw::new(&Composite::new(vec![process]), 8);
         let mut nu = vec![Vec::new(); 2];
         for _ in 0..RECORDS {
             let mut walk = 0.0;
-            let walks = matches!(process, Process::RandomWalk(_));
+            let walks = process.kind() == Kind::RandomWalk;
             let signal: Vec<f64> = (0..512)
                 .map(|_| {
                     let step = generator.sample::<f64, _>(StandardNormal);
@@ -106,10 +106,7 @@ fn robust_variances_scatter_as_said() {
     use crate::wavelet::both;
     const SIGNALS: usize = 1000;
     let tuning = Tuning::new(0.6).unwrap();
-    let law = SamplingLaw::new(
-        &Composite::new(vec![Process::White(White::new(1.0).unwrap())]),
-        6,
-    );
+    let law = SamplingLaw::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 6);
     let mut generator = Generator::seed_from_u64(8);
     let mut logs = vec![Vec::new(); 6];
     for _ in 0..SIGNALS {
@@ -140,8 +137,8 @@ fn robust_variances_scatter_as_said() {
 fn simulated_signals_scatter_so() {
     const SIGNALS: usize = 600;
     let model = Composite::new(vec![
-        Process::White(White::new(1.0).unwrap()),
-        Process::Ar1(Ar1::new(0.8, 0.5).unwrap()),
+        Process::white(1.0).unwrap(),
+        Process::ar1(0.8, 0.5).unwrap(),
     ]);
     let law = SamplingLaw::new(&model, 5);
     let edof = law.edof(2048);

@@ -555,11 +555,11 @@ fn limit(mut values: Vec<f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::curve::sampling::{SamplingLaw, variance_of_log};
-    use crate::noise::{Composite, Process, White};
+    use crate::noise::{Composite, Process};
     use rand::SeedableRng;
 
     fn noise(files: usize, levels: usize, edof: f64) -> Noise {
-        let white = Composite::new(vec![Process::White(White::new(1.0).unwrap())]);
+        let white = Composite::new(vec![Process::white(1.0).unwrap()]);
         Noise::new(
             SamplingLaw::new(&white, levels),
             vec![vec![edof; levels]; files],
@@ -628,7 +628,7 @@ mod tests {
 mod alarm_tests {
     use super::*;
     use crate::curve::sampling::SamplingLaw;
-    use crate::noise::{Composite, Process, White};
+    use crate::noise::{Composite, Process};
     use crate::rng::Generator;
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
@@ -637,7 +637,7 @@ mod alarm_tests {
     /// unusual in any. 100 sets know a rate of 2.5 % to 1.6 %, of which four are allowed.
     #[test]
     fn four_recordings_that_share_their_differences_are_alarmed_as_said() {
-        let white = Composite::new(vec![Process::White(White::new(1.0).unwrap())]);
+        let white = Composite::new(vec![Process::white(1.0).unwrap()]);
         let law = SamplingLaw::new(&white, 13);
         let edof = law.edof(1 << 16);
         let noise: Vec<Noise> = (0..3)

@@ -4,7 +4,7 @@ use super::comparison::{Comparison, Piece, Test, axes, excess_of_classical};
 use super::contrasts::{FALSE_ALARM, FEWEST};
 use crate::curve::{Group, Replicate};
 use crate::imu::{Axis, Sensor};
-use crate::noise::Process;
+use crate::noise::{Kind, Process};
 use crate::outcome::{Outcome, Settings, tau_s};
 use serde::{Serialize, Serializer};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -202,7 +202,7 @@ fn seen(
 /// Where recordings scatter unequally (one is shorter), t exceeds its limit for 2.5 % the more rarely
 /// ([Ibragimov and Müller](crate::bibliography::IbragimovMuller10)).
 fn drifts(pieces: &[Piece<'_>], rate_hz: f64) -> Vec<CommonFinding> {
-    let is_drift = |p: &Process| matches!(p, Process::Drift(_));
+    let is_drift = |p: &Process| p.kind() == Kind::Drift;
     if pieces
         .iter()
         .any(|p| p.model.processes.iter().any(is_drift))

@@ -105,10 +105,7 @@ fn term(kind: Kind, points: &[(f64, f64)]) -> Result<Process, CalibrationError> 
             )));
         }
     };
-    let process = kind.process(&[value], 1.0);
-    process
-        .expect("the kinds above have one parameter")
-        .map_err(outside)
+    Process::new(kind, 0.0, value, 1.0).map_err(outside)
 }
 
 /// Whether the first scales have a slope.
@@ -142,7 +139,7 @@ fn stretch(points: &[(f64, f64)], slope: f64) -> std::ops::Range<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::{Drift, FlickerNoise, Quantization, RandomWalk, White};
+    use crate::noise::Process;
     use approx::assert_relative_eq;
 
     fn curve(model: &Composite) -> Curve {
@@ -176,16 +173,16 @@ mod tests {
     #[test]
     fn a_term_alone_is_read_off() {
         assert_relative_eq!(
-            read(vec![Process::White(White::new(3.0).unwrap())])[0],
+            read(vec![Process::white(3.0).unwrap()])[0],
             3.0,
             max_relative = 1e-12
         );
-        let qn = Process::Quantization(Quantization::new(2.0).unwrap());
+        let qn = Process::quantization(2.0).unwrap();
         assert_relative_eq!(read(vec![qn])[0], 2.0, max_relative = 1e-12);
-        let flicker = Process::Flicker(FlickerNoise::new(4.0).unwrap());
+        let flicker = Process::flicker(4.0).unwrap();
         // The first scales lie above the line, of which nu = ln 2/π·B²; from m = 1 to 2 the slope is −0.16, too far off.
         let above = (2..=16)
-            .map(|level| (FlickerNoise::haar_shape(level) * PI / LN_2).ln())
+            .map(|level| (Kind::Flicker.haar_shape(0.0, level).0 * PI / LN_2).ln())
             .sum::<f64>()
             / 15.0;
         assert_relative_eq!(
@@ -194,9 +191,9 @@ mod tests {
             max_relative = 1e-12
         );
         assert!(above < 0.015);
-        let drift = Process::Drift(Drift::new(0.1).unwrap());
+        let drift = Process::drift(0.1).unwrap();
         assert_relative_eq!(read(vec![drift])[0], 0.1, max_relative = 1e-12);
-        let walk = Process::RandomWalk(RandomWalk::new(0.5).unwrap());
+        let walk = Process::random_walk(0.5).unwrap();
         assert_relative_eq!(read(vec![walk])[0], 0.5, max_relative = 0.011);
     }
 
@@ -204,9 +201,7 @@ mod tests {
     /// of √(2/eta).
     #[test]
     fn residuals_are_in_standard_deviations() {
-        let mut off = curve(&Composite::new(vec![Process::White(
-            White::new(3.0).unwrap(),
-        )]));
+        let mut off = curve(&Composite::new(vec![Process::white(3.0).unwrap()]));
         off.wv[15] *= 2.0;
         let fit = avlr(&off, &"WN".parse().unwrap()).unwrap();
         assert_relative_eq!(
@@ -228,8 +223,8 @@ mod tests {
     fn terms_together_are_read_high() {
         let gamma2 = 3.0 / 4096.0;
         let together = read(vec![
-            Process::White(White::new(1.0).unwrap()),
-            Process::RandomWalk(RandomWalk::new(gamma2).unwrap()),
+            Process::white(1.0).unwrap(),
+            Process::random_walk(gamma2).unwrap(),
         ]);
         for (value, truth) in together.iter().zip([1.0, gamma2]) {
             let high = value / truth - 1.0;
@@ -241,23 +236,18 @@ mod tests {
     /// (three parts in four of the first scale are 3Q²) there is.
     #[test]
     fn a_slope_further_on_is_no_quantization_noise() {
-        let white = || Process::White(White::new(1.0).unwrap());
+        let white = || Process::white(1.0).unwrap();
         let mut dipped = curve(&Composite::new(vec![white()]));
         dipped.wv[10] *= 0.5;
         let fit = avlr(&dipped, &"WN+QN".parse().unwrap()).unwrap();
         assert_eq!(fit.zero, [1]);
-        let led = read(vec![
-            white(),
-            Process::Quantization(Quantization::new(40.0).unwrap()),
-        ]);
+        let led = read(vec![white(), Process::quantization(40.0).unwrap()]);
         assert!((led[1] / 40.0 - 1.0).abs() < 0.15, "{led:?}");
     }
 
     #[test]
     fn correlated_noise_has_no_slope() {
-        let one = curve(&Composite::new(vec![Process::White(
-            White::new(3.0).unwrap(),
-        )]));
+        let one = curve(&Composite::new(vec![Process::white(3.0).unwrap()]));
         let error = avlr(&one, &"WN+AR1".parse().unwrap()).unwrap_err();
         assert!(
             error.to_string().starts_with("AR1 has no slope of its own"),

@@ -8,9 +8,7 @@
 use super::least_squares::Weighting;
 use crate::curve::sampling::Response;
 use crate::minimise::{self, Bounded, MOST, Matrix, Vector, cholesky_solve};
-use crate::noise::{
-    Ar1, Drift, FlickerNoise, GaussMarkov, Kind, Ma1, Quantization, RandomWalk, White,
-};
+use crate::noise::Kind;
 use crate::wavelet::{Curve, QuantizationResponse};
 use rayon::prelude::*;
 
@@ -294,22 +292,14 @@ impl Component {
     /// Wavelet variance per unit of amplitude and its derivative with respect to the coordinate.
     fn shape(&self, u: f64, level: u32) -> (f64, f64) {
         match self.kind {
-            Kind::White => (White::haar_shape(level), 0.0),
-            Kind::Quantization => (Quantization::haar_shape(level), 0.0),
-            Kind::Flicker => (FlickerNoise::haar_shape(level), 0.0),
-            Kind::RandomWalk => (RandomWalk::haar_shape(level), 0.0),
-            Kind::Drift => (Drift::haar_shape(level), 0.0),
-            Kind::Ar1 => of_log(u, |kappa| Ar1::haar_shape_of_kappa(kappa, level)),
-            Kind::GaussMarkov => of_log(u, |kappa| GaussMarkov::haar_shape(kappa, level)),
-            Kind::Ma1 => Ma1::haar_shape(u, level),
+            Kind::Ar1 | Kind::GaussMarkov => {
+                let kappa = u.exp();
+                let (value, derivative) = self.kind.haar_shape_of_kappa(kappa, level);
+                (value, kappa * derivative)
+            }
+            kind => kind.haar_shape(u, level),
         }
     }
-}
-
-fn of_log(u: f64, shape: impl Fn(f64) -> (f64, f64)) -> (f64, f64) {
-    let kappa = u.exp();
-    let (value, derivative) = shape(kappa);
-    (value, derivative * kappa)
 }
 
 /// Wavelet variance of a component per unit of its amplitude, at all levels.
@@ -762,16 +752,16 @@ mod tests {
     use super::*;
     use crate::Weighting;
     use crate::curve::implied;
-    use crate::noise::{Ar1, Composite, Kind, Process, Quantization, RandomWalk, White};
+    use crate::noise::{Composite, Kind, Process};
     use crate::wavelet::{Curve, Tuning};
 
     /// White noise, a random walk and two AR1 to be fitted to a curve that is 10 % off at every scale.
     fn objective() -> Objective {
         let model = Composite::new(vec![
-            Process::White(White::new(1.0).unwrap()),
-            Process::RandomWalk(RandomWalk::new(1e-7).unwrap()),
-            Process::Ar1(Ar1::new(0.9, 1e-2).unwrap()),
-            Process::Ar1(Ar1::new(0.999, 1e-5).unwrap()),
+            Process::white(1.0).unwrap(),
+            Process::random_walk(1e-7).unwrap(),
+            Process::ar1(0.9, 1e-2).unwrap(),
+            Process::ar1(0.999, 1e-5).unwrap(),
         ]);
         let levels: Vec<u32> = (1..=12).collect();
         let off =
@@ -870,8 +860,8 @@ mod tests {
     fn amplitudes_of_a_robust_curve_come_back() {
         for q2 in [0.01, 1.0, 100.0] {
             let model = Composite::new(vec![
-                Process::White(White::new(1.0).unwrap()),
-                Process::Quantization(Quantization::new(q2).unwrap()),
+                Process::white(1.0).unwrap(),
+                Process::quantization(q2).unwrap(),
             ]);
             let quantization = Some(*Tuning::default().quantization());
             let levels: Vec<u32> = (1..=12).collect();

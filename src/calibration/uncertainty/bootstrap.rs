@@ -345,7 +345,7 @@ mod goodness_tests;
 mod inference_tests {
     use super::{like, *};
     use crate::imu::{Axis, Channel, Sensor};
-    use crate::noise::{Composite, Model, Process, RandomWalk, VirtualImu, White};
+    use crate::noise::{Composite, Kind, Model, Process, VirtualImu};
     use crate::wavelet::{Tuning, classical};
     use crate::{
         ModelChoice, Pool, Replicate, Trim, Weighting, calibrate, grouped, infer, replicates,
@@ -428,8 +428,8 @@ mod inference_tests {
         const SETS: u64 = 150;
         let settings = settings("WN+RW");
         let truth = [
-            Process::White(White::new(1.0).unwrap()),
-            Process::RandomWalk(RandomWalk::new(1e-3).unwrap()),
+            Process::white(1.0).unwrap(),
+            Process::random_walk(1e-3).unwrap(),
         ];
         for replicates in [3, 4, 8] {
             let mut covered = [0_u32; 2];
@@ -497,7 +497,8 @@ mod inference_tests {
     #[test]
     fn flicker_noise_is_fitted_and_covered() {
         const SETS: u64 = 100;
-        let process = |code, value| Process::from_values(code, &[value], 1.0).unwrap().unwrap();
+        let process =
+            |code, value| Process::of_values(Kind::named(code).unwrap(), &[value], 1.0).unwrap();
         let axis = Composite::new(vec![
             process("WN", 1.0),
             process("FN", 0.05),

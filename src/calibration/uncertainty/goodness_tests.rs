@@ -4,7 +4,7 @@ use super::*;
 use crate::calibrate;
 use crate::curve::{Estimator, Pool, grouped, replicates};
 use crate::imu::Channel;
-use crate::noise::{Composite, Model, Process, RandomWalk, VirtualImu, White};
+use crate::noise::{Composite, Model, Process, VirtualImu};
 use crate::outcome::{Bootstrap, ModelChoice, Settings};
 
 /// Each of 20 exchangeable statistics in its turn as the observed one: all twentieths, once each.
@@ -23,8 +23,8 @@ fn every_rank_has_the_same_share() {
 
 /// Four recordings of white noise and a random walk, calibrated so often: how often the model is rejected at 5 %.
 fn rejected(model: &str, laboratories: u64) -> usize {
-    let white = Process::White(White::new(1.0).unwrap());
-    let walk = Process::RandomWalk(RandomWalk::new(1e-3).unwrap());
+    let white = Process::white(1.0).unwrap();
+    let walk = Process::random_walk(1e-3).unwrap();
     let axis = Composite::new(vec![white, walk]);
     let truth = Model::pooled(1.0, &axis, &axis);
     let settings = Settings {

@@ -103,9 +103,9 @@ pub const WIDEST: f64 = 100.0;
 
 /// Whether an interval of a correlation time ends where nothing was sought: by the draws it may be any.
 fn leaves_search(searched: Range, process: &Process, interval: &ParameterInterval) -> bool {
-    let kappa = |end: f64| match (process, interval.of.parameter) {
-        (Process::Ar1(_), Parameter::Phi) => Some(-end.ln()),
-        (Process::GaussMarkov(p), Parameter::Beta) => Some(end / p.rate_hz()),
+    let kappa = |end: f64| match interval.of.parameter {
+        Parameter::Phi => Some(-end.ln()),
+        Parameter::Beta => process.kappa().map(|kappa| kappa * end / process.shape()),
         _ => None,
     };
     // Ends beyond by rounding are not beyond.
@@ -192,11 +192,11 @@ fn nearest(
 
 /// ln of the correlation time, of those that have one.
 fn log_time(process: &Process) -> f64 {
-    match process {
-        Process::Ar1(p) => -(-p.phi().max(f64::MIN_POSITIVE).ln()).ln(),
-        Process::GaussMarkov(p) => -p.beta().ln(),
-        _ => 0.0,
+    if !process.kind().is_correlated() {
+        return 0.0;
     }
+    let longest = -f64::MIN_POSITIVE.ln();
+    -process.kappa().unwrap_or(longest).ln()
 }
 
 /// The smallest interval that holds both. A process that is hardly told from the others is shown only where
@@ -363,7 +363,7 @@ pub(crate) fn practical_intervals(
 mod tests {
     use super::*;
     use crate::imu::Sensor;
-    use crate::noise::{Ar1, Composite};
+    use crate::noise::{Composite, Process};
     use crate::rng::StreamKey;
     use crate::wavelet::Curve;
     use crate::{Estimator, Scope, Weighting, fit};
@@ -375,8 +375,7 @@ mod tests {
     /// quantile leaves out, the first has no interval.
     #[test]
     fn a_component_that_vanishes_in_draws_takes_nothing_of_the_other() {
-        let ar1 =
-            |time: f64, sigma2: f64| Process::Ar1(Ar1::new((-1.0 / time).exp(), sigma2).unwrap());
+        let ar1 = |time: f64, sigma2: f64| Process::ar1((-1.0 / time).exp(), sigma2).unwrap();
         let fit_of = |processes: Vec<Process>| {
             let composite = Composite::new(processes);
             let levels: Vec<u32> = (1..=12).collect();
@@ -503,7 +502,7 @@ mod tests {
 #[cfg(test)]
 mod practical_tests {
     use super::*;
-    use crate::noise::{GaussMarkov, Process, RandomWalk, White};
+    use crate::noise::Process;
 
     fn practical(processes: Vec<Process>) -> Practical {
         let (model, rate_hz, range_s) = (Composite::new(processes), 100.0, 1e4);
@@ -533,11 +532,9 @@ mod practical_tests {
     /// where nothing rises.
     #[test]
     fn a_random_walk_is_observed_where_the_model_rises_as_it_does() {
-        let white = Process::White(White::new(1e-4).unwrap());
-        let walk = Process::RandomWalk(RandomWalk::new(1e-12).unwrap());
-        let markov = |sigma: f64| {
-            Process::GaussMarkov(GaussMarkov::new(1.0 / 30.0, sigma * sigma, 100.0).unwrap())
-        };
+        let white = Process::white(1e-4).unwrap();
+        let walk = Process::random_walk(1e-12).unwrap();
+        let markov = |sigma: f64| Process::gauss_markov(1.0 / 30.0, sigma * sigma, 100.0).unwrap();
         let with_walk = practical(vec![white, walk]);
         assert!(with_walk.walk_is_observed() && with_walk.walk_until_s.is_none());
         let hump = practical(vec![white, markov(3e-3)]);

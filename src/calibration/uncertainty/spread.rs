@@ -735,7 +735,7 @@ mod spread_tests;
 #[cfg(test)]
 mod alike_tests {
     use super::*;
-    use crate::noise::{Composite, Process, RandomWalk, White};
+    use crate::noise::{Composite, Process};
     use crate::wavelet::{Tuning, both};
     use rand::RngExt;
     use rand_distr::StandardNormal;
@@ -785,8 +785,8 @@ mod alike_tests {
 
     /// Sets, of so many, that are said to differ.
     fn told(sets: u64, count: usize, spread: f64, estimator: Estimator) -> u32 {
-        let white = Process::White(White::new(1.0).unwrap());
-        let walk = Process::RandomWalk(RandomWalk::new(GAMMA2).unwrap());
+        let white = Process::white(1.0).unwrap();
+        let walk = Process::random_walk(GAMMA2).unwrap();
         let law = SamplingLaw::new(&Composite::new(vec![white, walk]), 10);
         let differs = |seed: u64| {
             let replicates = set(seed, count, spread);
@@ -821,8 +821,8 @@ mod alike_tests {
     /// differ, so no more than 5.
     #[test]
     fn axes_that_differ_are_not_recordings_that_differ() {
-        let white = Process::White(White::new(1.0).unwrap());
-        let walk = Process::RandomWalk(RandomWalk::new(GAMMA2).unwrap());
+        let white = Process::white(1.0).unwrap();
+        let walk = Process::random_walk(GAMMA2).unwrap();
         let law = SamplingLaw::new(&Composite::new(vec![white, walk]), 10);
         let differs = |seed: u64| {
             let of_axis = |axis: Axis| {
@@ -847,10 +847,7 @@ mod alike_tests {
 
     #[test]
     fn one_signal_cannot_differ() {
-        let law = SamplingLaw::new(
-            &Composite::new(vec![Process::White(White::new(1.0).unwrap())]),
-            10,
-        );
+        let law = SamplingLaw::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 10);
         let one = set(1, 1, 0.0);
         let own = Spread::new(&one, Estimator::Awv, &law, &tuning());
         assert_eq!(

@@ -67,15 +67,12 @@ fn a_clipped_variance_scatters_as_said() {
 /// white noise do at level 1, by 1.2 %.
 fn coverage(between: f64, is_shared: bool) -> f64 {
     use crate::imu::Axis;
-    use crate::noise::{Composite, Process, White};
+    use crate::noise::{Composite, Process};
     use rand::SeedableRng;
     const SETS: u32 = 1000;
     const SAMPLES: usize = 1 << 14;
     let tuning = Tuning::default();
-    let law = SamplingLaw::new(
-        &Composite::new(vec![Process::White(White::new(1.0).unwrap())]),
-        1,
-    );
+    let law = SamplingLaw::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 1);
     let mut generator = Generator::seed_from_u64(7);
     let mut held = 0;
     for _ in 0..SETS {
@@ -129,12 +126,9 @@ fn intervals_hold_the_truth_whatever_axes_share() {
 /// which four are allowed, and 2 % for the chi-square in place of the normal law.
 #[test]
 fn a_level_that_a_short_recording_lacks_scatters_as_the_others_show() {
-    use crate::noise::{Composite, Process, White};
+    use crate::noise::{Composite, Process};
     use rand::SeedableRng;
-    let law = SamplingLaw::new(
-        &Composite::new(vec![Process::White(White::new(1.0).unwrap())]),
-        2,
-    );
+    let law = SamplingLaw::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 2);
     let replicate = |(name, logs): (usize, &[f64])| Replicate {
         name: name.to_string(),
         axis: None,

@@ -1,7 +1,7 @@
 //! Simulated laboratories: the spread that they find.
 
 use super::*;
-use crate::noise::{Composite, Law, Model, RandomWalk, Spread, Variation, VirtualImu, White};
+use crate::noise::{Composite, Law, Model, Process, Spread, Variation, VirtualImu};
 use crate::{Estimator, ModelChoice, Pool, calibrate, grouped, infer, replicates};
 use nav_sim_signal::imu::Channel;
 
@@ -16,8 +16,8 @@ fn laboratory(
     sd: f64,
     estimator: Estimator,
 ) -> Outcome {
-    let white = Process::White(White::new(1.0).unwrap());
-    let walk = Process::RandomWalk(RandomWalk::new(1e-3).unwrap());
+    let white = Process::white(1.0).unwrap();
+    let walk = Process::random_walk(1e-3).unwrap();
     let noise = Composite::new(vec![white, walk]);
     let law = Law::Lognormal {
         median: 1.0,
@@ -25,7 +25,7 @@ fn laboratory(
         median_ci95: None,
         sd_ci95: None,
     };
-    let variation = Variation::new(&noise, 1.0, "WN", "sigma2", law).unwrap();
+    let variation = Variation::new(&noise, "WN", "sigma2", law).unwrap();
     let spread = Spread {
         axes: std::array::from_fn(|_| vec![variation.clone()]),
     };

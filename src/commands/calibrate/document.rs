@@ -17,7 +17,9 @@ use nav_sim_document::{
 };
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::practical::Horizon;
-use nav_sim_signal::noise::{Composite, Law, Parameter, ParameterRef, Process, Spread, Variation};
+use nav_sim_signal::noise::{
+    Composite, Kind, Law, Parameter, ParameterRef, Process, Spread, Variation,
+};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -1017,20 +1019,20 @@ fn further_figure(process: &Process, sensor: Sensor) -> Option<FurtherFigure> {
         Sensor::Gyro => ["rad", "rad/s per s"],
     };
     const TIME: &str = "correlation time T";
-    Some(match process {
-        Process::Ar1(p) if p.phi() > 0.0 => ("T", TIME, "s", Parameter::Phi, |phi, rate_hz| {
+    Some(match process.kind() {
+        Kind::Ar1 if process.shape() > 0.0 => ("T", TIME, "s", Parameter::Phi, |phi, rate_hz| {
             -1.0 / (phi.ln() * rate_hz)
         }),
-        Process::GaussMarkov(_) => ("T", TIME, "s", Parameter::Beta, |beta, _| 1.0 / beta),
+        Kind::GaussMarkov => ("T", TIME, "s", Parameter::Beta, |beta, _| 1.0 / beta),
         // Of the increments over a sample, as IEEE 952 has it.
-        Process::Quantization(_) => (
+        Kind::Quantization => (
             "Q",
             "quantization Q",
             increment,
             Parameter::Q2,
             |q2, rate_hz| q2.sqrt() / rate_hz,
         ),
-        Process::Drift(_) => ("R", "ramp", ramp, Parameter::Slope, |slope, rate_hz| {
+        Kind::Drift => ("R", "ramp", ramp, Parameter::Slope, |slope, rate_hz| {
             slope * rate_hz
         }),
         _ => return None,
@@ -1100,7 +1102,7 @@ impl CalibrationNote {
                 file.intervals.extend(intervals_of_axis(outcome, channel));
             }
         }
-        file.spread = spread(outcomes, settings.rate_hz);
+        file.spread = spread(outcomes);
         let mut provenance = self.provenance(outcomes, settings, curves);
         let mut remarks = toml::Table::new();
         let mut turn_on = TurnOn::default();
@@ -1154,7 +1156,7 @@ impl CalibrationNote {
 }
 
 /// The laws by which the parameters of recordings differ; none where none is known to.
-fn spread(outcomes: &[&Outcome], rate_hz: f64) -> Option<Spread> {
+fn spread(outcomes: &[&Outcome]) -> Option<Spread> {
     let mut spread = Spread::default();
     for outcome in outcomes {
         let (composite, labels) = (&outcome.fit.composite, outcome.fit.composite.labels());
@@ -1166,7 +1168,7 @@ fn spread(outcomes: &[&Outcome], rate_hz: f64) -> Option<Spread> {
                 sd_ci95: Some(found.sd_ci95),
             };
             let (process, parameter) = (&labels[found.of.process], found.of.parameter.name());
-            Variation::new(composite, rate_hz, process, parameter, law).ok()
+            Variation::new(composite, process, parameter, law).ok()
         };
         let laws: Vec<Variation> = outcome
             .inference

@@ -4,9 +4,9 @@
 //! ```
 //! use nav_sim::calibration::{ModelChoice, Pool, Settings, calibrate, grouped, replicates};
 //! use nav_sim::signal::imu::Channel;
-//! use nav_sim::signal::noise::{Composite, Model, Process, VirtualImu, White};
+//! use nav_sim::signal::noise::{Composite, Model, Process, VirtualImu};
 //!
-//! let white = Composite::new(vec![Process::White(White::new(4e-6)?)]);
+//! let white = Composite::new(vec![Process::white(4e-6)?]);
 //! let model = Model::pooled(100.0, &white, &white);
 //! let imu = VirtualImu { model: &model, spread: None, contamination: None, seed: 1 };
 //! let settings = Settings { model: ModelChoice::Given("WN".parse()?), rate_hz: 100.0, ..Settings::default() };

@@ -15,7 +15,7 @@ use nav_sim_signal::imu::{Axis, Sensor};
 use nav_sim_signal::noise::practical::{
     AxisParameters, Bias, Closure, Curve, Horizon, Pair, Policy, Ratio,
 };
-use nav_sim_signal::noise::{Composite, Process};
+use nav_sim_signal::noise::{Composite, Kind};
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -301,12 +301,13 @@ fn check(
             "calibrate recordings of both sensors, or write the other one's section by hand",
         );
     }
-    let has = |kind: fn(&Process) -> bool| axes.iter().any(|a| a.processes.iter().any(kind));
-    let walks = has(|p| matches!(p, Process::RandomWalk(_)));
+    let has = |kind| {
+        axes.iter()
+            .any(|a| a.processes.iter().any(|p| p.kind() == kind))
+    };
+    let walks = has(Kind::RandomWalk);
     let lacking = match target.bias {
-        Bias::Walk => {
-            (!walks && has(|p| matches!(p, Process::GaussMarkov(_)))).then_some("Gauss-Markov bias")
-        }
+        Bias::Walk => (!walks && has(Kind::GaussMarkov)).then_some("Gauss-Markov bias"),
         _ => walks.then_some("random walk"),
     };
     match lacking {

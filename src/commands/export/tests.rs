@@ -2,7 +2,7 @@ use super::targets::number;
 use super::*;
 use crate::io::model_file::TurnOn;
 use nav_sim_signal::imu::Channel;
-use nav_sim_signal::noise::{Ar1, GaussMarkov, Model, Process, Quantization, RandomWalk, White};
+use nav_sim_signal::noise::{Model, Process};
 use nav_sim_signal::units::{DEG, STANDARD_GRAVITY};
 
 const RATE: f64 = 200.0;
@@ -13,15 +13,15 @@ const K_A: f64 = 3e-5;
 const K_G: f64 = 2e-7;
 
 fn white(density: f64) -> Process {
-    Process::White(White::new(density * density * RATE).unwrap())
+    Process::white(density * density * RATE).unwrap()
 }
 
 fn walk(density: f64) -> Process {
-    Process::RandomWalk(RandomWalk::new(density * density / RATE).unwrap())
+    Process::random_walk(density * density / RATE).unwrap()
 }
 
 fn markov(sigma: f64, t_corr_s: f64) -> Process {
-    Process::GaussMarkov(GaussMarkov::new(1.0 / t_corr_s, sigma * sigma, RATE).unwrap())
+    Process::gauss_markov(1.0 / t_corr_s, sigma * sigma, RATE).unwrap()
 }
 
 /// A model with turn-on biases of 0.05 m/s² and 10 °/h.
@@ -384,7 +384,7 @@ fn a_sensor_without_a_bias_has_no_say_in_the_correlation_time() {
 
 #[test]
 fn doubts_are_told() {
-    let fast = Process::Ar1(Ar1::new(0.5, 1e-6).unwrap());
+    let fast = Process::ar1(0.5, 1e-6).unwrap();
     let strict = export(
         "kalibr",
         vec![fast, walk(K_A)],
@@ -416,8 +416,7 @@ fn doubts_are_told() {
     let wandering = markovs("kf-gins").doubts().join("\n");
     assert!(!wandering.contains("K is 0"), "{wandering}");
     // of 3 q²/(T/dt)² at 1 s as much as N²/T: half of the variance; an envelope has it in its N
-    let coarse =
-        || Process::Quantization(Quantization::new(N_A * N_A * RATE * RATE / 3.0).unwrap());
+    let coarse = || Process::quantization(N_A * N_A * RATE * RATE / 3.0).unwrap();
     for (policy, is_told) in [(Policy::Matched, true), (Policy::Envelope, false)] {
         let accel = vec![white(N_A), walk(K_A), coarse()];
         let told = export("kalibr", accel, vec![white(N_G), walk(K_G)], policy)

@@ -39,7 +39,7 @@ use nav_sim_navigation::simulation::lincov::weak_heading;
 use nav_sim_navigation::simulation::{BIAS_NAMES, REPORTED_NAMES, lincov};
 use nav_sim_navigation::trajectory::reference::Reference;
 use nav_sim_signal::imu::ImuIncrement;
-use nav_sim_signal::noise::{Composite, Model, Process, continuous, reduction};
+use nav_sim_signal::noise::{Composite, Kind, Model, continuous, reduction};
 use nav_sim_signal::units::{DEG, Refused};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -957,7 +957,7 @@ fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, Refused> {
         Composite::new(
             axis.processes
                 .iter()
-                .filter(|p| !matches!(p, Process::Quantization(_)))
+                .filter(|p| p.kind() != Kind::Quantization)
                 .copied()
                 .collect(),
         )

@@ -26,7 +26,7 @@ use crate::io::toml_file::{
     Between, Finite, NonNegative, OneOrEach, Positive, Share, Stationary, Version,
 };
 use nav_sim_signal::imu::Sensor;
-use nav_sim_signal::noise::Ar1;
+use nav_sim_signal::noise::Process;
 use nav_sim_signal::noise::contamination::{Contamination, Extent, Operation, Rule};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -178,7 +178,7 @@ fn operation(
             }
         }
         Described::Ar1 { phi, sigma2 } => {
-            let made = Ar1::new(phi.of(i), sigma2.of(i));
+            let made = Process::ar1(phi.of(i), sigma2.of(i));
             Operation::Ar1(made.map_err(|e| refused(e.parameter, format!("is not {}", e.domain)))?)
         }
         Described::HeavyTails { freedom, sigma } => Operation::HeavyTails {
@@ -261,13 +261,13 @@ mod tests {
         assert_eq!(abnormal[1], replace(0.18));
         assert_eq!(
             abnormal[3],
-            Operation::Ar1(Ar1::new(0.975_761, 3.397_832e-7).unwrap())
+            Operation::Ar1(Process::ar1(0.975_761, 3.397_832e-7).unwrap())
         );
         let abnormal = rules("section5-III", Sensor::Gyro, 5);
         assert_eq!(abnormal[1], replace(0.026));
         assert_eq!(
             abnormal[3],
-            Operation::Ar1(Ar1::new(0.976_658_0, 5.313_189e-9).unwrap())
+            Operation::Ar1(Process::ar1(0.976_658_0, 5.313_189e-9).unwrap())
         );
         assert_eq!(rules("section5-III", Sensor::Gyro, 2)[1], replace(0.022));
         for replicate in [1, 2, 4, 5, 6, 7] {

@@ -23,9 +23,7 @@ use super::model_file::{ModelFile, NOT_STATED, PROGRAM, SCHEMA, TurnOn, known};
 use super::toml_file::Source;
 use crate::report::readable;
 use nav_sim_signal::imu::{Channel, Sensor};
-use nav_sim_signal::noise::{
-    Composite, Flicker, Model, ParameterError, Process, RandomWalk, White, continuous,
-};
+use nav_sim_signal::noise::{Composite, Flicker, Model, ParameterError, Process, continuous};
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 use serde::Deserialize;
 use serde_json::json;
@@ -141,18 +139,13 @@ impl Datasheet {
         let density = self.value(sensor, Figure::Noise);
         if let Some(density) = density {
             let sigma2 = continuous::white_sigma2(density, rate_hz);
-            processes.push(Process::White(White::new(sigma2)?));
+            processes.push(Process::white(sigma2)?);
         }
         let given_s = self.value(sensor, Figure::CorrelationTime);
         let t_corr_s = given_s.unwrap_or(ASSUMED_CORRELATION_TIME_S);
         if let Some(floor) = self.value(sensor, Figure::Bias) {
             let flicker = Flicker { floor, t_corr_s };
-            processes.extend(
-                flicker
-                    .processes(rate_hz)?
-                    .into_iter()
-                    .map(Process::GaussMarkov),
-            );
+            processes.extend(flicker.processes(rate_hz)?);
             doubts.extend(doubt_floor(
                 sensor,
                 flicker,
@@ -162,7 +155,7 @@ impl Datasheet {
         }
         if let Some(density) = self.value(sensor, Figure::Walk) {
             let gamma2 = continuous::walk_gamma2(density, rate_hz);
-            processes.push(Process::RandomWalk(RandomWalk::new(gamma2)?));
+            processes.push(Process::random_walk(gamma2)?);
         }
         Ok(Composite::new(processes))
     }

@@ -591,10 +591,7 @@ fn read_process(
         let reason = format!("is more than {LARGEST:e}, which no sensor has");
         return Err(source.refused(&format!("{key}.{name}"), reason));
     }
-    let process = kind
-        .process(&values, rate_hz)
-        .expect("as many values as the kind has parameters");
-    process.map_err(|e| refuse_parameter(source, key, &e))
+    Process::of_values(kind, &values, rate_hz).map_err(|e| refuse_parameter(source, key, &e))
 }
 
 fn refuse_parameter(source: &Source, key: &str, e: &ParameterError) -> Failure {
@@ -633,14 +630,10 @@ fn read_laws(
             let key = format!("{key}[{i}]");
             let (process, parameter) = (law.process.as_str(), law.parameter.as_str());
             let law = law.distribution;
-            let variation = Variation::new(
-                file.model.axis(channel),
-                file.model.rate_hz,
-                process,
-                parameter,
-                law,
-            )
-            .map_err(|e| source.refused(&format!("{key}.{}", e.key), format!("is refused: {e}")))?;
+            let variation = Variation::new(file.model.axis(channel), process, parameter, law)
+                .map_err(|e| {
+                    source.refused(&format!("{key}.{}", e.key), format!("is refused: {e}"))
+                })?;
             if into
                 .iter()
                 .any(|v| (v.process.as_str(), v.of.parameter.name()) == (process, parameter))

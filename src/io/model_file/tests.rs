@@ -31,7 +31,7 @@ fn process_refusal(process: &str) -> String {
 }
 
 fn process(code: &str, values: &[f64]) -> Process {
-    Process::from_values(code, values, 100.0).unwrap().unwrap()
+    Process::of_values(Kind::named(code).unwrap(), values, 100.0).unwrap()
 }
 
 fn n2() -> Composite {
@@ -54,9 +54,7 @@ fn what_is_written_reads_back_to_the_same_bits() {
     gyro.processes.push(process("MA1", &[-0.5, 2e22]));
     let mut file = ModelFile::new(Model::pooled(100.0 / 3.0, &n2(), &gyro));
     // A GM belongs to its rate.
-    let gm = Process::from_values("GM", &[1.0 / 3.0, 0.1 + 0.2], 100.0 / 3.0)
-        .unwrap()
-        .unwrap();
+    let gm = Process::gauss_markov(1.0 / 3.0, 0.1 + 0.2, 100.0 / 3.0).unwrap();
     for axis in &mut file.model.axes[3..] {
         axis.processes[6] = gm;
     }
@@ -74,8 +72,8 @@ fn what_is_written_reads_back_to_the_same_bits() {
         low: 0.98,
         width: 1e-3,
     };
-    let pooled = Variation::new(&n2(), 100.0, "AR1_1", "phi", beta).unwrap();
-    let normal = Variation::new(&n2(), 100.0, "WN", "sigma2", Law::Normal { sd: 1e-7 }).unwrap();
+    let pooled = Variation::new(&n2(), "AR1_1", "phi", beta).unwrap();
+    let normal = Variation::new(&n2(), "WN", "sigma2", Law::Normal { sd: 1e-7 }).unwrap();
     let mut spread = Spread::default();
     let lognormal = Law::Lognormal {
         median: 0.9999,
@@ -83,14 +81,14 @@ fn what_is_written_reads_back_to_the_same_bits() {
         median_ci95: Some([0.9998, 0.99995]),
         sd_ci95: Some([0.1 + 0.2, 0.7]),
     };
-    let lognormal = Variation::new(&n2(), 100.0, "AR1_2", "phi", lognormal).unwrap();
+    let lognormal = Variation::new(&n2(), "AR1_2", "phi", lognormal).unwrap();
     let plain = Law::Lognormal {
         median: 2e-11,
         sd: 0.0,
         median_ci95: None,
         sd_ci95: None,
     };
-    let plain = Variation::new(&n2(), 100.0, "RW", "gamma2", plain).unwrap();
+    let plain = Variation::new(&n2(), "RW", "gamma2", plain).unwrap();
     spread.axes[..3].fill(vec![pooled, normal.clone(), lognormal, plain]);
     spread.axes[5].push(normal);
     file.spread = Some(spread);

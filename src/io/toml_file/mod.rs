@@ -601,7 +601,7 @@ pub(crate) struct Between<const LOW: i64, const HIGH: i64, const OPEN: bool>(pub
 pub(crate) type Share = Between<0, 1, false>;
 pub(crate) type NonNegative = Between<0, { i64::MAX }, false>;
 pub(crate) type Positive = Between<0, { i64::MAX }, true>;
-/// Coefficients of a stationary AR(1), as [`Ar1::new`](nav_sim_signal::noise::Ar1::new) takes them.
+/// Coefficients of a stationary AR(1), as [`Process::ar1`](nav_sim_signal::noise::Process::ar1) takes them.
 pub(crate) type Stationary = Between<-1, 1, true>;
 
 impl<const LOW: i64, const HIGH: i64, const OPEN: bool> TryFrom<f64> for Between<LOW, HIGH, OPEN> {

@@ -3,11 +3,11 @@
 //! ```
 //! use nav_sim_navigation::ekf::{Belief, FilterStates};
 //! use nav_sim_signal::imu::Sensor;
-//! use nav_sim_signal::noise::{Ar1, Composite, Model, Process, White};
+//! use nav_sim_signal::noise::{Composite, Model, Process};
 //!
 //! // A bias of 1e-4 rad/s with a correlation time of 100 s at 100 Hz.
-//! let bias = Ar1::new(0.9999, 1e-8 * (1.0 - 0.9999 * 0.9999))?;
-//! let axis = Composite::new(vec![Process::White(White::new(1e-6)?), Process::Ar1(bias)]);
+//! let bias = Process::ar1(0.9999, 1e-8 * (1.0 - 0.9999 * 0.9999))?;
+//! let axis = Composite::new(vec![Process::white(1e-6)?, bias]);
 //! let belief = Belief::new(&Model::pooled(100.0, &axis, &axis), FilterStates::Full, 1.0, 800.0)?;
 //! // Position, velocity, attitude, and a bias for each of six axes.
 //! assert_eq!(belief.states, 15);
@@ -301,27 +301,6 @@ struct AxisBelief {
 /// phi, innovation and initial variance of a bias of an axis.
 type BiasState = [f64; 3];
 
-/// The state that a process is; none of white noise, what is like it, and drifts.
-pub(crate) fn state_of(process: &Process) -> Option<BiasState> {
-    match process {
-        Process::Ar1(p) => Some([p.phi(), p.sigma2(), p.variance()]),
-        Process::GaussMarkov(p) => Some([p.ar1().phi(), p.ar1().sigma2(), p.s2()]),
-        // A random walk has no stationary variance. It is taken to start at zero; the turn-on bias is
-        // an unknown apart.
-        Process::RandomWalk(p) => Some([1.0, p.gamma2(), 0.0]),
-        _ => None,
-    }
-}
-
-/// Variance of the white noise that a filter which integrates feels: of an MA(1) its long-run variance.
-pub(crate) fn white_of(process: &Process) -> f64 {
-    match process {
-        Process::White(p) => p.sigma2(),
-        Process::Ma1(p) => (1.0 + p.theta()).powi(2) * p.sigma2(),
-        _ => 0.0,
-    }
-}
-
 impl AxisBelief {
     fn full(noise: &Composite) -> Self {
         let mut axis = Self {
@@ -330,18 +309,15 @@ impl AxisBelief {
         };
         for process in &noise.processes {
             // quantization is left out, a drift has a state of its own
-            axis.white += white_of(process);
-            axis.biases.extend(state_of(process));
-            if let Process::Flicker(p) = process {
-                let mut parts = Self::full(&Composite::new(p.parts(Ladder::FILTER)));
-                let stationary: f64 = parts.biases.iter().map(|[.., initial]| initial).sum();
-                // what is slower still is as constant as the slowest
-                if let Some([.., slowest]) = parts.biases.last_mut() {
-                    *slowest += (p.initial_variance() - stationary).max(0.0);
-                }
-                axis.white += parts.white;
-                axis.biases.extend(parts.biases);
+            let parts = process.parts(Ladder::FILTER);
+            axis.white += parts.iter().map(Process::white_variance).sum::<f64>();
+            let mut biases: Vec<_> = parts.iter().filter_map(Process::recursion).collect();
+            // what is slower still of flicker noise is as constant as the slowest
+            let stationary: f64 = biases.iter().map(|[.., initial]| initial).sum();
+            if let Some([.., slowest]) = biases.last_mut() {
+                *slowest += (process.initial_variance() - stationary).max(0.0);
             }
+            axis.biases.extend(biases);
         }
         axis
     }
@@ -364,12 +340,12 @@ impl AxisBelief {
         let reduced = reduction::reduce(noise, model.rate_hz, interval_s, window_s)
             .map_err(|source| BeliefError::Reduction { channel, source })?;
         let bias = [
-            reduced.bias.phi(),
-            reduced.bias.sigma2(),
+            reduced.bias.shape(),
+            reduced.bias.amplitude(),
             reduced.initial_variance,
         ];
         Ok(Self {
-            white: reduced.white.sigma2(),
+            white: reduced.white,
             biases: vec![bias],
         })
     }
@@ -535,18 +511,18 @@ pub(crate) fn psi_of_angles(q_b_n: DQuat) -> Matrix3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::{Ar1, GaussMarkov, Quantization, RandomWalk, White};
+    use crate::noise::Process;
 
     /// The filter of 15 states of a model with one bias an axis, whichever it is, is the filter with all states.
     #[test]
     fn a_model_that_fits_15_states_is_taken_as_it_is() {
-        let white = Process::White(White::new(5e-5).unwrap());
+        let white = Process::white(5e-5).unwrap();
         let biases = [
-            Process::RandomWalk(RandomWalk::new(3.3e-11).unwrap()),
-            Process::Ar1(Ar1::new(0.9999, 1e-11).unwrap()),
-            Process::GaussMarkov(GaussMarkov::new(0.01, 1e-6, 100.0).unwrap()),
+            Process::random_walk(3.3e-11).unwrap(),
+            Process::ar1(0.9999, 1e-11).unwrap(),
+            Process::gauss_markov(0.01, 1e-6, 100.0).unwrap(),
         ];
-        let quantization = Process::Quantization(Quantization::new(1e-7).unwrap());
+        let quantization = Process::quantization(1e-7).unwrap();
         for axes in [[0, 0, 0], [1, 1, 1], [2, 2, 2], [0, 1, 2]] {
             let axis = |i: usize| Composite::new(vec![white, biases[axes[i]], quantization]);
             let mut model = Model::pooled(100.0, &axis(0), &axis(0));

@@ -10,7 +10,7 @@ use crate::earth::{self, GravityModel};
 use crate::frames::NavState;
 use crate::imu::{ImuSample, Sensor};
 use crate::lanes::{Lanes, Level, Vec3};
-use crate::noise::{Ar1, Composite, Model, Process, White};
+use crate::noise::{Composite, Model, Process};
 use crate::rng::{Generator, StreamKey};
 use crate::strapdown::Strapdown;
 use glam::{DQuat, DVec3};
@@ -188,12 +188,12 @@ pub(super) fn gauss_markov_model() -> Model {
     let (phi_a, phi_g) = ((-0.01_f64 / 200.0).exp(), (-0.01_f64 / 500.0).exp());
     model(
         [
-            Process::White(White::new(4e-5).unwrap()),
-            Process::Ar1(Ar1::new(phi_a, 9e-4 * (1.0 - phi_a * phi_a)).unwrap()),
+            Process::white(4e-5).unwrap(),
+            Process::ar1(phi_a, 9e-4 * (1.0 - phi_a * phi_a)).unwrap(),
         ],
         [
-            Process::White(White::new(1e-6).unwrap()),
-            Process::Ar1(Ar1::new(phi_g, 1e-8 * (1.0 - phi_g * phi_g)).unwrap()),
+            Process::white(1e-6).unwrap(),
+            Process::ar1(phi_g, 1e-8 * (1.0 - phi_g * phi_g)).unwrap(),
         ],
     )
 }
@@ -398,10 +398,8 @@ fn splitting_a_bias_into_two_states_changes_nothing_outside() {
     let one = gauss_markov_model();
     let mut two = one.clone();
     for axis in &mut two.axes {
-        let Process::Ar1(bias) = axis.processes[1] else {
-            unreachable!("the model's second process")
-        };
-        let part = |share: f64| Process::Ar1(Ar1::new(bias.phi(), bias.sigma2() * share).unwrap());
+        let bias = axis.processes[1];
+        let part = |share: f64| bias.times(share).unwrap();
         axis.processes.splice(1.., [part(0.3), part(0.7)]);
     }
     let mut filters = [

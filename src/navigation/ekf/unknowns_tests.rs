@@ -12,7 +12,7 @@ use crate::earth::{self, GravityModel};
 use crate::frames::NavState;
 use crate::imu::Sensor;
 use crate::lanes::{Lanes, Level, Vec3};
-use crate::noise::{Composite, FlickerNoise, Ma1, Model, Process, RandomWalk, White};
+use crate::noise::{Composite, Model, Process};
 use crate::strapdown::Strapdown;
 use glam::{DQuat, DVec3};
 use nalgebra::DMatrix;
@@ -82,8 +82,8 @@ fn the_covariance_at_the_start_is_what_is_believed() {
 /// Flicker noise starts with the variance of all that is slower than its fastest bias, in however few states.
 #[test]
 fn flicker_noise_starts_with_its_variance() {
-    let noise = FlickerNoise::new(1e-8).unwrap();
-    let axis = Composite::new(vec![Process::Flicker(noise)]);
+    let noise = Process::flicker(1e-8).unwrap();
+    let axis = Composite::new(vec![noise]);
     let belief = Belief::new(
         &Model::pooled(100.0, &axis, &axis),
         FilterStates::Full,
@@ -102,8 +102,8 @@ fn flicker_noise_starts_with_its_variance() {
 /// where the model has no bias it is the only one.
 #[test]
 fn a_turn_on_bias_is_beside_what_wanders() {
-    let white = Process::White(White::new(1e-6).unwrap());
-    let walk = Process::RandomWalk(RandomWalk::new(1e-10).unwrap());
+    let white = Process::white(1e-6).unwrap();
+    let walk = Process::random_walk(1e-10).unwrap();
     for (processes, others) in [(vec![white, walk], 1), (vec![white], 0)] {
         let axis = Composite::new(processes);
         let model = Model::pooled(100.0, &axis, &axis);
@@ -137,8 +137,8 @@ fn a_turn_on_bias_is_beside_what_wanders() {
 #[test]
 fn white_noises_add_up_to_their_long_run_variance() {
     let parts = [
-        Process::White(White::new(3.0).unwrap()),
-        Process::Ma1(Ma1::new(-0.5, 8.0).unwrap()),
+        Process::white(3.0).unwrap(),
+        Process::ma1(-0.5, 8.0).unwrap(),
     ];
     let axis = Composite::new(parts.to_vec());
     let belief = Belief::new(

@@ -13,12 +13,12 @@
 //! use nav_sim_navigation::scenario::Scenario;
 //! use nav_sim_navigation::sensors::imu::Truth;
 //! use nav_sim_navigation::simulation::{Plan, record};
-//! use nav_sim_signal::noise::{Composite, Model, Process, RandomWalk, White};
+//! use nav_sim_signal::noise::{Composite, Model, Process};
 //!
 //! # let start = ProfileStart { t_s: 0.0, lat: 0.9, lon: 0.2, h: 0.0, heading: 0.0, speed: 20.0 };
 //! # let north = Segment { kind: Kind::Straight(Length::Duration(60.0)), climb_m: 0.0, ramp_s: None };
 //! # let drive = Profile { start, bank: Bank::None, ramp_s: 2.0, segments: vec![north] }.build()?;
-//! let axis = Composite::new(vec![Process::White(White::new(1e-6)?), Process::RandomWalk(RandomWalk::new(1e-14)?)]);
+//! let axis = Composite::new(vec![Process::white(1e-6)?, Process::random_walk(1e-14)?]);
 //! let model = Model::pooled(100.0, &axis, &axis);
 //! let scenario = Scenario::default();
 //! let beliefs = [Belief::new(&model, FilterStates::Full, 1.0, 800.0)?.with_initial(&scenario.initial)];

@@ -5,7 +5,7 @@ use crate::earth::GravityModel;
 use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings};
 use crate::frames::RollPitchYaw;
 use crate::imu::Channel;
-use crate::noise::{Ar1, Composite, Model, Process, RandomWalk, VirtualImu, White};
+use crate::noise::{Composite, Model, Process, VirtualImu};
 use crate::rng::StreamKey;
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::defects::{Defects, ImuSettings};
@@ -49,11 +49,8 @@ fn trajectory(duration_s: f64) -> Trajectory {
 fn model(scale: f64) -> Model {
     let axis = |white: f64, deviation: f64, t_corr_s: f64| {
         let phi = (-0.01 / t_corr_s).exp();
-        let bias = Ar1::new(phi, scale * deviation * deviation * (1.0 - phi * phi)).unwrap();
-        Composite::new(vec![
-            Process::White(White::new(white).unwrap()),
-            Process::Ar1(bias),
-        ])
+        let bias = Process::ar1(phi, scale * deviation * deviation * (1.0 - phi * phi)).unwrap();
+        Composite::new(vec![Process::white(white).unwrap(), bias])
     };
     Model::pooled(100.0, &axis(4e-5, 0.02, 200.0), &axis(1e-6, 2e-4, 300.0))
 }
@@ -480,8 +477,8 @@ fn an_outage_that_outlasts_the_trajectory_ends_with_it() {
 #[test]
 fn windows_of_recordings_leave_the_matched_filter_consistent() {
     let axis = |white: f64, gamma2: f64| {
-        let walk = Process::RandomWalk(RandomWalk::new(gamma2).unwrap());
-        Composite::new(vec![Process::White(White::new(white).unwrap()), walk])
+        let walk = Process::random_walk(gamma2).unwrap();
+        Composite::new(vec![Process::white(white).unwrap(), walk])
     };
     let model = Model::pooled(100.0, &axis(4e-5, 3e-9), &axis(1e-6, 1e-12));
     let imu = VirtualImu {

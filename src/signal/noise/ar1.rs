@@ -1,75 +1,38 @@
 //! First-order autoregressive process: X_t = phi X_{t−1} + W_t, W white with variance sigma2.
 
-use super::{Kind, ParameterError, checked};
 use std::f64::consts::LN_2;
 
-/// First-order autoregressive process, stationary: |phi| < 1.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Ar1 {
-    phi: f64,
-    sigma2: f64,
+/// Haar wavelet variance per unit of sigma2, and its derivative with respect to phi. Relative error a
+/// few 1e-15 for every |phi| < 1, up to |phi| = 1 − 1e-16.
+pub(super) fn haar_shape(phi: f64, level: u32) -> (f64, f64) {
+    let m = half_scale(level);
+    if level <= 1 {
+        // m = 1: W is half the difference of neighbours, nu = γ₀(1 − phi)/2, and 1 − phi cancels against
+        // that of γ₀.
+        let sum = 1.0 + phi;
+        (0.5 / sum, -0.5 / (sum * sum))
+    } else if phi > 0.5 {
+        // phi − 1 is exact here, so kappa keeps all its digits.
+        let (value, derivative) = slow_shape(-(phi - 1.0).ln_1p(), m);
+        // dκ/dphi = −1/phi.
+        (value, -derivative / phi)
+    } else if phi >= 0.0 {
+        fast_shape(phi, m)
+    } else {
+        let (value, derivative) = alternating_shape(-phi, level);
+        (value, -derivative)
+    }
 }
 
-impl Ar1 {
-    /// From the coefficient (dimensionless) and the innovation variance (units²).
-    ///
-    /// # Errors
-    /// When |phi| ≥ 1, the variance is negative, or either is not finite.
-    pub fn new(phi: f64, sigma2: f64) -> Result<Self, ParameterError> {
-        Ok(Self {
-            phi: checked(Kind::Ar1, "phi", phi)?,
-            sigma2: checked(Kind::Ar1, "sigma2", sigma2)?,
-        })
-    }
-
-    /// Coefficient.
-    pub const fn phi(&self) -> f64 {
-        self.phi
-    }
-
-    /// Innovation variance (units²).
-    pub const fn sigma2(&self) -> f64 {
-        self.sigma2
-    }
-
-    /// Stationary variance sigma2/(1 − phi²) (units²).
-    pub fn variance(&self) -> f64 {
-        // Factorised: 1 − phi is exact for phi ≥ ½, whereas phi² would be rounded before the subtraction.
-        self.sigma2 / ((1.0 - self.phi) * (1.0 + self.phi))
-    }
-
-    /// Haar wavelet variance per unit of sigma2, and its derivative with respect to phi. Relative error a
-    /// few 1e-15 for every |phi| < 1, up to |phi| = 1 − 1e-16.
-    pub(crate) fn haar_shape(phi: f64, level: u32) -> (f64, f64) {
-        let m = half_scale(level);
-        if level <= 1 {
-            // m = 1: W is half the difference of neighbours, nu = γ₀(1 − phi)/2, and 1 − phi cancels against
-            // that of γ₀.
-            let sum = 1.0 + phi;
-            (0.5 / sum, -0.5 / (sum * sum))
-        } else if phi > 0.5 {
-            // phi − 1 is exact here, so kappa keeps all its digits.
-            let (value, derivative) = slow_shape(-(phi - 1.0).ln_1p(), m);
-            // dκ/dphi = −1/phi.
-            (value, -derivative / phi)
-        } else if phi >= 0.0 {
-            fast_shape(phi, m)
-        } else {
-            let (value, derivative) = alternating_shape(-phi, level);
-            (value, -derivative)
-        }
-    }
-
-    /// The same in kappa = −ln phi > 0, the inverse correlation time in samples: value and derivative with
-    /// respect to kappa. Keeps the digits of a kappa too small to be told from 0 in phi.
-    pub fn haar_shape_of_kappa(kappa: f64, level: u32) -> (f64, f64) {
-        if kappa < LN_2 && level > 1 {
-            slow_shape(kappa, half_scale(level))
-        } else {
-            let phi = (-kappa).exp();
-            let (value, derivative) = Self::haar_shape(phi, level);
-            (value, -phi * derivative)
-        }
+/// The same in kappa = −ln phi > 0, the inverse correlation time in samples: value and derivative with
+/// respect to kappa. Keeps the digits of a kappa too small to be told from 0 in phi.
+pub(super) fn haar_shape_of_kappa(kappa: f64, level: u32) -> (f64, f64) {
+    if kappa < LN_2 && level > 1 {
+        slow_shape(kappa, half_scale(level))
+    } else {
+        let phi = (-kappa).exp();
+        let (value, derivative) = haar_shape(phi, level);
+        (value, -phi * derivative)
     }
 }
 
@@ -234,131 +197,90 @@ const RAMP: [f64; 24] = {
     c
 };
 
-// First-order moving average: X_t = W_t + theta W_{t−1}.
+/// Largest Allan deviation over standard deviation, reached with averages of [`ALLAN_PEAK_AT`] correlation times: with averages of
+/// x correlation times the Allan variance is s2·(2/x)·[1 − (3 − 4e^(−x) + e^(−2x))/(2x)].
+pub(crate) const ALLAN_PEAK: f64 = 0.617_364_283_144_441_3;
+/// Averaging time of the largest Allan deviation (correlation times).
+pub(crate) const ALLAN_PEAK_AT: f64 = 1.892_617_8;
 
-/// First-order moving average, invertible: |theta| ≤ 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ma1 {
-    theta: f64,
-    sigma2: f64,
-}
-
-impl Ma1 {
-    /// From the coefficient (dimensionless) and the innovation variance (units²).
-    ///
-    /// # Errors
-    /// When |theta| > 1, the variance is negative, or either is not finite.
-    pub fn new(theta: f64, sigma2: f64) -> Result<Self, ParameterError> {
-        Ok(Self {
-            theta: checked(Kind::Ma1, "theta", theta)?,
-            sigma2: checked(Kind::Ma1, "sigma2", sigma2)?,
-        })
-    }
-
-    /// Coefficient.
-    pub const fn theta(&self) -> f64 {
-        self.theta
-    }
-
-    /// Innovation variance (units²).
-    pub const fn sigma2(&self) -> f64 {
-        self.sigma2
-    }
-
-    /// Haar wavelet variance per unit of sigma2, and its derivative with respect to theta.
-    pub fn haar_shape(theta: f64, level: u32) -> (f64, f64) {
-        let m = half_scale(level);
-        let sum = 1.0 + theta;
+/// Haar wavelet variance per unit of s2, and its derivative with respect to kappa = beta/f, the inverse
+/// correlation time in samples.
+pub(super) fn markov_haar_shape(kappa: f64, level: u32) -> (f64, f64) {
+    let m = half_scale(level);
+    if kappa < LN_2 {
+        let bracket = Slow::new(kappa).bracket(m);
+        let value = 2.0 * kappa * bracket.value;
+        (value, 2.0 * bracket.value + value * bracket.log_derivative)
+    } else {
+        let phi = (-kappa).exp();
+        // phi ≤ ½: nothing cancels in the form of phi. d/dκ = −phi d/dphi, and 1 − phi² is sigma2/s2.
+        let variance = (1.0 - phi) * (1.0 + phi);
+        let (value, derivative) = fast_shape(phi, m);
         (
-            (m * sum * sum - 3.0 * theta) / (2.0 * m * m),
-            (2.0 * m * sum - 3.0) / (2.0 * m * m),
+            value * variance,
+            -phi * (derivative * variance - 2.0 * phi * value),
         )
     }
 }
 
-// First-order Gauss-Markov process: an AR1 described in continuous time.
+// The Allan variance at any averaging time: the Haar wavelet variance lives on octaves, a data sheet asks for one second, whatever
+// the rate. With averages over m samples it is twice the Haar wavelet variance of scale 2m, in closed form for every whole m.
 
-/// Gauss-Markov process: autocovariance s2·exp(−beta·|t|); sampled, an AR1 with phi = exp(−beta/f).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GaussMarkov {
-    beta: f64,
-    s2: f64,
-    rate_hz: f64,
-    ar1: Ar1,
+/// Allan variance of a Gauss-Markov process of variance 1 and correlation time 1/kappa samples.
+pub(super) fn unit_markov(kappa: f64, samples: u32) -> f64 {
+    // The textbook form loses every digit as kappa → 0; this one is a sum of positive terms.
+    if kappa < LN_2 && samples > 1 {
+        return 4.0 * kappa * Slow::new(kappa).bracket(f64::from(samples)).value;
+    }
+    let phi = (-kappa).exp();
+    match samples {
+        // Half the variance of the difference of neighbours, 1 − phi.
+        1 => -(-kappa).exp_m1(),
+        m => 2.0 * (1.0 - phi) * (1.0 + phi) * fast_shape(phi, f64::from(m)).0,
+    }
 }
 
-impl GaussMarkov {
-    /// Largest Allan deviation over standard deviation, reached with averages of [`Self::ALLAN_PEAK_AT`]
-    /// correlation times: with averages of x correlation times the Allan variance is
-    /// s2·(2/x)·[1 − (3 − 4e^(−x) + e^(−2x))/(2x)].
-    pub(crate) const ALLAN_PEAK: f64 = 0.617_364_283_144_441_3;
-    /// Averaging time of the largest Allan deviation (correlation times).
-    pub(crate) const ALLAN_PEAK_AT: f64 = 1.892_617_8;
-
-    /// From the inverse correlation time beta (1/s), the stationary variance s2 (units²) and the rate (Hz).
-    ///
-    /// # Errors
-    /// When beta or the rate is not positive, the variance is negative, or one is not finite.
-    pub fn new(beta: f64, s2: f64, rate_hz: f64) -> Result<Self, ParameterError> {
-        let positive = |parameter, value| checked(Kind::GaussMarkov, parameter, value);
-        let x = positive("beta", beta)? / positive("rate_hz", rate_hz)?;
-        let s2 = checked(Kind::GaussMarkov, "s2", s2)?;
-        // sigma2 = s2 (1 − phi²) by expm1: of a slow process phi² is next to 1 and the difference would lose
-        // its digits.
-        let ar1 = Ar1::new((-x).exp(), s2 * -(-2.0 * x).exp_m1())?;
-        Ok(Self {
-            beta,
-            s2,
-            rate_hz,
-            ar1,
-        })
+/// Allan variance of an AR1.
+pub(super) fn allan_variance(phi: f64, sigma2: f64, samples: u32) -> f64 {
+    let m = f64::from(samples);
+    if samples == 1 {
+        return sigma2 / (1.0 + phi);
     }
-
-    /// Inverse correlation time (1/s).
-    pub const fn beta(&self) -> f64 {
-        self.beta
+    if phi > 0.0 {
+        let variance = sigma2 / ((1.0 - phi) * (1.0 + phi));
+        return variance * unit_markov(-(phi - 1.0).ln_1p(), samples);
     }
+    // Between the octaves m may be odd: phi^m keeps its sign, and the product form of the wavelet variance
+    // does not apply.
+    // 1 − u by the logarithm of −phi = 1 − (1 + phi): as phi → −1 it vanishes for an even m as m (1 + phi) does.
+    let log_power = m * (-(1.0 + phi)).ln_1p();
+    let rest = if samples.is_multiple_of(2) {
+        -log_power.exp_m1()
+    } else {
+        1.0 + log_power.exp()
+    };
+    let bump = rest * (2.0 + rest);
+    sigma2 * (m * (1.0 - phi) * (1.0 + phi) - phi * bump)
+        / (m * m * (1.0 - phi).powi(3) * (1.0 + phi))
+}
 
-    /// Sample rate (Hz).
-    pub const fn rate_hz(&self) -> f64 {
-        self.rate_hz
+/// Variance of the mean of n samples of an AR1 of variance 1:
+/// 1/n² [n (1 + φ)/(1 − φ) − 2 φ (1 − φⁿ)/(1 − φ)²]
+pub(super) fn mean_shape(phi: f64, n: f64) -> f64 {
+    let left = 1.0 - phi;
+    if n * left < 1e-2 {
+        // The difference would lose its digits: e^(−κd) in powers of the distances d, what is left out is below 2e-8.
+        // Over the n² pairs the mean of |i − k| is (n² − 1)/(3n) and that of its square (n² − 1)/6.
+        let (kappa, squares) = (-phi.ln(), n * n - 1.0);
+        return 1.0 - kappa * squares / (3.0 * n) + kappa * kappa * squares / 12.0;
     }
-
-    /// Stationary variance (units²).
-    pub const fn s2(&self) -> f64 {
-        self.s2
-    }
-
-    /// The same process sampled: an AR1 with phi = e^(−beta/f) and sigma2 = s2 (1 − phi²).
-    pub const fn ar1(&self) -> Ar1 {
-        self.ar1
-    }
-
-    /// Haar wavelet variance per unit of s2, and its derivative with respect to kappa = beta/f, the inverse
-    /// correlation time in samples.
-    pub fn haar_shape(kappa: f64, level: u32) -> (f64, f64) {
-        let m = half_scale(level);
-        if kappa < LN_2 {
-            let bracket = Slow::new(kappa).bracket(m);
-            let value = 2.0 * kappa * bracket.value;
-            (value, 2.0 * bracket.value + value * bracket.log_derivative)
-        } else {
-            let phi = (-kappa).exp();
-            // phi ≤ ½: nothing cancels in the form of phi. d/dκ = −phi d/dphi, and 1 − phi² is sigma2/s2.
-            let variance = (1.0 - phi) * (1.0 + phi);
-            let (value, derivative) = fast_shape(phi, m);
-            (
-                value * variance,
-                -phi * (derivative * variance - 2.0 * phi * value),
-            )
-        }
-    }
+    (n * (1.0 + phi) / left - 2.0 * phi * (1.0 - phi.powf(n)) / (left * left)) / (n * n)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::GaussMarkov;
+    use crate::noise::Process;
     use approx::assert_relative_eq;
 
     /// The definition: the variance of a filtered process is a double sum over its autocovariance.
@@ -378,7 +300,7 @@ mod tests {
     fn haar_shape_is_the_variance_of_the_filtered_process() {
         for phi in PHIS {
             for level in 1..=6 {
-                let (value, _) = Ar1::haar_shape(phi, level);
+                let (value, _) = haar_shape(phi, level);
                 assert_relative_eq!(value, by_definition(phi, level), max_relative = 1e-11);
             }
         }
@@ -389,9 +311,8 @@ mod tests {
         for phi in PHIS {
             for level in 1..=20 {
                 let h = 1e-6;
-                let difference =
-                    Ar1::haar_shape(phi + h, level).0 - Ar1::haar_shape(phi - h, level).0;
-                let (value, derivative) = Ar1::haar_shape(phi, level);
+                let difference = haar_shape(phi + h, level).0 - haar_shape(phi - h, level).0;
+                let (value, derivative) = haar_shape(phi, level);
                 let scale = derivative.abs() + value;
                 assert_relative_eq!(
                     derivative / scale,
@@ -408,7 +329,7 @@ mod tests {
     fn an_alternating_process_keeps_its_digits_at_long_scales() {
         for level in [2, 10, 16] {
             let m = half_scale(level);
-            let (value, derivative) = Ar1::haar_shape(-1.0 + f64::EPSILON, level);
+            let (value, derivative) = haar_shape(-1.0 + f64::EPSILON, level);
             assert_relative_eq!(value, 0.25 / m, max_relative = 1e-8);
             assert_relative_eq!(derivative, 0.25 / m, max_relative = 1e-6);
         }
@@ -417,25 +338,147 @@ mod tests {
     #[test]
     fn a_gauss_markov_process_is_its_ar1() {
         for kappa in [1e-14_f64, 1e-6, 0.01, 0.69, 0.7, 3.0] {
-            let ar1 = Ar1::new((-kappa).exp(), -(-2.0 * kappa).exp_m1()).unwrap();
+            let ar1 = Process::ar1((-kappa).exp(), -(-2.0 * kappa).exp_m1()).unwrap();
             for level in [1, 5, 20] {
-                let (value, derivative) = GaussMarkov::haar_shape(kappa, level);
+                let (value, derivative) = markov_haar_shape(kappa, level);
                 // The rounding of phi, 1e-16, is 1e-16/kappa of 1 − phi.
                 let tolerance = 1e-14 + 2e-16 / kappa;
-                assert_relative_eq!(
-                    value,
-                    crate::noise::Process::Ar1(ar1).haar_wv(level),
-                    max_relative = tolerance
-                );
+                assert_relative_eq!(value, ar1.haar_wv(level), max_relative = tolerance);
                 let h = 1e-5 * kappa;
                 let (high, low) = (
-                    GaussMarkov::haar_shape(kappa + h, level),
-                    GaussMarkov::haar_shape(kappa - h, level),
+                    markov_haar_shape(kappa + h, level),
+                    markov_haar_shape(kappa - h, level),
                 );
                 let scale = value / kappa;
                 let difference = (high.0 - low.0) / (2.0 * h);
                 assert_relative_eq!(derivative / scale, difference / scale, epsilon = 1e-8);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod allan_tests {
+    use crate::noise::Process;
+
+    fn processes() -> Vec<Process> {
+        let ar1 = |phi| Process::ar1(phi, 1e-8).unwrap();
+        vec![
+            Process::white(5e-5).unwrap(),
+            Process::quantization(1e-7).unwrap(),
+            Process::random_walk(3e-11).unwrap(),
+            Process::drift(-2e-9).unwrap(),
+            Process::gauss_markov(0.02, 1e-6, 100.0).unwrap(),
+            Process::gauss_markov(120.0, 1e-6, 100.0).unwrap(),
+            Process::ma1(-0.4, 2e-6).unwrap(),
+            ar1(0.9999),
+            ar1(0.7),
+            ar1(0.3),
+            ar1(0.0),
+            ar1(-0.6),
+            ar1(-1.0 + 1e-12),
+        ]
+    }
+
+    #[test]
+    fn on_octaves_it_is_twice_the_wavelet_variance() {
+        for process in processes() {
+            for level in 1..20 {
+                let (a, b) = (
+                    process.allan_variance(1 << (level - 1)),
+                    2.0 * process.haar_wv(level),
+                );
+                assert!(
+                    (a / b - 1.0).abs() < 1e-12,
+                    "{process:?} level {level}: {a:e} {b:e}"
+                );
+            }
+        }
+    }
+
+    /// Between octaves against the definition: half the variance of the difference of two adjacent means of m samples,
+    /// summed from the autocovariance, Σ over the 2m × 2m pairs of samples with signs.
+    #[test]
+    fn between_octaves_it_is_the_variance_of_the_definition() {
+        for phi in [0.95_f64, 0.3, -0.6] {
+            let ar1 = Process::ar1(phi, 2.0).unwrap();
+            for m in [3_i32, 7, 13] {
+                let mut sum = 0.0;
+                for i in 0..2 * m {
+                    for j in 0..2 * m {
+                        let sign = if (i < m) == (j < m) { 1.0 } else { -1.0 };
+                        sum += sign * ar1.initial_variance() * phi.powi((i - j).abs());
+                    }
+                }
+                let definition = 0.5 * sum / f64::from(m * m);
+                let value = ar1.allan_variance(m as u32);
+                assert!(
+                    (value / definition - 1.0).abs() < 1e-11,
+                    "{phi} {m}: {value:e} {definition:e}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn white_noise_and_random_walk_are_those_of_the_standard() {
+        // N²/τ and K²τ/3, at 1 s of 100 Hz, the second to (dt/τ)²/2
+        let white = Process::white(1e-4).unwrap();
+        assert!((white.allan_variance(100) / 1e-6 - 1.0).abs() < 1e-14);
+        let walk = Process::random_walk(1e-8).unwrap();
+        assert!((walk.allan_variance(1000) / (1e-8 * 100.0 * 10.0 / 3.0) - 1.0).abs() < 1e-6);
+    }
+}
+
+#[cfg(test)]
+mod mean_tests {
+    use crate::noise::Process;
+    use approx::assert_relative_eq;
+
+    /// By definition: the double sum of the autocovariances of X_1 … X_n.
+    fn by_definition(n: usize, covariance: impl Fn(usize, usize) -> f64) -> f64 {
+        let sum: f64 = (1..=n)
+            .map(|i| (1..=n).map(|k| covariance(i, k)).sum::<f64>())
+            .sum();
+        sum / (n * n) as f64
+    }
+
+    fn closed_form(process: Process, n: usize) -> f64 {
+        process.mean_variance(n as f64)
+    }
+
+    #[test]
+    fn the_mean_of_n_samples_has_the_sum_of_their_covariances() {
+        let n = 50;
+        let of_distance = |at: &dyn Fn(usize) -> f64| by_definition(n, |i, k| at(i.abs_diff(k)));
+        let white = closed_form(Process::white(2.0).unwrap(), n);
+        assert_relative_eq!(
+            white,
+            of_distance(&|d| if d == 0 { 2.0 } else { 0.0 }),
+            max_relative = 1e-12
+        );
+        let steps = closed_form(Process::quantization(2.0).unwrap(), n);
+        let exact = of_distance(&|d| [4.0, -2.0].get(d).copied().unwrap_or(0.0));
+        assert_relative_eq!(steps, exact, max_relative = 1e-10);
+        let average = closed_form(Process::ma1(0.5, 2.0).unwrap(), n);
+        let exact = of_distance(&|d| [2.5, 1.0].get(d).copied().unwrap_or(0.0));
+        assert_relative_eq!(average, exact, max_relative = 1e-12);
+        let walk = closed_form(Process::random_walk(2.0).unwrap(), n);
+        assert_relative_eq!(
+            walk,
+            by_definition(n, |i, k| 2.0 * i.min(k) as f64),
+            max_relative = 1e-12
+        );
+        // On both sides of the series at 50 (1 − φ) = 0.01.
+        for phi in [-0.5_f64, 0.0, 0.3, 0.9, 0.999, 0.9998, 0.99999] {
+            let p = Process::ar1(phi, 2.0).unwrap();
+            let exact = of_distance(&|d| p.initial_variance() * phi.powi(d as i32));
+            assert_relative_eq!(closed_form(p, n), exact, max_relative = 1e-7);
+        }
+        let markov = Process::gauss_markov(0.5, 3.0, 10.0).unwrap();
+        let [phi, innovation, _] = markov.recursion().unwrap();
+        let same = closed_form(Process::ar1(phi, innovation).unwrap(), n);
+        // 1 − phi of the AR1 has lost two bits
+        assert_relative_eq!(closed_form(markov, n), same, max_relative = 1e-14);
     }
 }

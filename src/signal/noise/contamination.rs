@@ -4,7 +4,7 @@
 //! and V. Whatever the order in which rules are given, they are applied in this one: scaled parameters
 //! (before synthesis), added AR1, heavy tails, step, drift, replacement, bursts.
 
-use super::{Ar1, Composite, Process, Synthesizer};
+use super::{Composite, Process, Synthesizer};
 use crate::imu::{Channel, Sensor};
 use crate::rng::StreamKey;
 use crate::units::Refused;
@@ -45,7 +45,7 @@ pub enum Operation {
         factor: f64,
     },
     /// Adds an AR1.
-    Ar1(Ar1),
+    Ar1(Process),
     /// Adds white noise of heavy tails: Student's t.
     HeavyTails {
         /// Degrees of freedom, above 2: the variance is sigma²·freedom/(freedom − 2).
@@ -159,7 +159,6 @@ impl Contamination {
         noise: &mut Composite,
         channel: Channel,
         replicate: u64,
-        rate_hz: f64,
     ) -> Result<(), RefusedRule> {
         for rule in self.rules_for(channel, replicate) {
             if let Operation::Scale {
@@ -168,7 +167,7 @@ impl Contamination {
                 factor,
             } = &rule.operation
             {
-                scale(noise, channel, (process, parameter), *factor, rate_hz)
+                scale(noise, channel, (process, parameter), *factor)
                     .map_err(|e| rule.refused(e))?;
             }
         }
@@ -325,7 +324,6 @@ fn scale(
     channel: Channel,
     (label, parameter): (&str, &str),
     factor: f64,
-    rate_hz: f64,
 ) -> Result<(), Refused> {
     let named = format!("{label} {parameter}");
     let found = noise
@@ -338,14 +336,14 @@ fn scale(
             "{channel} has no {named} to scale, only {known}"
         )));
     };
-    let scaled = noise.set(of, factor * value, rate_hz);
+    let scaled = noise.set(of, factor * value);
     scaled.map_err(|e| Refused(format!("scaled: {e}")))
 }
 
-fn add_ar1(x: &mut [f64], ar1: Ar1, key: StreamKey<'_>) {
+fn add_ar1(x: &mut [f64], ar1: Process, key: StreamKey<'_>) {
     // In blocks, so that a long record needs no second one for the noise; the numbers do not depend on the
     // block.
-    let mut source = Synthesizer::new(&Composite::new(vec![Process::Ar1(ar1)]), key);
+    let mut source = Synthesizer::new(&Composite::new(vec![ar1]), key);
     let mut block = [0.0; 1024];
     for part in x.chunks_mut(block.len()) {
         let noise = &mut block[..part.len()];

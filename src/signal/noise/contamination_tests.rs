@@ -1,6 +1,6 @@
 use super::*;
 use crate::imu::Axis;
-use crate::noise::{RandomWalk, White};
+use crate::noise::Process;
 
 const X: Channel = Channel {
     sensor: Sensor::Accel,
@@ -124,7 +124,7 @@ fn bursts_are_sines_at_multiples_of_the_spacing() {
 
 #[test]
 fn the_added_ar1_has_its_variance() {
-    let ar1 = Ar1::new(0.9, 1.9).unwrap();
+    let ar1 = Process::ar1(0.9, 1.9).unwrap();
     let x = applied(Operation::Ar1(ar1), 100_000);
     let variance = x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64;
     // Bartlett: var of the sample variance 2γ₀²/n · (1 + φ²)/(1 − φ²).
@@ -172,8 +172,10 @@ fn the_order_is_fixed_and_other_signals_are_untouched() {
 #[test]
 fn parameters_are_scaled_for_their_replicate_only() {
     let noise = || {
-        let (white, walk) = (White::new(1.0).unwrap(), RandomWalk::new(3.0).unwrap());
-        Composite::new(vec![Process::White(white), Process::RandomWalk(walk)])
+        Composite::new(vec![
+            Process::white(1.0).unwrap(),
+            Process::random_walk(3.0).unwrap(),
+        ])
     };
     let scale = |process: &str| {
         let (process, parameter) = (process.to_owned(), "gamma2".to_owned());
@@ -184,11 +186,11 @@ fn parameters_are_scaled_for_their_replicate_only() {
         })
     };
     let (mut second, mut third) = (noise(), noise());
-    scale("RW").scale(&mut second, X, 2, 100.0).unwrap();
-    scale("RW").scale(&mut third, X, 3, 100.0).unwrap();
+    scale("RW").scale(&mut second, X, 2).unwrap();
+    scale("RW").scale(&mut third, X, 3).unwrap();
     assert_eq!(second.processes[1].parameters(), [("gamma2", 12.0)]);
     assert_eq!(third, noise());
-    let e = scale("RW_2").scale(&mut second, X, 2, 100.0).unwrap_err();
+    let e = scale("RW_2").scale(&mut second, X, 2).unwrap_err();
     assert_eq!(
         e.to_string(),
         "accel.x has no RW_2 gamma2 to scale, only WN sigma2, RW gamma2"

@@ -4,7 +4,7 @@
 //! a Gauss-Markov process its correlation time and variance. Quantization noise belongs to the
 //! quantiser's own rate and cannot be converted.
 
-use super::{Ar1, Composite, Drift, GaussMarkov, Model, Process, RandomWalk, White};
+use super::{Composite, Model, Process};
 use crate::units::Refused;
 
 /// White noise density N = sigma √dt (units/√Hz).
@@ -36,11 +36,7 @@ pub fn correlation_time_s(phi: f64, rate_hz: f64) -> f64 {
 impl Process {
     /// Correlation time (s) of an AR1 with phi > 0 or a GM; none of the others.
     pub fn correlation_time_s(&self, rate_hz: f64) -> Option<f64> {
-        match self {
-            Self::Ar1(p) if p.phi() > 0.0 => Some(correlation_time_s(p.phi(), rate_hz)),
-            Self::GaussMarkov(p) => Some(1.0 / p.beta()),
-            _ => None,
-        }
+        self.kappa().map(|kappa| 1.0 / (rate_hz * kappa))
     }
 }
 
@@ -57,7 +53,7 @@ pub fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, Refused> {
         let converted: Result<Vec<_>, _> = axis
             .processes
             .iter()
-            .map(|p| process_at_rate(p, model.rate_hz, rate_hz))
+            .map(|p| p.at_rate(model.rate_hz, rate_hz))
             .collect();
         *axis = Composite::new(converted?);
     }
@@ -69,50 +65,17 @@ pub fn same_rate(a_hz: f64, b_hz: f64) -> bool {
     (a_hz / b_hz - 1.0).abs() < 1e-6
 }
 
-fn process_at_rate(process: &Process, from_hz: f64, to_hz: f64) -> Result<Process, Refused> {
-    let ratio = to_hz / from_hz;
-    let tied = |why| {
-        Refused(format!(
-            "{} at {from_hz} Hz cannot be converted to {to_hz} Hz: {why}",
-            process.code()
-        ))
-    };
-    Ok(match process {
-        // What is kept: N² = sigma2/f, K² = gamma2·f, and the slope per second.
-        Process::White(p) => Process::White(White::new(p.sigma2() * ratio)?),
-        // B² is that of every rate.
-        Process::Flicker(p) => Process::Flicker(*p),
-        Process::RandomWalk(p) => Process::RandomWalk(RandomWalk::new(p.gamma2() / ratio)?),
-        Process::Drift(p) => Process::Drift(Drift::new(p.slope() / ratio)?),
-        Process::GaussMarkov(p) => Process::GaussMarkov(GaussMarkov::new(p.beta(), p.s2(), to_hz)?),
-        Process::Ar1(p) if p.phi() > 0.0 => {
-            // T and the stationary variance are kept: kappa = dt/T goes with dt, and sigma2 = variance·(1 −
-            // phi²).
-            let kappa = -(p.phi() - 1.0).ln_1p() / ratio;
-            Process::Ar1(Ar1::new(
-                (-kappa).exp(),
-                p.variance() * -(-2.0 * kappa).exp_m1(),
-            )?)
-        }
-        Process::Ar1(_) => return Err(tied("phi ≤ 0 has no continuous counterpart")),
-        Process::Ma1(_) => return Err(tied("it has no continuous counterpart")),
-        Process::Quantization(_) => {
-            return Err(tied("quantization belongs to the quantiser's own rate"));
-        }
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn n2_without_qn() -> Model {
         let axis = Composite::new(vec![
-            Process::White(White::new(5.2e-5).unwrap()),
-            Process::Ar1(Ar1::new(0.9835, 1.3e-8).unwrap()),
-            Process::GaussMarkov(GaussMarkov::new(1e-3, 4e-8, 100.0).unwrap()),
-            Process::RandomWalk(RandomWalk::new(2.9e-11).unwrap()),
-            Process::Drift(Drift::new(-1e-9).unwrap()),
+            Process::white(5.2e-5).unwrap(),
+            Process::ar1(0.9835, 1.3e-8).unwrap(),
+            Process::gauss_markov(1e-3, 4e-8, 100.0).unwrap(),
+            Process::random_walk(2.9e-11).unwrap(),
+            Process::drift(-1e-9).unwrap(),
         ]);
         Model::pooled(100.0, &axis, &axis)
     }
@@ -160,7 +123,7 @@ mod tests {
 
     #[test]
     fn quantization_noise_is_tied_to_its_rate() {
-        let qn = Process::Quantization(crate::noise::Quantization::new(1e-7).unwrap());
+        let qn = Process::quantization(1e-7).unwrap();
         let model = Model::pooled(100.0, &Composite::new(vec![qn]), &Composite::default());
         let error = at_rate(&model, 50.0).unwrap_err();
         assert!(

@@ -16,15 +16,10 @@
 //! AR1 whose correlation times are a factor e^h apart, each of stationary variance B²h/π or less; its spectrum is off by at most
 //! 2 sech(π²/h) between the ends (the transform of sech): 5e-4 for a factor of 3, 3.5 % for a factor of 8.
 
-use super::{Ar1, GaussMarkov, Kind, ParameterError, Process, White, checked};
+use super::ar1::{ALLAN_PEAK, ALLAN_PEAK_AT};
+use super::{ParameterError, Process};
 use std::f64::consts::{LN_2, PI};
 use std::sync::OnceLock;
-
-/// Flicker noise.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FlickerNoise {
-    b2: f64,
-}
 
 /// The AR1 that stand for flicker noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,94 +47,74 @@ impl Ladder {
     };
 }
 
-impl FlickerNoise {
-    /// Averages up to which the Allan variance is summed; beyond, its distance from the limit falls with their square
-    /// (but for a logarithm, 2e-8 of the limit).
-    const SUMMED: u32 = 2048;
-    /// Its limit per B².
-    const FLOOR: f64 = 2.0 * LN_2 / PI;
+/// Averages up to which the Allan variance is summed; beyond, its distance from the limit falls with their square
+/// (but for a logarithm, 2e-8 of the limit).
+const SUMMED: u32 = 2048;
+/// Its limit per B².
+const FLOOR: f64 = 2.0 * LN_2 / PI;
 
-    /// B² (units²).
-    ///
-    /// # Errors
-    /// When it is negative or not finite.
-    pub fn new(b2: f64) -> Result<Self, ParameterError> {
-        Ok(Self {
-            b2: checked(Kind::Flicker, "b2", b2)?,
-        })
+/// Haar wavelet variance per unit of B².
+pub(super) fn haar_shape(level: u32) -> f64 {
+    static SHAPES: OnceLock<[f64; 40]> = OnceLock::new();
+    let shapes = SHAPES.get_or_init(|| std::array::from_fn(|j| 0.5 * allan_shape(1 << j.min(31))));
+    shapes[(level as usize).clamp(1, shapes.len()) - 1]
+}
+
+/// Allan variance of averages over m samples per unit of B².
+pub(super) fn allan_shape(samples: u32) -> f64 {
+    if samples > SUMMED {
+        let nearest = summed(SUMMED) - FLOOR;
+        return FLOOR + nearest * (f64::from(SUMMED) / f64::from(samples)).powi(2);
     }
+    summed(samples.max(1))
+}
 
-    /// B² (units²).
-    pub const fn b2(&self) -> f64 {
-        self.b2
+/// Half of E (mean of m − mean of the m before)²: the mean squared difference across the two less that within them.
+fn summed(samples: u32) -> f64 {
+    let m = f64::from(samples);
+    let (mut odd, mut sum) = (0.0, 0.0);
+    for k in 1..2 * samples {
+        let k = f64::from(k);
+        odd += 1.0 / (2.0 * k - 1.0);
+        let across = m - (k - m).abs();
+        let within = 2.0 * (m - k).max(0.0);
+        sum += (across - within) * odd;
     }
+    2.0 / PI * sum / (m * m)
+}
 
-    /// Haar wavelet variance per unit of B².
-    pub fn haar_shape(level: u32) -> f64 {
-        static SHAPES: OnceLock<[f64; 40]> = OnceLock::new();
-        let shapes = SHAPES
-            .get_or_init(|| std::array::from_fn(|j| 0.5 * Self::allan_shape(1.0, 1 << j.min(31))));
-        shapes[(level as usize).clamp(1, shapes.len()) - 1]
-    }
+/// Variance at the beginning of what is slower than the fastest AR1 of a filter: of all that is synthesised, however slow.
+pub(super) fn initial_variance(b2: f64) -> f64 {
+    let fastest = (-1.0 / Ladder::FILTER.shortest).exp() * (1.0 - 1e-9);
+    let parts = Ladder::FINE.parts(b2).into_iter();
+    let slow = parts.filter_map(|part| part.recursion().filter(|[phi, ..]| *phi >= fastest));
+    slow.map(|[.., variance]| variance).sum()
+}
 
-    /// Allan variance of averages over m samples, of a B².
-    pub(super) fn allan_shape(b2: f64, samples: u32) -> f64 {
-        if samples > Self::SUMMED {
-            let nearest = Self::summed(Self::SUMMED) - Self::FLOOR;
-            return b2
-                * (Self::FLOOR + nearest * (f64::from(Self::SUMMED) / f64::from(samples)).powi(2));
-        }
-        b2 * Self::summed(samples.max(1))
-    }
-
-    /// Half of E (mean of m − mean of the m before)²: the mean squared difference across the two less that within them.
-    fn summed(samples: u32) -> f64 {
-        let m = f64::from(samples);
-        let (mut odd, mut sum) = (0.0, 0.0);
-        for k in 1..2 * samples {
-            let k = f64::from(k);
-            odd += 1.0 / (2.0 * k - 1.0);
-            let across = m - (k - m).abs();
-            let within = 2.0 * (m - k).max(0.0);
-            sum += (across - within) * odd;
-        }
-        2.0 / PI * sum / (m * m)
-    }
-
+impl Ladder {
     /// White noise and the AR1 whose sum stands for it, the fastest first.
-    pub fn parts(&self, ladder: Ladder) -> Vec<Process> {
+    pub(super) fn parts(self, b2: f64) -> Vec<Process> {
         let Ladder {
             ratio,
             shortest,
             longest,
-        } = ladder;
+        } = self;
         let step = ratio.ln();
         // A correlation time of T samples is 1/(2 asinh u).
         let of_time = |samples: f64| (0.5 / samples).sinh();
         let (first, last) = (of_time(shortest), of_time(longest));
         let count = ((first / last).ln() / step + 1e-9).floor() as i32 + 1;
         // Faster ones have the spectrum 1/u where they are felt: a geometric sum.
-        let white = self.b2 * step / PI / first / (ratio - 1.0);
+        let white = b2 * step / PI / first / (ratio - 1.0);
         let ar1 = |k: i32| {
             let u = first * ratio.powi(-k);
             let phi = (-2.0 * u.asinh()).exp();
-            Ar1::new(phi, self.b2 * step / PI * 4.0 * phi * u).map(Process::Ar1)
+            Process::ar1(phi, b2 * step / PI * 4.0 * phi * u)
         };
-        let white = White::new(white).map(Process::White);
-        std::iter::once(white)
+        std::iter::once(Process::white(white))
             .chain((0..count).map(ar1))
             .filter_map(Result::ok)
             .collect()
-    }
-
-    /// Variance at the beginning of what is slower than the fastest AR1 of a filter: of all that is synthesised, however slow.
-    pub fn initial_variance(&self) -> f64 {
-        let fastest = (-1.0 / Ladder::FILTER.shortest).exp() * (1.0 - 1e-9);
-        let slow = |part: Process| match part {
-            Process::Ar1(p) if p.phi() >= fastest => p.variance(),
-            _ => 0.0,
-        };
-        self.parts(Ladder::FINE).into_iter().map(slow).sum()
     }
 }
 
@@ -160,11 +135,7 @@ const APART: f64 = 16.0;
 /// The shortest correlation time, unless the longest is shorter (s): what is faster is hidden by white noise.
 const SHORTEST_S: f64 = 1.0;
 /// Lowest Allan variance between the peaks of one, two, three processes of variance 1; more change it by less than 1e-3.
-const LOWEST: [f64; 3] = [
-    GaussMarkov::ALLAN_PEAK * GaussMarkov::ALLAN_PEAK,
-    0.436_065_855_9,
-    0.448_028_281_7,
-];
+const LOWEST: [f64; 3] = [ALLAN_PEAK * ALLAN_PEAK, 0.436_065_855_9, 0.448_028_281_7];
 
 /// A bias whose Allan deviation has a floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -180,21 +151,18 @@ impl Flicker {
     /// longest correlation time.
     pub fn range_s(&self) -> (f64, f64) {
         let shortest_s = self.t_corr_s * APART.powi(1 - self.count());
-        (
-            GaussMarkov::ALLAN_PEAK_AT * shortest_s,
-            GaussMarkov::ALLAN_PEAK_AT * self.t_corr_s,
-        )
+        (ALLAN_PEAK_AT * shortest_s, ALLAN_PEAK_AT * self.t_corr_s)
     }
 
     /// The Gauss-Markov processes whose sum has this floor, the slowest first.
     ///
     /// # Errors
     /// When a number is not positive.
-    pub fn processes(&self, rate_hz: f64) -> Result<Vec<GaussMarkov>, ParameterError> {
+    pub fn processes(&self, rate_hz: f64) -> Result<Vec<Process>, ParameterError> {
         // One variance for all, such that the lowest Allan variance between the peaks is the square of the
         // floor.
         let s2 = self.floor * self.floor / LOWEST[(self.count() as usize).min(LOWEST.len()) - 1];
-        let process = |k: i32| GaussMarkov::new(APART.powi(k) / self.t_corr_s, s2, rate_hz);
+        let process = |k: i32| Process::gauss_markov(APART.powi(k) / self.t_corr_s, s2, rate_hz);
         (0..self.count()).map(process).collect()
     }
 
@@ -214,8 +182,8 @@ mod tests {
     /// ([Percival]) by the midpoint rule.
     #[test]
     fn the_wavelet_variance_is_the_integral_of_the_spectrum() {
-        assert!((FlickerNoise::haar_shape(1) - 1.0 / PI).abs() < 1e-15);
-        assert!((FlickerNoise::haar_shape(30) - LN_2 / PI).abs() < 1e-9);
+        assert!((haar_shape(1) - 1.0 / PI).abs() < 1e-15);
+        assert!((haar_shape(30) - LN_2 / PI).abs() < 1e-9);
         for level in [2, 5, 9] {
             let m = f64::from(1_u32 << (level - 1));
             let n = 1 << 20;
@@ -228,15 +196,12 @@ mod tests {
                 .sum();
             let integral = sum / f64::from(n);
             assert!(
-                (FlickerNoise::haar_shape(level) / integral - 1.0).abs() < 1e-6,
+                (haar_shape(level) / integral - 1.0).abs() < 1e-6,
                 "{level}: {integral}"
             );
         }
         // where the sum ends and the limit begins
-        let (summed, beyond) = (
-            FlickerNoise::summed(4096),
-            FlickerNoise::allan_shape(1.0, 4096),
-        );
+        let (summed, beyond) = (summed(4096), allan_shape(4096));
         assert!((summed / beyond - 1.0).abs() < 2e-8, "{summed} {beyond}");
     }
 
@@ -244,14 +209,14 @@ mod tests {
     /// samples, of filters from 2^9 to 2^17.
     #[test]
     fn the_sums_are_off_by_what_is_said() {
-        let noise = FlickerNoise::new(4.0).unwrap();
+        let noise = Process::flicker(4.0).unwrap();
         for (ladder, levels, error) in [
             (Ladder::FINE, 1..=24, 6e-4),
             (Ladder::FILTER, 9..=17, 0.035),
         ] {
             let sum = Composite::new(noise.parts(ladder));
             for level in levels {
-                let ratio = sum.haar_wv(level) / (4.0 * FlickerNoise::haar_shape(level));
+                let ratio = sum.haar_wv(level) / (4.0 * haar_shape(level));
                 assert!((ratio - 1.0).abs() < error, "{ladder:?}, {level}: {ratio}");
             }
         }
@@ -261,7 +226,7 @@ mod tests {
     /// 100 records of 2^12 samples: the mean wavelet variance is within four of its standard errors.
     #[test]
     fn what_is_synthesised_has_its_wavelet_variance() {
-        let axis = Composite::new(vec![Process::Flicker(FlickerNoise::new(1.0).unwrap())]);
+        let axis = Composite::new(vec![Process::flicker(1.0).unwrap()]);
         let model = Model::pooled(100.0, &axis, &axis);
         let measured = |run| {
             let key = StreamKey {
@@ -279,7 +244,7 @@ mod tests {
         for j in 0..9 {
             let mean = all.iter().map(|nu| nu[j]).sum::<f64>() / 100.0;
             let variance = all.iter().map(|nu| (nu[j] - mean).powi(2)).sum::<f64>() / 99.0;
-            let expected = FlickerNoise::haar_shape(j as u32 + 1);
+            let expected = haar_shape(j as u32 + 1);
             assert!(
                 (mean - expected).abs() < 4.0 * (variance / 100.0).sqrt(),
                 "{j}: {mean} {expected}"
@@ -291,7 +256,7 @@ mod tests {
 #[cfg(test)]
 mod flicker_tests {
     use super::*;
-    use crate::noise::{Composite, Process};
+    use crate::noise::Composite;
 
     /// Over averages every 1/64 octave between the peaks; sampled at 100 Hz the shortest (1.2 s) is the continuous one to
     /// (dt/T)²/12 = 6e-6.
@@ -307,14 +272,7 @@ mod flicker_tests {
                 floor: 3e-5,
                 t_corr_s,
             };
-            let noise = Composite::new(
-                flicker
-                    .processes(100.0)
-                    .unwrap()
-                    .into_iter()
-                    .map(Process::GaussMarkov)
-                    .collect(),
-            );
+            let noise = Composite::new(flicker.processes(100.0).unwrap());
             assert_eq!(noise.processes.len(), count);
             let (from_s, to_s) = flicker.range_s();
             let steps = ((to_s / from_s).log2() * 64.0).ceil().max(1.0);

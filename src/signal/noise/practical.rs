@@ -13,9 +13,9 @@
 //! pair stands for them over a [`Horizon`] of averaging times, and [`Pair::closure`] by how much it is off.
 //!
 //! ```
-//! use nav_sim_signal::noise::{practical::*, Ar1, Composite, Process};
+//! use nav_sim_signal::noise::{practical::*, Composite, Process};
 //! // no WN at all: an AR1 of a few milliseconds is the white noise
-//! let axis = Composite::new(vec![Process::Ar1(Ar1::new(0.5, 1e-4)?)]);
+//! let axis = Composite::new(vec![Process::ar1(0.5, 1e-4)?]);
 //! let curve = Curve::largest(&[&axis], 100.0, Horizon::default())?;
 //! assert_eq!(curve.pair(Policy::Strict, Bias::Walk).density, 0.0);
 //! let matched = curve.pair(Policy::Matched, Bias::Walk);
@@ -253,7 +253,7 @@ impl Curve {
 
     /// Whether all axes are the same white noise and random walk, so that the largest is one of them.
     fn is_white_and_walk(&self) -> bool {
-        let pair = |p: &Process| matches!(p, Process::White(_) | Process::RandomWalk(_));
+        let pair = |p: &Process| matches!(p.kind(), Kind::White | Kind::RandomWalk);
         self.axes
             .iter()
             .all(|a| *a == self.axes[0] && a.processes.iter().all(pair))
@@ -308,7 +308,7 @@ fn point(axes: &[&Composite], samples: u32) -> Point {
         };
         axes.iter().map(of_axis).fold(0.0, f64::max)
     };
-    let carried = |p: &Process| !matches!(p, Process::Quantization(_) | Process::Drift(_));
+    let carried = |p: &Process| !matches!(p.kind(), Kind::Quantization | Kind::Drift);
     Point {
         samples,
         whole: largest(&|_| true),
@@ -332,11 +332,7 @@ fn averages(from: f64, to: f64) -> Vec<u32> {
 
 /// Standard deviation and correlation time of an AR1 or GM that has them.
 fn markov_of(process: &Process, rate_hz: f64) -> Option<Markov> {
-    let variance = match process {
-        Process::Ar1(p) => p.variance(),
-        Process::GaussMarkov(p) => p.s2(),
-        _ => return None,
-    };
+    let [.., variance] = process.recursion()?;
     let t_corr_s = process
         .correlation_time_s(rate_hz)
         .filter(|_| variance > 0.0)?;
@@ -364,7 +360,7 @@ fn bias(t_corr_s: Option<f64>, samples: u32, rate_hz: f64) -> f64 {
         return (2.0 * m * m + 1.0) / (6.0 * m * rate_hz);
     };
     let kappa = 1.0 / (t_corr_s * rate_hz);
-    super::allan::unit_markov(kappa, samples)
+    super::ar1::unit_markov(kappa, samples)
 }
 
 /// The pair of a policy.

@@ -1,19 +1,19 @@
 use super::*;
-use crate::noise::{Ar1, Drift, GaussMarkov, Quantization, RandomWalk, White};
+use crate::noise::Process;
 use crate::units::DEG;
 
 const RATE: f64 = 100.0;
 
 fn wn(density: f64) -> Process {
-    Process::White(White::new(density * density * RATE).unwrap())
+    Process::white(density * density * RATE).unwrap()
 }
 
 fn rw(density: f64) -> Process {
-    Process::RandomWalk(RandomWalk::new(density * density / RATE).unwrap())
+    Process::random_walk(density * density / RATE).unwrap()
 }
 
 fn gm(sigma: f64, t_corr_s: f64) -> Process {
-    Process::GaussMarkov(GaussMarkov::new(1.0 / t_corr_s, sigma * sigma, RATE).unwrap())
+    Process::gauss_markov(1.0 / t_corr_s, sigma * sigma, RATE).unwrap()
 }
 
 fn curve(processes: Vec<Process>) -> Curve {
@@ -22,12 +22,12 @@ fn curve(processes: Vec<Process>) -> Curve {
 
 /// No WN, a fast AR1 and slow biases: what calibrations of real recordings look like.
 fn without_wn() -> Vec<Process> {
-    let fast = Process::Ar1(Ar1::new(0.6, 4e-5).unwrap());
+    let fast = Process::ar1(0.6, 4e-5).unwrap();
     vec![
         fast,
         gm(3e-4, 20.0),
         rw(5e-6),
-        Process::Quantization(Quantization::new(1e-8).unwrap()),
+        Process::quantization(1e-8).unwrap(),
     ]
 }
 
@@ -48,7 +48,7 @@ fn a_pair_comes_back_from_every_policy() {
 #[test]
 fn the_search_finds_a_pair_by_another_name() {
     let (n, k, t): (f64, f64, f64) = (2e-3, 4e-4, 1e6);
-    let white = Process::Ar1(Ar1::new(0.0, n * n * RATE).unwrap());
+    let white = Process::ar1(0.0, n * n * RATE).unwrap();
     let slow = gm(k * (0.5 * t).sqrt(), t);
     for policy in [Policy::Matched, Policy::Envelope] {
         let pair = curve(vec![white, slow]).pair(policy, Bias::Walk);
@@ -78,7 +78,7 @@ fn a_gauss_markov_bias_comes_back() {
 /// Allan deviation at 1 s is the model's. 1 − (3/2)(T/τ) of it, T = 20 ms: 3 % below at 1 s.
 #[test]
 fn a_fast_ar1_is_the_white_noise() {
-    let axis = vec![Process::Ar1(Ar1::new(0.6, 4e-5).unwrap())];
+    let axis = vec![Process::ar1(0.6, 4e-5).unwrap()];
     let pair = curve(axis).pair(Policy::Matched, Bias::Walk);
     let n = (4e-5_f64 / RATE).sqrt() / (1.0 - 0.6);
     assert!(
@@ -136,7 +136,7 @@ fn matched_is_the_least_squares_pair() {
 /// less than (ln 2/32)²/2·(3/2) = 4e-4.
 #[test]
 fn the_envelope_is_nowhere_below() {
-    let drift = Process::Drift(Drift::new(2e-9).unwrap());
+    let drift = Process::drift(2e-9).unwrap();
     for model in [
         without_wn(),
         vec![wn(1e-4), gm(1e-3, 5.0), drift],
@@ -164,7 +164,7 @@ fn the_envelope_is_nowhere_below() {
 /// Ramp of slope c: its Allan deviation is c τ/√2, so at some time any white noise and random walk fall behind.
 #[test]
 fn what_a_pair_cannot_carry_is_told() {
-    let drift = Process::Drift(Drift::new(1e-7).unwrap());
+    let drift = Process::drift(1e-7).unwrap();
     let with_drift = curve(vec![wn(1e-4), drift]);
     let pair = with_drift.pair(Policy::Matched, Bias::Walk);
     let expected =

@@ -4,7 +4,7 @@
 //! weights, over the scales from one GNSS interval to [`window_s`]. Quantization noise is left out: its
 //! integral is bounded. So is a drift: the filter has a state for its slope. The reduction is a pure function of model, interval and window.
 
-use super::{Ar1, Composite, GaussMarkov, ParameterError, Process, White};
+use super::{Composite, Kind, ParameterError, Process};
 use nalgebra::{Matrix3, Vector3};
 
 /// Longest time scale that matters to a filter whose longest outage is given (s): eight times the outage,
@@ -17,10 +17,10 @@ pub fn window_s(longest_outage_s: f64) -> f64 {
 /// White noise and one bias in the place of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reduced {
-    /// White noise of a sample.
-    pub white: White,
-    /// The bias: a Gauss-Markov process, sampled.
-    pub bias: Ar1,
+    /// Variance of a sample of white noise (units²).
+    pub white: f64,
+    /// The bias: a Gauss-Markov process, sampled as an AR1.
+    pub bias: Process,
     /// Variance of the bias at the start (units²): that of the model's stationary processes; random walks
     /// start at 0.
     pub initial_variance: f64,
@@ -81,9 +81,9 @@ pub fn reduce(
     // one.
     let (kappa, variance) = (ln_kappa.exp(), ln_variance.exp());
     Ok(Reduced {
-        white: White::new(ln_white.exp())?,
-        bias: Ar1::new((-kappa).exp(), variance * -(-2.0 * kappa).exp_m1())?,
-        initial_variance: stationary_variance(&kept),
+        white: ln_white.exp(),
+        bias: Process::ar1((-kappa).exp(), variance * -(-2.0 * kappa).exp_m1())?,
+        initial_variance: kept.processes.iter().map(Process::initial_variance).sum(),
         misfit: fit
             .residuals(&[ln_white, ln_variance, ln_kappa])
             .iter()
@@ -94,38 +94,19 @@ pub fn reduce(
 /// Whether a filter with one bias an axis carries the noise as it is: at most one of its processes is a bias.
 #[must_use]
 pub fn is_exact(noise: &Composite) -> bool {
-    let is_bias = |p: &&Process| {
-        matches!(
-            p,
-            Process::Ar1(_) | Process::GaussMarkov(_) | Process::RandomWalk(_)
-        )
+    let states = |p: &Process| match p.kind() {
+        Kind::Flicker => 2,
+        _ => usize::from(p.recursion().is_some()),
     };
-    let is_flicker = |p: &Process| matches!(p, Process::Flicker(_));
-    noise.processes.iter().filter(is_bias).count() <= 1 && !noise.processes.iter().any(is_flicker)
+    noise.processes.iter().map(states).sum::<usize>() <= 1
 }
 
 /// The processes that the pair stands for: without quantization noise and without drift.
 #[must_use]
 pub fn carried(noise: &Composite) -> Composite {
-    let apart = |p: &&Process| matches!(p, Process::Quantization(_) | Process::Drift(_));
-    Composite::new(
-        noise
-            .processes
-            .iter()
-            .filter(|p| !apart(p))
-            .copied()
-            .collect(),
-    )
-}
-
-fn stationary_variance(noise: &Composite) -> f64 {
-    let variance = |p: &Process| match p {
-        Process::Ar1(p) => p.variance(),
-        Process::GaussMarkov(p) => p.s2(),
-        Process::Flicker(p) => p.initial_variance(),
-        _ => 0.0,
-    };
-    noise.processes.iter().map(variance).sum()
+    let is_apart = |p: &Process| matches!(p.kind(), Kind::Quantization | Kind::Drift);
+    let processes = noise.processes.iter().copied();
+    Composite::new(processes.filter(|p| !is_apart(p)).collect())
 }
 
 /// Least squares of ln(reduced/model) in (ln sigma2, ln variance, ln kappa), kappa = dt/T.
@@ -157,8 +138,8 @@ impl Fit {
         let (mut aa, mut ab, mut bb, mut a1, mut b1) = (0.0, 0.0, 0.0, 0.0, 0.0);
         let (mut a_max, mut b_max) = (0.0_f64, 0.0_f64);
         for (level, target) in self.levels.iter().zip(&self.target) {
-            let a = White::haar_shape(*level) / target;
-            let b = GaussMarkov::haar_shape(ln_kappa.exp(), *level).0 / target;
+            let a = Kind::White.haar_shape(0.0, *level).0 / target;
+            let b = Kind::GaussMarkov.haar_shape(ln_kappa.exp(), *level).0 / target;
             (aa, ab, bb, a1, b1) = (aa + a * a, ab + a * b, bb + b * b, a1 + a, b1 + b);
             (a_max, b_max) = (a_max.max(a), b_max.max(b));
         }
@@ -181,8 +162,10 @@ impl Fit {
 
     fn residuals(&self, x: &[f64; 3]) -> Vec<f64> {
         let (white, variance, kappa) = (x[0].exp(), x[1].exp(), x[2].exp());
-        let model =
-            |l| white * White::haar_shape(l) + variance * GaussMarkov::haar_shape(kappa, l).0;
+        let model = |l| {
+            white * Kind::White.haar_shape(0.0, l).0
+                + variance * Kind::GaussMarkov.haar_shape(kappa, l).0
+        };
         self.levels
             .iter()
             .zip(&self.target)
@@ -229,8 +212,11 @@ impl Fit {
         let (white, variance, kappa) = (x[0].exp(), x[1].exp(), x[2].exp());
         let (mut normal, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
         for (level, target) in self.levels.iter().zip(&self.target) {
-            let (shape, slope) = GaussMarkov::haar_shape(kappa, *level);
-            let (a, b) = (white * White::haar_shape(*level), variance * shape);
+            let (shape, slope) = Kind::GaussMarkov.haar_shape(kappa, *level);
+            let (a, b) = (
+                white * Kind::White.haar_shape(0.0, *level).0,
+                variance * shape,
+            );
             // d ln(a + b) with respect to ln sigma2, ln variance and ln kappa.
             let row = Vector3::new(a, b, variance * slope * kappa) / (a + b);
             normal += row * row.transpose();
@@ -243,19 +229,19 @@ impl Fit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::{Quantization, RandomWalk};
+    use crate::noise::Process;
 
     fn ar1(phi: f64, sigma2: f64) -> Process {
-        Process::Ar1(Ar1::new(phi, sigma2).unwrap())
+        Process::ar1(phi, sigma2).unwrap()
     }
 
     fn n2() -> Vec<Process> {
         vec![
-            Process::White(White::new(5e-5).unwrap()),
+            Process::white(5e-5).unwrap(),
             ar1(0.9835, 1.3e-8),
             ar1(0.9999, 1e-11),
-            Process::RandomWalk(RandomWalk::new(2.9e-13).unwrap()),
-            Process::Quantization(Quantization::new(1e-7).unwrap()),
+            Process::random_walk(2.9e-13).unwrap(),
+            Process::quantization(1e-7).unwrap(),
         ]
     }
 
@@ -265,9 +251,9 @@ mod tests {
     fn the_fit_recovers_a_pair_that_exists() {
         let model = Composite::new(vec![n2()[0], ar1(0.9995, 2e-10), ar1(0.9995, 3e-10)]);
         let reduced = reduce(&model, 100.0, 1.0, 800.0).unwrap();
-        assert!((reduced.white.sigma2() / 5e-5 - 1.0).abs() < 1e-6);
-        assert!((reduced.bias.phi() - 0.9995).abs() < 1e-9);
-        assert!((reduced.bias.sigma2() / 5e-10 - 1.0).abs() < 1e-6);
+        assert!((reduced.white / 5e-5 - 1.0).abs() < 1e-6);
+        assert!((reduced.bias.shape() - 0.9995).abs() < 1e-9);
+        assert!((reduced.bias.amplitude() / 5e-10 - 1.0).abs() < 1e-6);
         assert!(reduced.misfit < 1e-9);
     }
 
@@ -311,10 +297,7 @@ mod tests {
         let model = Composite::new(vec![n2()[0], ar1(0.9999, 1e-11), n2()[3]]);
         let off_at_the_end = |window_s: f64| {
             let reduced = reduce(&model, 100.0, 1.0, window_s).unwrap();
-            let pair = Composite::new(vec![
-                Process::White(reduced.white),
-                Process::Ar1(reduced.bias),
-            ]);
+            let pair = Composite::new(vec![Process::white(reduced.white).unwrap(), reduced.bias]);
             (
                 (pair.haar_wv(18) / model.haar_wv(18)).ln().abs(),
                 reduced.misfit,

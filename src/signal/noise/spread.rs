@@ -105,13 +105,12 @@ pub struct Variation {
 }
 
 impl Variation {
-    /// The law of `parameter` of the process labelled `process` in `noise` sampled at `rate_hz`.
+    /// The law of `parameter` of the process labelled `process` in `noise`.
     ///
     /// # Errors
     /// When the process or parameter does not exist, or the law is no law or leaves the domain.
     pub fn new(
         noise: &Composite,
-        rate_hz: f64,
         process: &str,
         parameter: &str,
         law: Law,
@@ -148,7 +147,7 @@ impl Variation {
             Law::Lognormal { median, .. } => [median; 2],
         };
         for end in ends {
-            if let Err(e) = noise.clone().set(of, end, rate_hz) {
+            if let Err(e) = noise.clone().set(of, end) {
                 let message = format!("the law reaches values that are refused: {e}");
                 return refused("distribution", message);
             }
@@ -196,7 +195,7 @@ impl Variation {
     }
 
     /// Draws this parameter of `noise`: again while it is outside its domain.
-    fn draw(&self, noise: &mut Composite, rate_hz: f64, g: &mut Generator) {
+    fn draw(&self, noise: &mut Composite, g: &mut Generator) {
         let parameter = self.of.parameter;
         let centre = noise.value(self.of);
         loop {
@@ -214,7 +213,7 @@ impl Variation {
                     parameter.unscaled(scaled)
                 }
             };
-            if noise.set(self.of, value, rate_hz).is_ok() {
+            if noise.set(self.of, value).is_ok() {
                 return;
             }
         }
@@ -246,7 +245,7 @@ impl Spread {
                     process: &process,
                 };
                 let noise = &mut drawn.axes[channel.index()];
-                variation.draw(noise, model.rate_hz, &mut key.generator());
+                variation.draw(noise, &mut key.generator());
             }
         }
         drawn
@@ -265,8 +264,8 @@ impl Spread {
                 let value = of.parameter.unscaled(scaled[0] + scaled[2] - scaled[1]);
                 let noise = &mut moved.axes[axis];
                 // An amplitude of 0 has no logarithm: what was drawn stands.
-                if noise.set(of, value, model.rate_hz).is_err() {
-                    let _ = noise.set(of, own, model.rate_hz);
+                if noise.set(of, value).is_err() {
+                    let _ = noise.set(of, own);
                 }
             }
         }
@@ -313,9 +312,9 @@ impl VirtualImu<'_> {
             let Some(contamination) = self.contamination else {
                 break;
             };
-            let (noise, rate_hz) = (&mut model.axes[channel.index()], model.rate_hz);
+            let noise = &mut model.axes[channel.index()];
             contamination
-                .scale(noise, channel, replicate, rate_hz)
+                .scale(noise, channel, replicate)
                 .map_err(|source| ReplicateError { replicate, source })?;
         }
         Ok(model)
@@ -394,7 +393,7 @@ mod replicate_tests {
     use super::*;
     use crate::imu::{Axis, Sensor};
     use crate::noise::contamination::{Operation, Rule};
-    use crate::noise::{Composite, Law, Process, Variation};
+    use crate::noise::{Composite, Kind, Law, Process, Variation};
 
     const X: Channel = Channel {
         sensor: Sensor::Accel,
@@ -402,8 +401,9 @@ mod replicate_tests {
     };
 
     fn model() -> Model {
-        let process =
-            |code, values: &[f64]| Process::from_values(code, values, 100.0).unwrap().unwrap();
+        let process = |code, values: &[f64]| {
+            Process::of_values(Kind::named(code).unwrap(), values, 100.0).unwrap()
+        };
         let noise = Composite::new(vec![process("WN", &[1.0]), process("RW", &[0.01])]);
         Model::pooled(100.0, &noise, &noise)
     }
@@ -458,7 +458,7 @@ mod replicate_tests {
             low: 1.0,
             width: 1.0,
         };
-        let variation = Variation::new(&model.axes[0], 100.0, "RW", "gamma2", law).unwrap();
+        let variation = Variation::new(&model.axes[0], "RW", "gamma2", law).unwrap();
         let mut spread = Spread::default();
         spread.axes[0].push(variation);
         let operation = Operation::Scale {

@@ -1,12 +1,14 @@
 //! Laws, their draws and their refusals.
 
 use super::*;
-use crate::noise::Process;
+use crate::noise::{Kind, Process};
 
 const RATE: f64 = 100.0;
 
 fn n1() -> Composite {
-    let process = |code, values: &[f64]| Process::from_values(code, values, RATE).unwrap().unwrap();
+    let process = |code, values: &[f64]| {
+        Process::of_values(Kind::named(code).unwrap(), values, RATE).unwrap()
+    };
     Composite::new(vec![
         process("WN", &[5e-5]),
         process("AR1", &[0.985, 1.5e-8]),
@@ -15,7 +17,7 @@ fn n1() -> Composite {
 }
 
 fn spread(process: &str, parameter: &str, law: Law) -> Spread {
-    let variation = Variation::new(&n1(), RATE, process, parameter, law).unwrap();
+    let variation = Variation::new(&n1(), process, parameter, law).unwrap();
     Spread {
         axes: std::array::from_fn(|_| vec![variation.clone()]),
     }
@@ -52,9 +54,9 @@ fn beta_has_its_range_and_moments() {
 #[test]
 fn normal_is_truncated_to_the_domain() {
     let mut noise = n1();
-    noise.processes[0] = Process::from_values("WN", &[0.0], RATE).unwrap().unwrap();
+    noise.processes[0] = Process::white(0.0).unwrap();
     let law = Law::Normal { sd: 2.0 };
-    let variation = Variation::new(&noise, RATE, "WN", "sigma2", law).unwrap();
+    let variation = Variation::new(&noise, "WN", "sigma2", law).unwrap();
     let mut spread = Spread::default();
     spread.axes[0].push(variation);
     let model = Model::pooled(RATE, &noise, &noise);
@@ -133,13 +135,11 @@ fn draws_move_with_their_centre() {
         median_ci95: None,
         sd_ci95: None,
     };
-    s.axes[0].push(Variation::new(&n1(), RATE, "AR1", "phi", phi).unwrap());
+    s.axes[0].push(Variation::new(&n1(), "AR1", "phi", phi).unwrap());
     let model = Model::pooled(RATE, &n1(), &n1());
     let mut centre = model.clone();
-    centre.axes[0].processes[0] = Process::from_values("WN", &[1e-4], RATE).unwrap().unwrap();
-    centre.axes[0].processes[1] = Process::from_values("AR1", &[0.985_f64.powi(2), 3e-8], RATE)
-        .unwrap()
-        .unwrap();
+    centre.axes[0].processes[0] = Process::white(1e-4).unwrap();
+    centre.axes[0].processes[1] = Process::ar1(0.985_f64.powi(2), 3e-8).unwrap();
     let (own, moved) = (s.draw(&model, 1, 5), s.draw_about(&centre, &model, 1, 5));
     let value = |m: &Model, p: usize, v: usize| m.axes[0].processes[p].values()[v];
     assert!((value(&moved, 0, 0) / value(&own, 0, 0) - 2.0).abs() < 1e-12);
@@ -156,7 +156,7 @@ fn what_is_not_drawn_keeps_its_value() {
 #[test]
 fn impossible_laws_are_refused_in_words() {
     let refusal = |process, parameter, law| {
-        Variation::new(&n1(), RATE, process, parameter, law)
+        Variation::new(&n1(), process, parameter, law)
             .unwrap_err()
             .to_string()
     };

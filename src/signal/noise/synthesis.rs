@@ -1,6 +1,6 @@
 //! Synthesis: draws the noise of one axis from its model, block by block.
 
-use super::{Ar1, Composite, Ladder, Process};
+use super::{Composite, Kind, Ladder, Process};
 use crate::rng::{Generator, StreamKey};
 use rand::{Rng, RngExt};
 use std::sync::LazyLock;
@@ -33,79 +33,57 @@ impl Synthesizer {
             recursive: Vec::new(),
         };
         for (process, label) in noise.processes.iter().zip(noise.labels()) {
-            match process {
-                Process::Flicker(flicker) => {
-                    for (i, part) in flicker.parts(Ladder::FINE).iter().enumerate() {
-                        let label = format!("{label}.{i}");
-                        synthesizer.add(
-                            part,
-                            StreamKey {
-                                process: &label,
-                                ..key
-                            }
-                            .generator(),
-                        );
-                    }
-                }
-                _ => synthesizer.add(
-                    process,
-                    StreamKey {
-                        process: &label,
-                        ..key
-                    }
-                    .generator(),
-                ),
+            let parts = process.parts(Ladder::FINE);
+            for (i, part) in parts.iter().enumerate() {
+                let label = match parts.len() {
+                    1 => label.clone(),
+                    _ => format!("{label}.{i}"),
+                };
+                let key = StreamKey {
+                    process: &label,
+                    ..key
+                };
+                synthesizer.add(part, key.generator());
             }
         }
         synthesizer
     }
 
     /// Adds a process, unless it is identically zero.
-    fn add(&mut self, process: &Process, mut g: Generator) {
+    fn add(&mut self, process: &Process, mut generator: Generator) {
+        let (theta, size) = (process.shape(), process.amplitude());
+        if size == 0.0 {
+            return;
+        }
         let draw = |g: &mut Generator| Ziggurat::get().draw(g);
-        let (kind, last) = match process {
-            Process::White(p) if p.sigma2() > 0.0 => (
-                Kind::White {
-                    sigma: p.sigma2().sqrt(),
-                },
-                0.0,
-            ),
+        if let Some([phi, innovation, initial]) = process.recursion() {
+            // X_0 from the stationary law, so that X_1 has it too.
+            let is_stationary = initial > 0.0;
+            let start = is_stationary.then(|| initial.sqrt() * draw(&mut generator));
+            return self.recursive.push(Recursive {
+                phi,
+                sigma: innovation.sqrt(),
+                last: start.unwrap_or(0.0),
+                generator,
+                block: [0.0; BLOCK],
+            });
+        }
+        let sigma = size.abs().sqrt();
+        let (filter, last) = match process.kind() {
+            Kind::White => (Filter::White { sigma }, 0.0),
+            Kind::Drift => (Filter::Drift { slope: size }, 0.0),
             // The value before the first one is drawn too, so that the first sample has the variance 2 Q² of
             // all others.
-            Process::Quantization(p) if p.q2() > 0.0 => (
-                Kind::Quantization {
-                    scale: (12.0 * p.q2()).sqrt(),
-                },
-                g.random(),
-            ),
-            Process::Drift(p) if p.slope() != 0.0 => (Kind::Drift { slope: p.slope() }, 0.0),
-            Process::Ma1(p) if p.sigma2() > 0.0 => {
-                let sigma = p.sigma2().sqrt();
-                (
-                    Kind::Ma1 {
-                        theta: p.theta(),
-                        sigma,
-                    },
-                    sigma * draw(&mut g),
-                )
+            Kind::Quantization => {
+                let scale = (12.0 * size).sqrt();
+                (Filter::Quantization { scale }, generator.random())
             }
-            Process::Ar1(p) if p.sigma2() > 0.0 => {
-                return self.recursive.push(Recursive::ar1(p, g));
-            }
-            Process::GaussMarkov(p) if p.s2() > 0.0 => {
-                return self.recursive.push(Recursive::ar1(&p.ar1(), g));
-            }
-            Process::RandomWalk(p) if p.gamma2() > 0.0 => {
-                return self
-                    .recursive
-                    .push(Recursive::new(1.0, p.gamma2().sqrt(), 0.0, g));
-            }
-            _ => return,
+            _ => (Filter::Ma1 { theta, sigma }, sigma * draw(&mut generator)),
         };
         self.direct.push(Direct {
-            kind,
+            filter,
             last,
-            generator: g,
+            generator,
         });
     }
 
@@ -127,14 +105,14 @@ impl Synthesizer {
 /// A process whose samples are made of fresh numbers and at most one past one.
 #[derive(Debug, Clone)]
 struct Direct {
-    kind: Kind,
+    filter: Filter,
     /// The past number (QN, MA1) or time (DR).
     last: f64,
     generator: Generator,
 }
 
 #[derive(Debug, Clone)]
-enum Kind {
+enum Filter {
     White { sigma: f64 },
     Quantization { scale: f64 },
     Drift { slope: f64 },
@@ -147,18 +125,18 @@ impl Direct {
         // A local copy of the generator stays in registers; the one behind `self` would be stored at every
         // draw.
         let (z, mut g, mut last) = (Ziggurat::get(), self.generator.clone(), self.last);
-        match self.kind {
-            Kind::White { sigma } => out.iter_mut().for_each(|x| *x += sigma * z.draw(&mut g)),
-            Kind::Quantization { scale } => out.iter_mut().for_each(|x| {
+        match self.filter {
+            Filter::White { sigma } => out.iter_mut().for_each(|x| *x += sigma * z.draw(&mut g)),
+            Filter::Quantization { scale } => out.iter_mut().for_each(|x| {
                 let u = g.random::<f64>();
                 *x += scale * (u - last);
                 last = u;
             }),
-            Kind::Drift { slope } => out.iter_mut().for_each(|x| {
+            Filter::Drift { slope } => out.iter_mut().for_each(|x| {
                 last += 1.0;
                 *x += slope * last;
             }),
-            Kind::Ma1 { theta, sigma } => out.iter_mut().for_each(|x| {
+            Filter::Ma1 { theta, sigma } => out.iter_mut().for_each(|x| {
                 let w = sigma * z.draw(&mut g);
                 *x += w + theta * last;
                 last = w;
@@ -177,24 +155,6 @@ struct Recursive {
     generator: Generator,
     /// Fresh numbers, then samples.
     block: [f64; BLOCK],
-}
-
-impl Recursive {
-    const fn new(phi: f64, sigma: f64, last: f64, generator: Generator) -> Self {
-        Self {
-            phi,
-            sigma,
-            last,
-            generator,
-            block: [0.0; BLOCK],
-        }
-    }
-
-    /// A stationary AR1: X_0 from the stationary law, so that X_1 has it too.
-    fn ar1(p: &Ar1, mut g: Generator) -> Self {
-        let start = p.variance().sqrt() * Ziggurat::get().draw(&mut g);
-        Self::new(p.phi(), p.sigma2().sqrt(), start, g)
-    }
 }
 
 /// Adds the next samples of N recursions to `out`.
@@ -335,7 +295,7 @@ fn tail(g: &mut Generator) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::{Drift, GaussMarkov, Ma1, Quantization, RandomWalk, White};
+    use crate::noise::Process;
 
     const KEY: StreamKey<'_> = StreamKey {
         seed: 7,
@@ -348,19 +308,19 @@ mod tests {
     const SIGMAS: f64 = 5.0;
 
     fn white() -> Process {
-        Process::White(White::new(4.0).unwrap())
+        Process::white(4.0).unwrap()
     }
     fn quantization() -> Process {
-        Process::Quantization(Quantization::new(0.5).unwrap())
+        Process::quantization(0.5).unwrap()
     }
     fn ar1(phi: f64) -> Process {
-        Process::Ar1(Ar1::new(phi, 2.0).unwrap())
+        Process::ar1(phi, 2.0).unwrap()
     }
     fn walk() -> Process {
-        Process::RandomWalk(RandomWalk::new(0.25).unwrap())
+        Process::random_walk(0.25).unwrap()
     }
     fn ma1() -> Process {
-        Process::Ma1(Ma1::new(0.6, 1.5).unwrap())
+        Process::ma1(0.6, 1.5).unwrap()
     }
 
     fn draw(processes: Vec<Process>, key: StreamKey<'_>, n: usize) -> Vec<f64> {
@@ -406,10 +366,8 @@ mod tests {
         }
         let gamma_ma = [1.5 * 1.36, 1.5 * 0.6, 0.0];
         assert_autocovariance(ma1(), |k| gamma_ma[k.unsigned_abs().min(2) as usize]);
-        let gm = GaussMarkov::new(2.0, 3.0, 100.0).unwrap();
-        assert_autocovariance(Process::GaussMarkov(gm), |k| {
-            3.0 * (-2.0 * k.abs() as f64 / 100.0).exp()
-        });
+        let gm = Process::gauss_markov(2.0, 3.0, 100.0).unwrap();
+        assert_autocovariance(gm, |k| 3.0 * (-2.0 * k.abs() as f64 / 100.0).exp());
     }
 
     /// Variance over many runs of the sample at a given time; its standard deviation is σ²√(2/R).
@@ -446,7 +404,7 @@ mod tests {
 
     #[test]
     fn drift_is_a_ramp_from_one_slope() {
-        let x = draw(vec![Process::Drift(Drift::new(-0.5).unwrap())], KEY, 4);
+        let x = draw(vec![Process::drift(-0.5).unwrap()], KEY, 4);
         assert_eq!(x, [-0.5, -1.0, -1.5, -2.0]);
     }
 
@@ -507,7 +465,7 @@ mod tests {
     fn wavelet_variance_is_the_theoretical_one() {
         const RUNS: u64 = 64;
         const LEVELS: u32 = 9;
-        let gm = Process::GaussMarkov(GaussMarkov::new(2.0, 3.0, 100.0).unwrap());
+        let gm = Process::gauss_markov(2.0, 3.0, 100.0).unwrap();
         let n2 = vec![white(), quantization(), ar1(0.9), ar1(0.999), walk()];
         for processes in [
             vec![quantization()],
@@ -556,7 +514,7 @@ mod tests {
 
     #[test]
     fn block_sizes_do_not_matter() {
-        let drift = Process::Drift(Drift::new(1e-3).unwrap());
+        let drift = Process::drift(1e-3).unwrap();
         let noise = Composite::new(vec![
             white(),
             ar1(0.9),
@@ -582,10 +540,7 @@ mod tests {
     #[test]
     fn nothing_is_zero() {
         assert_eq!(draw(vec![], KEY, 3), [0.0; 3]);
-        assert_eq!(
-            draw(vec![Process::White(White::new(0.0).unwrap())], KEY, 3),
-            [0.0; 3]
-        );
+        assert_eq!(draw(vec![Process::white(0.0).unwrap()], KEY, 3), [0.0; 3]);
     }
 }
 

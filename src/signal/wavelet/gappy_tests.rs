@@ -1,7 +1,7 @@
 //! Unbiased, exactly; as known as the degrees of freedom say; robust.
 
 use super::*;
-use crate::noise::{Ar1, Composite, Process, RandomWalk, Synthesizer, White};
+use crate::noise::{Composite, Process, Synthesizer};
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::both;
 use rand::{RngExt, SeedableRng};
@@ -83,9 +83,9 @@ fn the_expectation_is_exact_whatever_the_holes() {
 /// WN, AR1 and RW that lead at the first, middle and last scales.
 fn noise() -> Composite {
     Composite::new(vec![
-        Process::White(White::new(1.0).unwrap()),
-        Process::Ar1(Ar1::new(0.95, 0.02).unwrap()),
-        Process::RandomWalk(RandomWalk::new(4e-4).unwrap()),
+        Process::white(1.0).unwrap(),
+        Process::ar1(0.95, 0.02).unwrap(),
+        Process::random_walk(4e-4).unwrap(),
     ])
 }
 

@@ -163,7 +163,7 @@ fn biases_add_up() {
 
 /// A filter that is certain of everything but for white noise of a sample of these variances at 100 Hz.
 fn certain(accel: f64, gyro: f64) -> Ekf {
-    let axis = |sigma2: f64| Composite::new(vec![Process::White(White::new(sigma2).unwrap())]);
+    let axis = |sigma2: f64| Composite::new(vec![Process::white(sigma2).unwrap()]);
     let model = Model::pooled(100.0, &axis(accel), &axis(gyro));
     let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
     let start = NavState {

@@ -9,10 +9,9 @@
 use super::pass::{Assessment, Consistency, ErrorLaw, FilterPass, Judged, assess};
 use super::track::{NAV, Track};
 use crate::earth::GravityModel;
-use crate::ekf::belief::white_of;
 use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings};
 use crate::imu::{Axis, Channel};
-use crate::noise::{Model, reduction};
+use crate::noise::{Model, Process, reduction};
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
@@ -109,7 +108,7 @@ impl Search<'_> {
                     .axis(channel)
                     .processes
                     .iter()
-                    .map(white_of)
+                    .map(Process::white_variance)
                     .sum(),
             );
             belief.white[s][i] = white * ln[first].exp();

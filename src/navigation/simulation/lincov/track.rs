@@ -4,7 +4,7 @@ use super::pass::add_scaled;
 use super::truth::defects;
 use crate::closure::Bounds;
 use crate::earth::ned_difference;
-use crate::ekf::belief::{BiasGroup, psi_of_angles, state_of};
+use crate::ekf::belief::{BiasGroup, psi_of_angles};
 use crate::ekf::covariance::{
     EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavError, PSI, R, Sample, V,
 };
@@ -12,7 +12,7 @@ use crate::ekf::{Belief, UnknownKind, body_velocity_rows, fix_rows, yaw_row};
 use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::{Channel, Sensor};
 use crate::lanes::{Quat, Vec3};
-use crate::noise::{Ladder, Model, Process};
+use crate::noise::{Kind, Ladder, Model, Process};
 use crate::sensors::aiding::{Aid, AidPart, Law};
 use crate::sensors::defects::{Felt, Surroundings};
 use crate::simulation::BIASES;
@@ -1061,29 +1061,21 @@ impl Sources {
     }
 
     pub(super) fn add(&mut self, signal: usize, process: &Process) {
-        let state = match process {
-            Process::Flicker(p) => {
-                p.parts(Ladder::FINE)
-                    .iter()
-                    .for_each(|part| self.add(signal, part));
-                return;
+        for part in process.parts(Ladder::FINE) {
+            match part.kind() {
+                Kind::White => self.white[signal] += part.amplitude(),
+                Kind::Drift => self.states.push(Source::ramp(signal, part.amplitude())),
+                _ => {
+                    // U_k − U_{k−1}: the last U is a state, because the sum over a step telescopes. As white noise it
+                    // would grow.
+                    let memory = part.moving_average().map(|[theta, variance]| {
+                        Source::memory(signal, variance.sqrt(), 1.0, theta)
+                    });
+                    let bias = part.recursion().map(|state| Source::bias(signal, state));
+                    self.states.extend(memory.or(bias));
+                }
             }
-            Process::White(p) => {
-                self.white[signal] += p.sigma2();
-                return;
-            }
-            // U_k − U_{k−1}: the last U is a state, because the sum over a step telescopes. As white noise it
-            // would grow.
-            Process::Quantization(p) => Source::memory(signal, p.q2().sqrt(), 1.0, -1.0),
-            Process::Ma1(p) => Source::memory(signal, p.sigma2().sqrt(), 1.0, p.theta()),
-            Process::Drift(p) => Source::ramp(signal, p.slope()),
-            other => {
-                let bias = state_of(other).map(|state| Source::bias(signal, state));
-                self.states.extend(bias);
-                return;
-            }
-        };
-        self.states.push(state);
+        }
     }
 }
 

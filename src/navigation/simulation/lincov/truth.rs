@@ -3,7 +3,7 @@
 use super::track::{CROSSED, Measured, Outer, PUSHED, RECTIFIED, SCALED, Source, Sources, WARMED};
 use crate::ekf::Belief;
 use crate::imu::{Axis, Channel, Sensor};
-use crate::noise::{Kind, Model, Process};
+use crate::noise::{Kind, Model};
 use crate::sensors::aiding::{AidError, AidingSettings};
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
@@ -242,8 +242,8 @@ fn processes(model: &Model, sensor: Sensor, drifts: &mut Vec<Source>) -> Vec<Nam
     for channel in Axis::ALL.map(|axis| Channel { sensor, axis }) {
         let noise = model.axis(channel);
         for (process, label) in noise.processes.iter().zip(noise.labels()) {
-            if let Process::Drift(p) = process {
-                drifts.push(Source::drift(channel.index(), p.slope()));
+            if process.kind() == Kind::Drift {
+                drifts.push(Source::drift(channel.index(), process.amplitude()));
                 continue;
             }
             let name = format!("{}.{label}", sensor.name());

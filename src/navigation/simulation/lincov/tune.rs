@@ -684,7 +684,7 @@ pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
         };
         for process in &mut scaled.axes[channel.index()].processes {
             if is_felt(process) {
-                *process = times(process, factor.on_variance, model.rate_hz);
+                *process = times(process, factor.on_variance);
             }
         }
     }
@@ -692,7 +692,7 @@ pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
 }
 
 /// A process whose variance is multiplied.
-fn times(process: &Process, on_variance: f64, rate_hz: f64) -> Process {
+fn times(process: &Process, on_variance: f64) -> Process {
     // a drift has an amplitude, the others a variance
     let factor = if process.kind() == Kind::Drift {
         on_variance.sqrt()
@@ -700,7 +700,7 @@ fn times(process: &Process, on_variance: f64, rate_hz: f64) -> Process {
         on_variance
     };
     // beyond the largest number nothing is left to enlarge
-    process.times(factor, rate_hz).unwrap_or(*process)
+    process.times(factor).unwrap_or(*process)
 }
 
 // Where a function that falls crosses zero.
