@@ -71,7 +71,7 @@ fn a_directory_of_models_is_ranked() {
     let arguments = |limit| {
         [
             "--outage",
-            "30",
+            "60:90",
             "--require",
             limit,
             "--catalogue",
