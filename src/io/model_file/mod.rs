@@ -432,7 +432,7 @@ pub fn from_text(path: &Path, text: &str) -> Result<ModelFile, Failure> {
 
 pub(super) fn parse(source: &Source) -> Result<ModelFile, Failure> {
     let Description {
-        rate_hz: Finite(rate_hz),
+        rate_hz: Between(rate_hz),
         accel,
         gyro,
         turn_on,
