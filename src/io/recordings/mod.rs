@@ -6,7 +6,7 @@
 
 use super::logs::LogOptions;
 use super::table::{
-    ACCELERATION, ANGLE, ANGULAR_RATE, Asked, Bare, Column, Dictionary, NO_COLUMN, NONE, Numbers,
+    ACCELERATION, ANGLE, ANGULAR_RATE, Asked, Bare, Column, Dictionary, NO_COLUMN, Numbers,
     Quantity, TIME, Table, Units, is_oxts, unreadable,
 };
 use super::{Failure, Place, help, table};
@@ -177,9 +177,8 @@ const fn gyro(name: &'static str) -> [Quantity; 3] {
     signal(name, [GYRO, GYRO_SI, &["dtheta"]], [ANGULAR_RATE, ANGLE])
 }
 
-/// Quantities of a recording. A packet counter starts again at 0 after 65535; ticks of 0.1 ms do after 2^32 − 1, and an
-/// exporter may leave them empty.
-static QUANTITIES: [[Quantity; 3]; 9] = [
+/// Quantities of a recording. A packet counter starts again at 0 after 65535.
+static QUANTITIES: [[Quantity; 3]; 8] = [
     [
         time(STAMP, Bare::Unknown, 0),
         time(OF_CLOCK, Bare::Unknown, 1),
@@ -187,16 +186,8 @@ static QUANTITIES: [[Quantity; 3]; 9] = [
     ],
     [
         time(&["timeus"], Bare::Is(1e-6), 1),
-        time(&["timems"], Bare::Is(1e-3), 1),
-        time(&["itow"], Bare::Is(1e-3), 1),
-    ],
-    [
-        Quantity::new("counter", &["packetcounter"], NONE, Bare::Is(1.0)),
-        Quantity::new("counter", &["packet_counter"], NONE, Bare::Is(1.0)),
-        Quantity {
-            may_be_empty: true,
-            ..Quantity::new("ticks", &["sampletimefine"], NONE, Bare::Is(1.0))
-        },
+        time(&["timems", "itow"], Bare::Is(1e-3), 1),
+        Quantity::number("counter", &["packetcounter", "packet_counter"]),
     ],
     accel("accel.x"),
     accel("accel.y"),
@@ -223,15 +214,7 @@ pub(crate) const DICTIONARY: Dictionary = Dictionary {
     array: &[&SIX, &SEVEN],
     numbers: Numbers::Finite,
     advice: "name the columns t_s, accel_x_m_s2 … gyro_z_rad_s (also _g, _mg, _deg_s, _deg_h; t_ms, t_us, t_ns)",
-    bad_cell: |error, value| match value.matches(':').count() > 1 {
-        _ if error.advice().is_some() => error,
-        true => {
-            error.or_hint("write the time in seconds, from any instant on, and name the column t_s")
-        }
-        false => error
-            .or_hint("remove the line")
-            .or_hint("record again: a sample that is made up would change the noise"),
-    },
+    bad_cell: "remove the line, or record again: a sample that is made up would change the noise",
 };
 
 /// The name of a channel's column in files of this program.

@@ -10,7 +10,8 @@ use nav_sim_logs::npy::Array;
 use nav_sim_logs::{Channel, Clock, Content, Kind as LogKind, in_seconds, npy};
 pub(crate) use quantity::find;
 pub(crate) use quantity::{
-    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, NONE, Quantity, SPEED, TIME, Units, normalised,
+    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, TIME,
+    Units, normalised,
 };
 use std::fmt::Display;
 use std::io::{BufRead, Cursor, Read};
@@ -30,8 +31,8 @@ pub(crate) struct Dictionary {
     pub(crate) numbers: Numbers,
     /// Advice where columns are not found.
     pub(crate) advice: &'static str,
-    /// Advice of a cell that is refused.
-    pub(crate) bad_cell: fn(Failure, &str) -> Failure,
+    /// Advice where a cell is refused.
+    pub(crate) bad_cell: &'static str,
 }
 
 impl Dictionary {
@@ -43,7 +44,7 @@ impl Dictionary {
             array: &[],
             numbers: Numbers::Finite,
             advice,
-            bad_cell: |error, _| error,
+            bad_cell: "",
         }
     }
 }
@@ -124,7 +125,7 @@ pub(crate) fn read(
             .is_some_and(|e| e.eq_ignore_ascii_case(ending))
     };
     let name = path.display().to_string();
-    let of = |columns| table(path, columns, dictionary, asked);
+    let of = |columns| of_columns(&name, columns, vec![], dictionary, asked);
     let table = match logs::kind_of(path) {
         #[cfg(feature = "npz")]
         Some(LogKind::Npz) => {
@@ -134,14 +135,14 @@ pub(crate) fn read(
                 ..of(columns)?
             })
         }
-        Some(_) => log(path, dictionary, asked),
+        Some(_) => log(path, asked, &of),
         None if ends_in("npy") => of(npy(path, dictionary, asked)?),
         #[cfg(feature = "parquet")]
         None if ends_in("parquet") => of(parquet(path)?),
         #[cfg(not(feature = "parquet"))]
         None if ends_in("parquet") => {
             let message = "is Apache Parquet, which this build does not read";
-            let refusal = Failure::contents(name, Place::Itself, message);
+            let refusal = Failure::contents(&name, Place::Itself, message);
             Err(refusal.or_hint("build with --features parquet, or write CSV"))
         }
         None if is_oxts(path) => {
@@ -323,19 +324,25 @@ impl Table {
         dictionary: &Dictionary,
     ) -> Result<(), Failure> {
         let own = &mut self.columns[column];
+        let si = value * own.factor.unwrap_or(1.0);
+        let outside = own
+            .quantity
+            .range
+            .filter(|(low, high, _)| !(*low..=*high).contains(&si));
         let is_measured = value.is_finite() && value.abs() <= LARGEST;
-        if is_measured || dictionary.numbers != Numbers::Finite || own.quantity.may_be_empty {
-            own.values.push(value);
+        if is_measured && outside.is_none() || dictionary.numbers == Numbers::Any {
+            let is_inside = value.is_nan() || outside.is_none();
+            own.values.push(if is_inside { value } else { f64::NAN });
             return Ok(());
         }
         let text = written.map_or_else(
             || value.to_string(),
             |cell| shown(&String::from_utf8_lossy(cell.trim_ascii()), 40),
         );
-        let (text, reason) = match value.is_finite() {
-            true if written.is_none() => (format!("{value:e}"), BEYOND),
-            true => (text, BEYOND),
-            false => (format!("\"{text}\""), "is not finite"),
+        let (text, reason) = match outside {
+            _ if !value.is_finite() => (format!("\"{text}\""), "is not finite"),
+            Some((.., reason)) if is_measured => (text, reason),
+            _ => (text, BEYOND),
         };
         Err(self.bad_cell(&self.columns[column].name, line, &text, reason, dictionary))
     }
@@ -348,19 +355,18 @@ impl Table {
         reason: &str,
         dictionary: &Dictionary,
     ) -> Failure {
-        let mut error = Failure::cell(&self.path, line, column, value, reason);
+        let error = Failure::cell(&self.path, line, column, value, reason);
         let point = value.trim_matches('"').replacen(',', ".", 1);
         if point.len() + 2 == value.len() && value.contains(',') && point.parse::<f64>().is_ok() {
-            error = error.or_hint("write decimals with a point: 0.5, not 0,5");
+            return error.or_hint("write decimals with a point: 0.5, not 0,5");
         }
-        (dictionary.bad_cell)(error, value)
+        let is_time = value.matches(':').count() > 1;
+        let time = "write the time in seconds, from any instant on, and name the column t_s";
+        error.or_hint(if is_time { time } else { dictionary.bad_cell })
     }
 
     /// Refuses a table without rows, or whose rows end before others.
-    fn filled(mut self) -> Result<Self, Failure> {
-        let is_clock =
-            |c: &Column| !(c.quantity.may_be_empty && c.values.iter().any(|v| v.is_nan()));
-        self.columns.retain(is_clock);
+    fn filled(self) -> Result<Self, Failure> {
         let uneven = |c: &&Column| c.values.len() != self.columns[0].values.len();
         if let Some(other) = self.columns.iter().find(uneven) {
             let (rows, first) = (other.values.len(), &self.columns[0]);
@@ -524,7 +530,7 @@ fn read_text(
     if !table.columns.is_empty() {
         head.rows(&mut table, reader, &places, dictionary)?;
     }
-    table.comments.splice(..0, head.comments);
+    table.comments = head.comments;
     Ok(table)
 }
 
@@ -658,6 +664,7 @@ impl Head {
         let mut rows = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
+            .comment(Some(b'#'))
             .delimiter(self.delimiter)
             .buffer_capacity(BUFFER)
             .from_reader(rows);
@@ -669,15 +676,6 @@ impl Head {
         while rows.read_byte_record(&mut record).map_err(cannot)? {
             let line = self.before + line_of(&record, rows.position().line());
             let found = record.len();
-            let first = record.get(0).unwrap_or_default().trim_ascii_start();
-            if first.starts_with(b"#") || first.starts_with(b"%") {
-                let cells: Vec<&[u8]> = record.iter().collect();
-                let text = String::from_utf8_lossy(&cells.join(&self.delimiter)).into_owned();
-                table
-                    .comments
-                    .push(text.trim_start_matches(['#', '%', ' ']).to_owned());
-                continue;
-            }
             if row == 0 && !has_units && found == expected && is_words(&record) {
                 has_units = true;
                 let text = format!("line {line} has words and no numbers: passed over");
@@ -707,7 +705,6 @@ impl Head {
                 let Some(column) = *column else { continue };
                 let value = match number(cell, self.delimiter) {
                     Some(value) => value,
-                    None if table.columns[column].quantity.may_be_empty => f64::NAN,
                     None => {
                         let value = shown(&String::from_utf8_lossy(cell.trim_ascii()), 40);
                         let (value, reason) = (format!("\"{value}\""), "is not a number");
@@ -885,27 +882,28 @@ impl<R: Read> Read for Blanks<R> {
 /// Columns by their names.
 type Columns = Vec<(String, Vec<f64>)>;
 
-/// The table of such columns.
-pub(super) fn table(
-    path: &Path,
+/// The table of such columns; the rows stand in these lines, or are counted from 1.
+pub(crate) fn of_columns(
+    path: &str,
     columns: Columns,
+    lines: Vec<u64>,
     dictionary: &Dictionary,
     asked: &Asked<'_>,
 ) -> Result<Table, Failure> {
-    let path = path.display().to_string();
     let names: Vec<String> = match asked.names {
         Some(names) if names.len() != columns.len() => {
-            return Err(Failure::row_length(&path, 1, columns.len(), names.len()));
+            return Err(Failure::row_length(path, 1, columns.len(), names.len()));
         }
         Some(names) => names.to_vec(),
         None => columns.iter().map(|(name, _)| name.clone()).collect(),
     };
-    let (mut table, places) = Table::new(&path, 0, &names, dictionary, asked, false)?;
+    let (mut table, places) = Table::new(path, 0, &names, dictionary, asked, false)?;
+    table.lines = lines;
     table.fits(columns.first().map_or(0, |(_, values)| values.len() as u64))?;
     for ((_, values), place) in columns.into_iter().zip(places) {
         let Some(column) = place else { continue };
-        for (line, value) in (1..).zip(values) {
-            table.push(column, value, None, line, dictionary)?;
+        for (row, value) in values.into_iter().enumerate() {
+            table.push(column, value, None, table.line(row), dictionary)?;
         }
     }
     Ok(table)
@@ -1096,10 +1094,10 @@ fn oxts_times(path: &Path) -> Result<Vec<f64>, Failure> {
 }
 
 /// Reads the samples of the IMU of a log.
-pub(super) fn log(
+fn log(
     path: &Path,
-    dictionary: &Dictionary,
     asked: &Asked<'_>,
+    of: &dyn Fn(Columns) -> Result<Table, Failure>,
 ) -> Result<Table, Failure> {
     let refused = |e| logs::refused(path, e);
     let log = logs::open(path)?;
@@ -1115,7 +1113,7 @@ pub(super) fn log(
         });
         columns.push(((*name).to_owned(), values.collect()));
     }
-    let mut table = table(path, columns, dictionary, asked)?;
+    let mut table = of(columns)?;
     table.assumptions.push(format!("topic {}", channel.topic));
     table.warnings.extend(log.damage().map(logs::cut_off));
     let is_other = |c: &&Channel| c.topic != channel.topic && c.clock == Clock::Unix;

@@ -12,6 +12,7 @@
 //! | ArduPilot | `TimeUS` |
 //! | loggers | `ax_mps2`, `gx_radps`, `gyro_x_dps`, `acc_x [mg]`, … |
 
+use nav_sim_navigation::earth::MAX_LATITUDE_DEG;
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 
 /// Endings of names, each with the SI units in one of that.
@@ -61,6 +62,15 @@ pub(crate) enum Bare {
     Not,
 }
 
+/// Ends of a range, and the reason for which what is beyond them is refused.
+pub(crate) type Range = (f64, f64, &'static str);
+pub(crate) const LATITUDE: Range = (
+    -MAX_LATITUDE_DEG,
+    MAX_LATITUDE_DEG,
+    "is not a latitude within ±89.9",
+);
+pub(crate) const LONGITUDE: Range = (-180.0, 360.0, "is not a longitude");
+
 /// A quantity that a column may hold.
 #[derive(Debug)]
 pub(crate) struct Quantity {
@@ -79,8 +89,8 @@ pub(crate) struct Quantity {
     pub(crate) rank: Option<u8>,
     /// True if it is an increment over the sample.
     pub(crate) per_sample: bool,
-    /// True if empty cells make it a column that is passed over.
-    pub(crate) may_be_empty: bool,
+    /// Numbers that it may be (SI).
+    pub(crate) range: Option<Range>,
 }
 
 impl Quantity {
@@ -100,7 +110,7 @@ impl Quantity {
             of_words: false,
             rank: None,
             per_sample: false,
-            may_be_empty: false,
+            range: None,
         }
     }
 
@@ -129,6 +139,23 @@ impl Quantity {
         Self {
             rank: Some(0),
             ..Self::new("t_s", stems, TIME, Bare::Is(1.0))
+        }
+    }
+
+    /// The same between such ends (degrees).
+    pub(crate) const fn within(self, (low, high, reason): Range) -> Self {
+        Self {
+            range: Some((low * DEG - 1e-9, high * DEG + 1e-9, reason)),
+            ..self
+        }
+    }
+
+    /// The same where it is above 0, as a standard deviation is.
+    pub(crate) const fn positive(self) -> Self {
+        const REASON: &str = "is not a standard deviation: it must be above 0";
+        Self {
+            range: Some((f64::MIN_POSITIVE, f64::MAX, REASON)),
+            ..self
         }
     }
 

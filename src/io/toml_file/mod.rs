@@ -234,6 +234,8 @@ mod tests;
 
 /// Words that choose among the kinds of a table.
 static TAGS: [&str; 4] = ["type", "operation", "kind", "distribution"];
+/// Fields that are no keys: a struct of the keys that are none of the others.
+const REST: [&str; 1] = ["sigma"];
 
 /// What is wrong, and the path of the value or of its table.
 #[derive(Debug)]
@@ -244,7 +246,7 @@ struct Refusal {
 
 #[derive(Debug)]
 enum What {
-    Unknown(String, &'static [&'static str]),
+    Unknown(String, Vec<&'static str>),
     Missing(&'static str),
     Variant(String, &'static [&'static str]),
     NoList,
@@ -307,7 +309,7 @@ impl DeserializeError for Refusal {
     }
 
     fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
-        What::Unknown(field.to_owned(), expected).into()
+        What::Unknown(field.to_owned(), expected.to_vec()).into()
     }
 
     fn missing_field(field: &'static str) -> Self {
@@ -349,8 +351,11 @@ impl<'a> Node<'a> {
 
     /// What is wrong with it, unless it is with a part of it.
     fn blamed<T>(self, read: impl FnOnce(Self) -> Result<T, Refusal>) -> Result<T, Refusal> {
-        let path = self.path.clone();
+        let (path, passed) = (self.path.clone(), self.passed);
         read(self).map_err(|mut e| {
+            if let (What::Unknown(_, legal), None) = (&mut e.what, &e.path) {
+                legal.extend(passed);
+            }
             e.path.get_or_insert(path);
             e
         })
@@ -409,11 +414,14 @@ impl<'de> Deserializer<'de> for Node<'_> {
         fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Refusal> {
-        let tag = fields.iter().find(|field| TAGS.contains(field));
+        let is_rest = |field: &str| REST.contains(&field);
+        let tag = fields
+            .iter()
+            .find(|field| TAGS.contains(field) || is_rest(field));
         match (self.value, tag) {
             (DeValue::Array(_), _) => Err("is not a table".into()),
             // the kind that the word chooses has the keys that are none of these fields
-            (DeValue::Table(table), Some(tag)) if table.contains_key(*tag) => {
+            (DeValue::Table(table), Some(tag)) if table.contains_key(*tag) || is_rest(tag) => {
                 let own = self.keys(table);
                 let own = own.filter(|(key, _)| key != tag && fields.contains(key));
                 let kind = Node {
