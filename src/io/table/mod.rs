@@ -436,13 +436,17 @@ impl Table {
         Some(self.columns.swap_remove(at))
     }
 
-    /// Keeps the rows of which that holds.
-    pub(crate) fn retain(&mut self, keep: impl Fn(&Self, usize) -> bool) {
-        let kept: Vec<usize> = (0..self.rows()).filter(|row| keep(self, *row)).collect();
+    /// Keeps the rows of finite numbers; what was left out, in words.
+    pub(crate) fn keep_whole(&mut self) -> Option<String> {
+        let all = self.rows();
+        let is_whole = |row: &usize| self.columns.iter().all(|c| c.values[*row].is_finite());
+        let kept: Vec<usize> = (0..all).filter(is_whole).collect();
         self.lines = kept.iter().map(|row| self.line(*row)).collect();
         for column in &mut self.columns {
             column.values = kept.iter().map(|row| column.values[*row]).collect();
         }
+        let count = all - kept.len();
+        (count > 0).then(|| format!("{count} rows left out: values not finite, or out of range"))
     }
 
     /// Refuses a table without one of the quantities that are needed; a column that nearly has the name of a missing one
