@@ -6,7 +6,6 @@ use super::recordings::timing::{median_step, unit_of_step};
 use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
 use super::table::{
     Asked, Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Numbers, Quantity, SPEED, Table,
-    normalised,
 };
 use super::toml_file::{Between, Finite, Source};
 use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
@@ -947,77 +946,53 @@ mod initial_tests {
 
 // Recorded speeds of a wheel.
 
-/// Speeds by the words of their names.
+/// Speeds and their times.
 static SPEED_QUANTITIES: [Quantity; 5] = [
     Quantity::time(OF_CLOCK),
     Quantity::time(STAMP),
     Quantity::time(OF_RECEIVER),
     Quantity::new("t_s", &["timeus"], NONE, Bare::Is(1e-6)),
-    Quantity {
-        of_words: true,
-        ..Quantity::new(
+    Quantity::new(
+        "speed",
+        &[
             "speed",
-            &[
-                "speed", "velocity", "vel", "v", "wheel", "wheels", "odometer", "odo", "forward",
-                "rear",
-            ],
-            SPEED,
-            Bare::Unknown,
-        )
-    },
+            "velocity",
+            "vel",
+            "v",
+            "wheel",
+            "wheel_speed",
+            "odometer",
+            "odo",
+            "forward",
+            "forward_speed",
+        ],
+        SPEED,
+        Bare::Unknown,
+    ),
 ];
 
 const SPEEDS: Dictionary = Dictionary::new(
     &SPEED_QUANTITIES,
-    "columns: t_s and wheel_m_s (or wheel_km_h, wheel_mph), negative in reverse; or rear_left_m_s and rear_right_m_s",
+    "columns: t_s and wheel_m_s (or wheel_km_h, wheel_mph), negative in reverse",
 );
 
-/// Reads speeds: a table with a time, and a speed or those of both rear wheels, whose mean is taken.
+/// Reads speeds: a table with a time and a speed.
 ///
 /// # Errors
 /// Whatever is wrong with it, with its line.
 pub(crate) fn read_wheel(path: &Path) -> Result<Vec<WheelSpeed>, Error> {
     let table = table::read(path, &SPEEDS, &Asked::default())?;
-    let [time] = table.columns(["t_s"], &SPEEDS)?;
-    let speeds = speed_columns(&table)?;
-    let speed = |row| speeds.iter().map(|c| c.si(row)).sum::<f64>() / speeds.len() as f64;
+    let [time, speed] = table.columns(["t_s", "speed"], &SPEEDS)?;
+    if speed.factor.is_none() {
+        return Err(table.no_unit(speed));
+    }
     let t_s = (0..table.rows()).map(|row| time.si(row));
     increasing(&table.path, |k| table.line(k), t_s.clone())?;
-    let rows = t_s.enumerate().map(|(row, t_s)| WheelSpeed {
-        t_s,
-        m_s: speed(row),
+    let rows = t_s.enumerate().map(|(row, t_s)| {
+        let m_s = speed.si(row);
+        WheelSpeed { t_s, m_s }
     });
     Ok(rows.collect())
-}
-
-/// The speed, or those of both rear wheels.
-fn speed_columns(table: &Table) -> Result<Vec<&Column>, Error> {
-    let has = |c: &Column, word: &str| normalised(&c.name).split('_').any(|w| w == word);
-    let is_candidate = |c: &&Column| c.quantity.of_words && !has(c, "front");
-    let all: Vec<&Column> = table.columns.iter().filter(is_candidate).collect();
-    let rear = |side: &str| all.iter().find(|c| has(c, "rear") && has(c, side));
-    let chosen = match (rear("left"), rear("right"), &all[..]) {
-        (Some(left), Some(right), _) => vec![*left, *right],
-        (_, _, []) => {
-            let refusal = table.refused("no speed of a wheel");
-            return Err(refusal.or_hint(SPEEDS.advice));
-        }
-        (_, _, [one]) => vec![*one],
-        (_, _, many) => {
-            let names: Vec<_> = many.iter().map(|c| format!("\"{}\"", c.name)).collect();
-            let message = format!("several speeds: {}", names.join(", "));
-            return Err(table.refused(message).or_hint("keep one of them"));
-        }
-    };
-    if let Some(column) = chosen.iter().find(|column| column.factor.is_none()) {
-        let message = format!(
-            "column \"{}\" has no unit of speed in its name",
-            column.name
-        );
-        let refusal = table.refused(message);
-        return Err(refusal.or_hint("end its name in _m_s, _km_h or _mph"));
-    }
-    Ok(chosen)
 }
 
 #[cfg(test)]
@@ -1049,50 +1024,24 @@ mod wheel_tests {
     }
 
     #[test]
-    fn of_four_wheels_it_is_the_mean_of_the_rear() {
-        let header = "t_ms,front_left_m_s,front_right_m_s,rear_left_m_s,rear_right_m_s";
-        let speeds = read(&format!("{header}\n1000,9,9,7,8\n1010,9,9,8,9\n")).unwrap();
-        assert_eq!(
-            speeds,
-            [
-                WheelSpeed { t_s: 1.0, m_s: 7.5 },
-                WheelSpeed {
-                    t_s: 1.01,
-                    m_s: 8.5
-                }
-            ]
-        );
-    }
-
-    #[test]
     fn what_is_no_speed_is_refused_with_its_line_and_column() {
         for (text, said, hint) in [
             (
                 "# a\nt_s,wheel_ticks\n0,1\n",
-                "line 2: column \"wheel_ticks\" has no unit",
-                "_m_s, _km_h or _mph",
-            ),
-            (
-                "t_s,wheel_rpm\n0,1\n",
-                "line 1: column \"wheel_rpm\" has no unit",
-                "_m_s, _km_h or _mph",
+                "line 2: column speed is missing",
+                "",
             ),
             (
                 "t_s,wheel\n0,1\n",
                 "line 1: column \"wheel\" has no unit",
-                "_m_s, _km_h or _mph",
-            ),
-            (
-                "t_s,speed_ft_s\n0,1\n",
-                "line 1: column \"speed_ft_s\" has no unit",
-                "_m_s, _km_h or _mph",
+                "_m_s, _km_h, _mph",
             ),
             (
                 "t_s,wheel_m_s,speed_m_s\n0,1,1\n",
-                "several speeds: \"wheel_m_s\", \"speed_m_s\"",
-                "keep one",
+                "columns \"wheel_m_s\" and \"speed_m_s\" both give speed",
+                "remove one",
             ),
-            ("t_s,gear\n0,1\n", "no speed of a wheel", "wheel_m_s"),
+            ("t_s,gear\n0,1\n", "column speed is missing", "wheel_m_s"),
             ("wheel_m_s\n1\n", "column t_s is missing", "t_s"),
             (
                 "t_s,wheel_m_s\n1,2\n1,2\n",

@@ -250,7 +250,7 @@ pub(crate) fn load(
     let table = table::read(path, dictionary, &asked)?;
     let is_gyro = |c: &&Column| c.factor.is_none() && c.quantity.name.starts_with("gyro");
     if let Some(column) = table.columns.iter().find(is_gyro) {
-        return Err(no_unit(&table, &column.name));
+        return Err(table.no_unit(column));
     }
     if table.columns.iter().all(|c| c.quantity.axis.is_empty()) {
         let known = table.columns.iter().map(|c| &c.name);
@@ -272,24 +272,12 @@ pub(crate) fn load(
     Ok(table)
 }
 
-/// A column without a unit that cannot be known.
-fn no_unit(table: &Table, column: &str) -> Failure {
-    let units = if column.to_lowercase().starts_with('a') {
-        "end its name in _m_s2, _g or _mg"
-    } else {
-        "end its name in _rad_s, _deg_s or _deg_h"
-    };
-    table
-        .refused(format!("column \"{column}\" has no unit in its name"))
-        .or_hint(units)
-        .or_option(help::COLUMN_NAMES)
-}
-
 /// Fewer samples than are needed.
 fn too_short(path: &str, samples: usize, needed: usize) -> Failure {
     let message = format!("{samples} samples, but {needed} are needed");
     Failure::contents(path, Place::Within, message)
         .or_hint("record for longer, or ask for fewer scales")
+        .or_option(("skip-s", "a smaller --skip-s"))
 }
 
 /// Reads recordings; those of a directory in name order (numbers in names by value). All are held.
@@ -716,18 +704,6 @@ fn pieces(
     let all = || ends.windows(2).map(|w| w[0]..w[1]);
     let longest = all().map(|p| p.len()).max().unwrap_or(0);
     let needed = options.min_samples.max(2);
-    if longest < needed && options.skip_s > 0.0 {
-        let (skip_s, seconds) = (
-            options.skip_s,
-            crate::report::seconds(samples as f64 / timing.rate_hz),
-        );
-        let message = format!(
-            "leaving out the first {skip_s} s leaves {longest} samples of {seconds} s, but {needed} are needed"
-        );
-        return Err(Failure::contents(path, Place::Within, message)
-            .or_option(("skip-s", "a smaller --skip-s"))
-            .or_hint("a longer recording"));
-    }
     if longest < needed {
         return Err(too_short(path, longest, needed));
     }
@@ -791,7 +767,7 @@ pub(crate) fn gravity_factor(raw: &Table) -> Result<f64, Failure> {
             }
         }
     }
-    Err(no_unit(raw, &first.name))
+    Err(raw.no_unit(first))
 }
 
 /// The value of all samples, if two or more have the same.

@@ -30,11 +30,10 @@ pub(super) fn timing(
     }
     let known = options.rate_hz.map(|rate_hz| (rate_hz, "given"));
     let clock = match (time, known.or(raw.rate_hz)) {
-        (Some(time), known) => {
+        (Some(time), _) => {
             let mut clock = Clock::new(time, options.gaps, "time column".to_owned());
             if clock.unit_s.is_nan() {
-                let known_hz = known.map(|(rate_hz, _)| rate_hz);
-                let (unit_s, unit) = guess(clock.step, clock.start_s, known_hz);
+                let (unit_s, unit) = unit_of_step(clock.step);
                 let text = format!("column \"{}\" taken as {unit}", clock.name);
                 let is_told = !clock.steps.is_empty();
                 report.assumptions.extend(is_told.then_some(text));
@@ -318,9 +317,6 @@ const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 0.5..=20_000.0;
 /// The units of time and their length (s).
 const UNITS: [(f64, &str); 4] = [(1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")];
 
-/// Unix time of the years 2000 to 2100 (s): in no two units of a thousand are the numbers of these the same.
-const UNIX_S: std::ops::Range<f64> = 9.4e8..4.2e9;
-
 /// The unit in which a step is that of 10 Hz … 10 kHz: the four ranges do not overlap.
 pub(crate) fn unit_of_step(step: f64) -> (f64, &'static str) {
     UNITS[match step {
@@ -329,20 +325,4 @@ pub(crate) fn unit_of_step(step: f64) -> (f64, &'static str) {
         s if s > 0.1 => 1,
         _ => 0,
     }]
-}
-
-/// The unit that is assumed from the step, the first time and a rate that is known otherwise (Hz).
-fn guess(step: f64, first: f64, known_hz: Option<f64>) -> (f64, &'static str) {
-    // The units are thousands apart: the nearest ratio is the one that is meant.
-    let apart = |unit_s: f64| known_hz.map_or(0.0, |hz| (hz * step * unit_s).ln().abs());
-    let is_known = known_hz.is_some() && step > 0.0;
-    let is_meant = |(unit_s, _): &(f64, &str)| match is_known {
-        true => UNITS.iter().all(|other| apart(*unit_s) <= apart(other.0)),
-        false => {
-            let is_usual = USUAL_RATES_HZ.contains(&(1.0 / (step * unit_s)));
-            is_usual && UNIX_S.contains(&(first * unit_s))
-        }
-    };
-    let found = UNITS.into_iter().find(is_meant);
-    found.unwrap_or_else(|| unit_of_step(step))
 }

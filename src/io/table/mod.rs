@@ -262,11 +262,6 @@ impl Table {
         let rank = |c: &Column| c.quantity.rank.map(|rank| (rank, c.factor.is_none()));
         let mut k = 1;
         while k < self.columns.len() {
-            // speeds are chosen by who reads them
-            if self.columns[k].quantity.of_words {
-                k += 1;
-                continue;
-            }
             let (name, later) = (self.columns[k].quantity.name, &self.columns[k]);
             let Some(i) = self.columns[..k]
                 .iter()
@@ -298,20 +293,28 @@ impl Table {
                     && !asked.unwanted.is_some_and(|is| is(q))
             };
             if let Some(quantity) = dictionary.quantities.iter().find(is_meant) {
-                let endings: Vec<String> = quantity
-                    .units
-                    .iter()
-                    .map(|(names, _)| format!("_{}", names[0]))
-                    .collect();
-                let message = format!("column \"{name}\" is in a unit that is not known");
-                return Err(self
-                    .refused(message)
-                    .or_hint(format!("end its name in one of {}", endings.join(", ")))
-                    .or_option(help::COLUMN_NAMES)
-                    .or_option(help::CHANNELS));
+                let problem = "is in a unit that is not known";
+                return Err(self.unit(name, quantity, problem).or_option(help::CHANNELS));
             }
         }
         Ok(())
+    }
+
+    /// The refusal of the unit of a column.
+    fn unit(&self, name: &str, quantity: &Quantity, problem: &str) -> Failure {
+        let endings = quantity
+            .units
+            .iter()
+            .map(|(names, _)| format!("_{}", names[0]));
+        let endings: Vec<String> = endings.collect();
+        self.refused(format!("column \"{name}\" {problem}"))
+            .or_hint(format!("end its name in one of {}", endings.join(", ")))
+            .or_option(help::COLUMN_NAMES)
+    }
+
+    /// The refusal of a column whose unit cannot be known.
+    pub(crate) fn no_unit(&self, column: &Column) -> Failure {
+        self.unit(&column.name, column.quantity, "has no unit in its name")
     }
 
     /// Appends a number to a column; `written`: as the file has it.

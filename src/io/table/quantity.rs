@@ -83,8 +83,6 @@ pub(crate) struct Quantity {
     pub(crate) bare: Bare,
     /// Sign of what the file has.
     pub(crate) sign: f64,
-    /// True if a stem is one word of the name.
-    pub(crate) of_words: bool,
     /// Preference among columns of the quantity; without it there may be but one.
     pub(crate) rank: Option<u8>,
     /// True if it is an increment over the sample.
@@ -107,7 +105,6 @@ impl Quantity {
             units,
             bare,
             sign: 1.0,
-            of_words: false,
             rank: None,
             per_sample: false,
             range: None,
@@ -180,11 +177,8 @@ impl Quantity {
         let Some(stem) = stem.strip_suffix(self.axis) else {
             return false;
         };
-        match (self.of_words, self.axis) {
-            (true, _) => stem.split('_').any(|word| self.stems.contains(&word)),
-            (_, "") => self.stems.contains(&stem),
-            _ => self.stems.contains(&stem.trim_end_matches('_')),
-        }
+        let is_axis = !self.axis.is_empty();
+        self.stems.contains(&stem) || is_axis && self.stems.contains(&stem.trim_end_matches('_'))
     }
 
     /// The factor of a column of this name, of none without a unit; nothing of another quantity.
