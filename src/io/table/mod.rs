@@ -964,14 +964,14 @@ const RATE: &str = "rate_hz";
 /// it is stated.
 #[cfg(feature = "npz")]
 fn npz(path: &Path) -> Result<(Columns, Option<f64>), Failure> {
-    use nav_sim_logs::{Error, Fault, npz::Archive};
+    use nav_sim_logs::{Fault, npz::Archive};
     let refused = |e| logs::refused(path, e);
     let mut archive = Archive::open(path).map_err(refused)?;
     let (mut columns, mut rate_hz) = (Vec::new(), None);
     for name in archive.names() {
         let Array { shape, values } = match archive.read(&name) {
             // texts and the like are passed over
-            Err(Error::At(_, Fault::Encoding(_))) => {
+            Err(e) if matches!(e.fault, Fault::Encoding) => {
                 columns.push((name, Vec::new()));
                 continue;
             }
