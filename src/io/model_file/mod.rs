@@ -31,7 +31,7 @@ use nav_sim_signal::noise::{
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
-use serde_json::Map;
+use serde_json::{Map, json};
 use std::fmt;
 use std::fmt::Write;
 use std::path::Path;
@@ -508,8 +508,7 @@ fn read_turn_on(source: &Source, table: &TurnOnTable) -> Result<TurnOn, Failure>
     let axes = |sensor: Sensor, given: &Option<OneOrEach<Finite, [Finite; 3]>>, limit: f64| {
         let axes = match given {
             None => return Ok(None),
-            Some(OneOrEach::One(all)) => [all.0; 3],
-            Some(OneOrEach::Each(each)) => each.map(|sigma| sigma.0),
+            Some(given) => [0, 1, 2].map(|axis| given.of(axis)),
         };
         if axes.iter().all(|sigma| (0.0..=limit).contains(sigma)) {
             return Ok(Some(axes));
@@ -699,11 +698,9 @@ fn turn_on(file: &ModelFile) -> String {
         let Some(axes) = turn_on.axes(sensor) else {
             continue;
         };
-        let alike = axes.iter().all(|sigma| *sigma == axes[0]);
-        let value = if alike {
-            format!("{:?}", axes[0])
-        } else {
-            format!("{axes:?}")
+        let value = match axes {
+            [x, y, z] if x == y && y == z => format!("{x:?}"),
+            axes => format!("{axes:?}"),
         };
         let _ = writeln!(out, "{} = {value}", TurnOn::key(sensor));
     }
@@ -767,32 +764,12 @@ fn laws(file: &ModelFile, channel: Channel) -> Option<Vec<String>> {
 }
 
 fn law(v: &Variation) -> String {
-    let constants = match v.law {
-        Law::Beta { a, b, low, width } => {
-            format!(
-                "distribution = \"beta\"\na = {a:?}\nb = {b:?}\nlow = {low:?}\nwidth = {width:?}"
-            )
-        }
-        Law::Normal { sd } => format!("distribution = \"normal\"\nsd = {sd:?}"),
-        Law::Lognormal {
-            median,
-            median_ci95,
-            sd,
-            sd_ci95,
-        } => {
-            let ends = |name, ends: Option<[f64; 2]>| {
-                ends.map_or(String::new(), |ends| format!("\n{name}{CI} = {ends:?}"))
-            };
-            format!(
-                "distribution = \"lognormal\"\nmedian = {median:?}{}\nsd = {sd:?}{}",
-                ends("median", median_ci95),
-                ends("sd", sd_ci95)
-            )
-        }
-    };
-    format!(
-        "process = \"{}\"\nparameter = \"{}\"\n{constants}\n",
-        v.process,
-        v.of.parameter.name()
-    )
+    let mut table = toml::Table::new();
+    for (distribution, constants) in json!(v.law).as_object().into_iter().flatten() {
+        table = known(constants.clone());
+        table.insert("distribution".into(), distribution.as_str().into());
+    }
+    table.insert("process".into(), v.process.as_str().into());
+    table.insert("parameter".into(), v.of.parameter.name().into());
+    table.to_string()
 }

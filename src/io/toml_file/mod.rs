@@ -609,12 +609,15 @@ pub(crate) enum OneOrEach<One, Each = Vec<One>> {
     Each(Each),
 }
 
-impl<One: Copy + Into<f64>> OneOrEach<One> {
+impl<One: Copy + Into<f64>, Each: AsRef<[One]>> OneOrEach<One, Each> {
     /// The one, or the i-th of a list (NaN beyond it).
     pub(crate) fn of(&self, i: usize) -> f64 {
         match self {
             Self::One(value) => (*value).into(),
-            Self::Each(values) => values.get(i).map_or(f64::NAN, |value| (*value).into()),
+            Self::Each(values) => values
+                .as_ref()
+                .get(i)
+                .map_or(f64::NAN, |value| (*value).into()),
         }
     }
 }
