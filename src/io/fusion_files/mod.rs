@@ -5,7 +5,7 @@ use super::logs::LogOptions;
 use super::recordings::timing::{median_step, unit_of_step};
 use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
 use super::table::{
-    Asked, Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Numbers, Quantity, SPEED, Table,
+    Asked, Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table,
 };
 use super::toml_file::{Between, Finite, Source};
 use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
@@ -171,7 +171,7 @@ const FIXES: Dictionary = Dictionary {
 
 /// Dictionary of solutions, which have numbers that stand for none.
 const SOLUTION: Dictionary = Dictionary {
-    numbers: Numbers::Any,
+    is_partial: true,
     ..FIXES
 };
 

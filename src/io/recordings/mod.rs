@@ -6,8 +6,8 @@
 
 use super::logs::LogOptions;
 use super::table::{
-    ACCELERATION, ANGLE, ANGULAR_RATE, Asked, Bare, Column, Dictionary, NO_COLUMN, Numbers,
-    Quantity, TIME, Table, Units, is_oxts, unreadable,
+    ACCELERATION, ANGLE, ANGULAR_RATE, Asked, Bare, Column, Dictionary, NO_COLUMN, Quantity, TIME,
+    Table, Units, is_oxts, unreadable,
 };
 use super::{Failure, Place, help, table};
 use crate::report::six_digits;
@@ -212,7 +212,7 @@ pub(crate) const DICTIONARY: Dictionary = Dictionary {
     quantities: QUANTITIES.as_flattened(),
     bare: &[],
     array: &[&SIX, &SEVEN],
-    numbers: Numbers::Finite,
+    is_partial: false,
     advice: "name the columns t_s, accel_x_m_s2 … gyro_z_rad_s (also _g, _mg, _deg_s, _deg_h; t_ms, t_us, t_ns)",
     bad_cell: "remove the line, or record again: a sample that is made up would change the noise",
 };
@@ -309,13 +309,13 @@ pub(crate) fn visit<T: Send>(
     for some in files.chunks(AT_ONCE) {
         let outcomes: Vec<_> = some
             .par_iter()
-            .map(|file| held(&file.path, options, look))
+            .map(|(path, _)| held(path, options, look))
             .collect();
-        for (file, outcome) in some.iter().zip(outcomes) {
+        for ((path, is_found), outcome) in some.iter().zip(outcomes) {
             match outcome {
                 // the output of this very command, say, when it goes to a file in the directory
-                Err(e) if file.from_directory && e.passed_over().is_some() => {
-                    let (path, why) = (file.path.display(), e.passed_over().unwrap_or_default());
+                Err(e) if *is_found && e.passed_over().is_some() => {
+                    let (path, why) = (path.display(), e.passed_over().unwrap_or_default());
                     let text = format!("{path}: passed over, {why}");
                     report.warnings.push(text);
                 }
@@ -357,55 +357,33 @@ mod tests;
 
 // Which files are meant: directories stand for the recordings in them.
 
-/// A file to read.
-struct File {
-    pub(super) path: PathBuf,
-    /// Found in a directory, not named: may turn out to be something else.
-    from_directory: bool,
-}
-
 const ENDINGS: [&str; 10] = [
     "csv", "tsv", "txt", "npy", "npz", "mcap", "bag", "ulg", "ubx", "parquet",
 ];
 
-/// The files, in the order given, those of a directory in name order.
-fn expand(paths: &[PathBuf]) -> Result<Vec<File>, Failure> {
+/// The files, in the order given, those of a directory in name order; true where it was found in one, not named: it may turn out
+/// to be something else.
+fn expand(paths: &[PathBuf]) -> Result<Vec<(PathBuf, bool)>, Failure> {
     let mut files = Vec::new();
     for path in paths {
-        let io = |e: std::io::Error| {
-            let is_missing = e.kind() == std::io::ErrorKind::NotFound;
-            let advice = "check the path; a directory stands for all its recordings";
-            unreadable(path, e).or_hint_if(is_missing.then(|| advice.to_owned()))
-        };
+        let io = |e| unreadable(path, e);
         if std::fs::metadata(path).map_err(io)?.is_dir() && !is_oxts(path) {
             let inside = listing(path).map_err(io)?;
             if inside.is_empty() {
                 return Err(no_files(path.display().to_string()));
             }
-            files.extend(inside.into_iter().map(|path| File {
-                path,
-                from_directory: true,
-            }));
+            files.extend(inside.into_iter().map(|path| (path, true)));
         } else {
-            files.push(File {
-                path: path.clone(),
-                from_directory: false,
-            });
+            files.push((path.clone(), false));
         }
     }
     let mut seen = HashSet::new();
-    for file in &files {
+    for (path, _) in &files {
         // A pipe has no path of its own.
-        if !seen.insert(
-            file.path
-                .canonicalize()
-                .unwrap_or_else(|_| file.path.clone()),
-        ) {
+        if !seen.insert(path.canonicalize().unwrap_or_else(|_| path.clone())) {
             let message = "is given twice: it would count as two replicates";
-            return Err(
-                Failure::contents(file.path.display(), Place::Itself, message)
-                    .or_hint("name each file once; a directory stands for all its recordings"),
-            );
+            return Err(Failure::contents(path.display(), Place::Itself, message)
+                .or_hint("name each file once; a directory stands for all its recordings"));
         }
     }
     Ok(files)
@@ -670,17 +648,14 @@ pub(super) fn recordings(
 
 /// The samples of a stretch with NaN where some are missing.
 fn with_holes(samples: &[f64], piece: &Range<usize>, holes: &[(usize, usize)]) -> Vec<f64> {
-    let is_inside = |(sample, _): &&(usize, usize)| *sample > piece.start && *sample < piece.end;
-    let inside = holes.iter().filter(is_inside);
-    let lost: usize = inside.clone().map(|(_, lost)| lost).sum();
-    let (mut whole, mut done) = (Vec::with_capacity(samples.len() + lost), 0);
-    for (sample, lost) in inside {
-        let next = sample - piece.start;
-        whole.extend_from_slice(&samples[done..next]);
-        whole.extend(std::iter::repeat_n(f64::NAN, *lost));
-        done = next;
+    let inside = holes.iter().filter(|(sample, _)| *sample > piece.start);
+    let (mut inside, mut whole) = (inside.peekable(), Vec::with_capacity(samples.len()));
+    for (k, value) in piece.clone().zip(samples) {
+        if let Some((_, lost)) = inside.next_if(|(sample, _)| *sample == k) {
+            whole.extend(std::iter::repeat_n(f64::NAN, *lost));
+        }
+        whole.push(*value);
     }
-    whole.extend_from_slice(&samples[done..]);
     whole
 }
 
@@ -726,11 +701,13 @@ fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
     let from_gravity = gravity_factor(raw)?;
     let factor = |column: &Column| {
         let channel = column.quantity.name;
-        if let Some(value) = only_value(&column.values) {
-            let message = format!(
-                "{channel} (column \"{}\") is dead: every sample is {value}",
-                column.name
-            );
+        let [value, others @ ..] = &column.values[..] else {
+            return Ok(1.0);
+        };
+        let is_same = |other: &f64| other.to_bits() == value.to_bits();
+        if !others.is_empty() && others.iter().all(is_same) {
+            let name = &column.name;
+            let message = format!("{channel} (column \"{name}\") is dead: every sample is {value}");
             return Err(Failure::contents(&raw.path, Place::Within, message)
                 .or_option(help::CHANNELS)
                 .or_hint("record again"));
@@ -770,13 +747,6 @@ pub(crate) fn gravity_factor(raw: &Table) -> Result<f64, Failure> {
     Err(raw.no_unit(first))
 }
 
-/// The value of all samples, if two or more have the same.
-fn only_value(values: &[f64]) -> Option<f64> {
-    let (first, rest) = values.split_first()?;
-    let is_same = |value: &f64| value.to_bits() == first.to_bits();
-    (!rest.is_empty() && rest.iter().all(is_same)).then_some(*first)
-}
-
 /// Mean of values times a factor, summed about the first of them so that a large offset costs no digits.
 fn mean(values: &[f64], factor: f64) -> f64 {
     /// Values whose sum is taken before it is added: rounding grows with their number.
@@ -794,20 +764,13 @@ fn norm(vector: &[f64]) -> f64 {
 
 /// Static specific force is gravity, or nothing where the mean was removed before; rates are small.
 fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Failure> {
-    let means_of_sensor = |sensor| -> Vec<f64> {
-        means
-            .iter()
-            .filter(|(channel, _)| channel.sensor == sensor)
-            .map(|(_, mean)| *mean)
-            .collect()
-    };
-    let (accel, gyro) = (
-        means_of_sensor(Sensor::Accel),
-        means_of_sensor(Sensor::Gyro),
-    );
-    let is_gravity = |mean: &[f64]| (norm(mean) / STANDARD_GRAVITY - 1.0).abs() < 0.1;
-    if accel.len() == 3 && gyro.len() == 3 && norm(&accel) < NO_GRAVITY && is_gravity(&gyro) {
-        let (f, rate) = (norm(&accel), norm(&gyro));
+    let [accel, gyro] = Sensor::ALL.map(|sensor| -> Vec<f64> {
+        let own = means.iter().filter(|(channel, _)| channel.sensor == sensor);
+        own.map(|(_, mean)| *mean).collect()
+    });
+    let (f, rate) = (norm(&accel), norm(&gyro));
+    let is_gravity = (rate / STANDARD_GRAVITY - 1.0).abs() < 0.1;
+    if accel.len() == 3 && gyro.len() == 3 && f < NO_GRAVITY && is_gravity {
         let message = format!(
             "accelerometers and gyroscopes are exchanged: |f| is {f:.4} m/s², the mean rate {rate:.4} rad/s"
         );
@@ -816,10 +779,10 @@ fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Fa
             .or_option(help::COLUMN_NAMES));
     }
     if accel.len() == 3 {
-        check_gravity(&report.file, norm(&accel))?;
+        check_gravity(&report.file, f)?;
     }
-    if norm(&gyro) > 0.1 {
-        let degrees = norm(&gyro).to_degrees();
+    if rate > 0.1 {
+        let degrees = rate.to_degrees();
         report.warn(format!(
             "mean angular rate {degrees:.1} deg/s: not static, or deg/s named rad/s?"
         ));

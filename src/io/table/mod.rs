@@ -27,8 +27,8 @@ pub(crate) struct Dictionary {
     pub(crate) bare: &'static [&'static [&'static str]],
     /// Names of the columns of arrays without names.
     pub(crate) array: &'static [&'static [&'static str]],
-    /// Numbers that a cell may hold.
-    pub(crate) numbers: Numbers,
+    /// True if cells that hold no number of their range are NaN: who reads them leaves those rows out.
+    pub(crate) is_partial: bool,
     /// Advice where columns are not found.
     pub(crate) advice: &'static str,
     /// Advice where a cell is refused.
@@ -42,20 +42,11 @@ impl Dictionary {
             quantities,
             bare: &[],
             array: &[],
-            numbers: Numbers::Finite,
+            is_partial: false,
             advice,
             bad_cell: "",
         }
     }
-}
-
-/// Numbers that a table may hold.
-#[derive(Clone, Copy, PartialEq)]
-pub(crate) enum Numbers {
-    /// Finite ones.
-    Finite,
-    /// Any: who reads it leaves those rows out.
-    Any,
 }
 
 /// Choices of who reads a table.
@@ -333,7 +324,7 @@ impl Table {
             .range
             .filter(|(low, high, _)| !(*low..=*high).contains(&si));
         let is_measured = value.is_finite() && value.abs() <= LARGEST;
-        if is_measured && outside.is_none() || dictionary.numbers == Numbers::Any {
+        if is_measured && outside.is_none() || dictionary.is_partial {
             let is_inside = value.is_nan() || outside.is_none();
             own.values.push(if is_inside { value } else { f64::NAN });
             return Ok(());
@@ -638,7 +629,7 @@ impl Head {
                     .names
                     .map(<[String]>::to_vec)
                     .or_else(|| layout(dictionary.bare, cells.len()))
-                    .ok_or_else(|| no_header(path, line, &cells, text, dictionary))?;
+                    .ok_or_else(|| no_header(path, line, text, dictionary))?;
                 return Ok(head);
             }
             let names = asked.names.map_or(cells, <[String]>::to_vec);
@@ -734,33 +725,22 @@ fn layout(layouts: &[&[&str]], columns: usize) -> Option<Vec<String>> {
     Some(found.iter().map(|name| (*name).to_owned()).collect())
 }
 
-fn no_header(
-    path: &str,
-    line: u64,
-    cells: &[String],
-    text: &str,
-    dictionary: &Dictionary,
-) -> Failure {
-    let refused =
-        |message: String| Failure::contents(path, line, message).or_hint(dictionary.advice);
-    if !dictionary.bare.is_empty() {
-        return refused(format!("{} columns without a header", cells.len()));
-    }
+fn no_header(path: &str, line: u64, text: &str, dictionary: &Dictionary) -> Failure {
     let found = shown(text, 60);
-    refused(format!(
-        "a header that names the columns is missing, found \"{found}\""
-    ))
-    .or_option(help::COLUMN_NAMES)
+    let message = format!("a header that names the columns is missing, found \"{found}\"");
+    Failure::contents(path, line, message)
+        .or_hint(dictionary.advice)
+        .or_option(help::COLUMN_NAMES)
 }
 
 /// The rate in a comment such as `Update Rate: 100.0Hz`.
 fn rate_in(comment: &str) -> Option<f64> {
     let lower = comment.to_lowercase();
-    let words = ["update rate", "sample rate", "sampling rate", "output rate"];
-    let after = words.iter().find_map(|w| lower.split_once(w))?.1;
+    let after = lower.split_once("update rate")?.1;
     let value = after.trim_start_matches(|c: char| !c.is_ascii_digit());
-    let end = value.find(|c: char| !c.is_ascii_digit() && c != '.');
-    let digits = &value[..end.unwrap_or(value.len())];
+    let digits = value
+        .split(|c: char| !c.is_ascii_digit() && c != '.')
+        .next()?;
     digits.parse().ok().filter(|r: &f64| *r > 0.0)
 }
 
@@ -802,12 +782,11 @@ fn split(text: &str, delimiter: u8) -> Vec<String> {
 
 /// True if a row has units, say, below the names: no cell begins as a number does.
 fn is_words(record: &csv::ByteRecord) -> bool {
-    let first = |cell: &[u8]| cell.trim_ascii().first().copied();
     let is_word = |cell: &[u8]| {
-        let begins = |b: u8| !b.is_ascii_digit() && !b"+-.".contains(&b);
-        number(cell, b',').is_none() && first(cell).is_none_or(begins)
+        let first = cell.trim_ascii().first();
+        number(cell, b',').is_none() && first.is_none_or(|b| !b"+-.0123456789".contains(b))
     };
-    record.iter().all(is_word) && record.iter().any(|cell| first(cell).is_some())
+    record.iter().all(is_word) && record.iter().any(|cell| !cell.trim_ascii().is_empty())
 }
 
 /// Error of the system, with its kind.

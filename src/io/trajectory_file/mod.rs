@@ -2,7 +2,7 @@
 
 use super::fusion_files::{WEEK_S, check_jump, doubt_degrees};
 use super::table::{
-    self, Asked, Column, Dictionary, LATITUDE, LONGITUDE, Numbers, Quantity, Table, normalised,
+    self, Asked, Column, Dictionary, LATITUDE, LONGITUDE, Quantity, Table, normalised,
 };
 use super::{Failure, Failure as Error, Place, source};
 use crate::parse;
@@ -45,7 +45,7 @@ const KNOWN: &str =
 /// # Errors
 /// Whatever is wrong with the file, with its line.
 pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<String>), Failure> {
-    match read(path, options, Numbers::Finite)? {
+    match read(path, options, false)? {
         None => Ok((profile::load(path)?, Vec::new())),
         Some(rows) => rows.trajectory(),
     }
@@ -61,14 +61,14 @@ pub(crate) fn load_reference(
     path: &Path,
     options: &Options,
 ) -> Result<(Reference, Vec<String>), Failure> {
-    match read(path, options, Numbers::Any)? {
+    match read(path, options, true)? {
         None => Ok((profile::load(path)?.into(), Vec::new())),
         Some(rows) => rows.reference(),
     }
 }
 
 /// The rows of a file; none of a motion profile.
-fn read(path: &Path, options: &Options, numbers: Numbers) -> Result<Option<Rows>, Failure> {
+fn read(path: &Path, options: &Options, is_partial: bool) -> Result<Option<Rows>, Failure> {
     let name = path.display().to_string();
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
@@ -77,7 +77,7 @@ fn read(path: &Path, options: &Options, numbers: Numbers) -> Result<Option<Rows>
         "gpx" => gpx(&name, &source::table_text(path)?).map(Some),
         ending @ ("nav" | "tum" | "csv" | "tsv" | "txt") => {
             let text = source::table_text(path)?;
-            rows(&name, &text, ending, options, numbers).map(Some)
+            rows(&name, &text, ending, options, is_partial).map(Some)
         }
         _ => {
             let message = format!("a trajectory file ends in {KNOWN}");
@@ -268,10 +268,10 @@ fn rows(
     text: &str,
     ending: &str,
     options: &Options,
-    numbers: Numbers,
+    is_partial: bool,
 ) -> Result<Rows, Error> {
     let dictionary = Dictionary {
-        numbers,
+        is_partial,
         bare: match ending {
             "nav" => &[KF_GINS],
             "tum" => &[TUM],
@@ -657,18 +657,11 @@ mod import_tests {
     type Loaded = Result<(Trajectory, Vec<String>), Error>;
 
     fn nav(text: &str) -> Loaded {
-        rows(
-            "truth.nav",
-            text,
-            "nav",
-            &Options::default(),
-            Numbers::Finite,
-        )?
-        .trajectory()
+        rows("truth.nav", text, "nav", &Options::default(), false)?.trajectory()
     }
 
     fn tum(path: &str, text: &str, options: &Options) -> Loaded {
-        rows(path, text, "tum", options, Numbers::Finite)?.trajectory()
+        rows(path, text, "tum", options, false)?.trajectory()
     }
 
     #[test]
@@ -695,7 +688,7 @@ mod import_tests {
         let e = nav("2016 1 2 3\n").unwrap_err();
         assert_eq!(
             e.to_string(),
-            "truth.nav, line 1: 4 columns without a header"
+            "truth.nav, line 1: a header that names the columns is missing, found \"2016 1 2 3\""
         );
     }
 

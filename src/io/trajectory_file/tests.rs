@@ -13,7 +13,7 @@ fn read(text: &str) -> Result<(Trajectory, Vec<String>), Failure> {
 }
 
 fn read_with(text: &str, options: &Options) -> Result<(Trajectory, Vec<String>), Failure> {
-    rows("a.csv", text, "csv", options, Numbers::Finite)?.trajectory()
+    rows("a.csv", text, "csv", options, false)?.trajectory()
 }
 
 /// North-east along 46.5° N at 2 rows a second, 20 rows, heading 45°, with one row replaced.
@@ -396,7 +396,7 @@ fn a_far_time_stamp_is_refused_with_its_line_in_every_format() {
         &format!("# origin: 45, 7, 0\n{tum}"),
         "tum",
         &Options::default(),
-        Numbers::Finite,
+        false,
     );
     let e = tum.unwrap().trajectory().unwrap_err().to_string();
     assert!(
@@ -439,7 +439,7 @@ fn jumps_and_heights_of_other_formats_are_refused_as_those_of_tables() {
             .map(|k| format!("{k} {} 0 0 0 0 0 1\n", place(k)))
             .collect();
         let text = format!("# origin: 45, 7, 0\n{text}");
-        let rows = rows("a.tum", &text, "tum", &Options::default(), Numbers::Finite);
+        let rows = rows("a.tum", &text, "tum", &Options::default(), false);
         rows.unwrap().trajectory().unwrap_err().to_string()
     };
     assert!(
@@ -562,7 +562,7 @@ fn references_are_used_but_for_what_jumps() {
     };
     let text = HEADER.to_owned() + &(0..600).map(row).collect::<String>();
     assert!(read(&text.replace("nan", "0.5")).is_err());
-    let parsed = rows("a.csv", &text, "csv", &Options::default(), Numbers::Any).unwrap();
+    let parsed = rows("a.csv", &text, "csv", &Options::default(), true).unwrap();
     let (reference, warnings) = parsed.reference().unwrap();
     let known = |t: f64| reference.state(t).is_some();
     assert_eq!(
@@ -587,7 +587,7 @@ fn references_are_used_but_for_what_jumps() {
         &(HEADER.to_owned() + &mad),
         "csv",
         &Options::default(),
-        Numbers::Any,
+        true,
     )
     .unwrap();
     assert!(parsed.reference().is_err());
