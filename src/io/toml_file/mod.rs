@@ -3,6 +3,7 @@
 //! Keys have paths, `outage[2].end_s`; entries of lists of tables are counted from 1.
 
 use super::suggest::nearest;
+use super::table::shown;
 use super::{Failure, Place, source};
 use nav_sim_signal::units::SettingError;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -85,7 +86,7 @@ impl Source {
     /// The file as its description has it.
     ///
     /// # Errors
-    /// Line and column of what is not TOML; line, key and value of what is refused, a mistyped key with the nearest legal one.
+    /// Line of what is not TOML; line, key and value of what is refused, a mistyped key with the nearest legal one.
     pub(crate) fn get<T: DeserializeOwned>(&self) -> Result<T, Failure> {
         let table = DeTable::parse(&self.text).map_err(|e| self.syntax(&e))?;
         let value = DeValue::Table(table.into_inner());
@@ -94,15 +95,12 @@ impl Source {
 
     fn syntax(&self, e: &toml::de::Error) -> Failure {
         let span = e.span().unwrap_or_default();
-        let line_start = self.text[..span.start].rfind('\n').map_or(0, |i| i + 1);
-        let column = self.text[line_start..span.start].chars().count() + 1;
-        let key = self.text.get(span.clone()).unwrap_or_default().trim();
-        let message = match e.message() {
-            "duplicate key" => format!("the key \"{key}\" is there already"),
-            other => other.to_owned(),
-        };
-        let place = Place::Character(self.line(span.start) as u64, column as u64);
-        self.at(place, message)
+        let line = self.line(span.start);
+        let written = self.text.get(span).unwrap_or_default();
+        self.at(
+            line,
+            format!("{}: {}", e.message(), shown(written.trim(), 40)),
+        )
     }
 
     /// The line (from 1) a byte stands in.

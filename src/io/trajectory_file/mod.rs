@@ -1,6 +1,7 @@
 //! Trajectory files: CSV, motion profiles (TOML), imports.
 
 use super::fusion_files::{WEEK_S, check_jump, doubt_degrees};
+use super::recordings::timing::median_step;
 use super::table::{
     self, Asked, Column, Dictionary, LATITUDE, LONGITUDE, Quantity, Table, normalised,
 };
@@ -226,21 +227,23 @@ impl Rows {
     /// Rows a minute apart are no trajectory of a vehicle, their time is in milliseconds; and one time stamp
     /// that is far off makes no trajectory of years. In long steps the curve between rows is a guess.
     fn check_steps(&mut self) -> Result<(), Error> {
-        let time = |i: usize| self.samples[i].t_s;
-        let step = |i: &usize| time(*i) - time(*i - 1);
-        let mut order: Vec<usize> = (1..self.samples.len()).collect();
-        order.sort_by(|a, b| step(a).total_cmp(&step(b)));
-        let (Some(middle), Some(&longest)) = (order.get(order.len() / 2), order.last()) else {
+        let t_s: Vec<f64> = self.samples.iter().map(|s| s.t_s).collect();
+        let step = |i: &usize| t_s[*i] - t_s[*i - 1];
+        let by_step = |a: &usize, b: &usize| step(a).total_cmp(&step(b));
+        let Some(longest) = (1..t_s.len()).max_by(by_step) else {
             return Ok(());
         };
-        let (median_s, longest_s) = (step(middle), step(&longest));
-        let (previous_s, t_s) = (time(longest - 1), time(longest));
+        let (median_s, longest_s) = (median_step(&t_s), step(&longest));
+        let [first_s, .., last_s] = t_s[..] else {
+            return Ok(());
+        };
+        let (previous_s, t_s) = (t_s[longest - 1], t_s[longest]);
         if median_s >= 50.0 {
             let message = format!("the rows are {median_s} s apart");
             let advice = "one row a second at least; is the time in milliseconds (t_ms)?";
             return Err(self.refuse(1, message, advice));
         }
-        if time(self.samples.len() - 1) - time(0) > MAX_DURATION_S {
+        if last_s - first_s > MAX_DURATION_S {
             let message =
                 format!("time goes from {previous_s} s to {t_s} s, and may span a day at most");
             let advice = "is that time stamp damaged, on another clock, or in another unit?";
@@ -937,11 +940,14 @@ impl Instants {
     }
 }
 
+/// The header of a trajectory as CSV.
+pub(crate) const HEADER: &str =
+    "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n";
+
 /// A trajectory as CSV. Positions are written with the digits that read back to them, since accelerations are their second
 /// differences; times to the nanosecond, velocities to 1e-9 m/s, angles to 1e-12 degrees.
 pub(crate) fn csv(trajectory: &Trajectory, rows: Instants) -> String {
-    let mut text =
-        "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n".to_owned();
+    let mut text = HEADER.to_owned();
     for t_s in rows.times(trajectory) {
         let state = trajectory.state(t_s);
         let (v, rpy) = (state.v_n, RollPitchYaw::from_quat(state.q_b_n));
