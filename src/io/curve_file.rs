@@ -1,7 +1,7 @@
 //! Wavelet-variance curves to fit: CSV with columns `tau_samples,wv,edof`, or the JSON that `calibrate` or `wv`
 //! writes (the classical curve of a signal is GMWM's, the robust one RGMWM's).
 
-use super::table::{Asked, Dictionary, Quantity, parse as parse_table};
+use super::table::{Dictionary, Quantity, parse as parse_table};
 use super::{Failure, Place, source};
 use crate::report::{CurvesFile, FittedCurve, SignalsFile};
 use nav_sim_signal::imu::{Axis, Sensor};
@@ -54,10 +54,10 @@ static QUANTITIES: [Quantity; 3] = [
     Quantity::number("wv", &["wv"]),
     Quantity::number("edof", &["edof"]),
 ];
-const DICTIONARY: Dictionary = Dictionary::new(&QUANTITIES, "the first line names them");
+const DICTIONARY: Dictionary<'_> = Dictionary::new(&QUANTITIES, "the first line names them");
 
 fn csv(path: &str, text: &str) -> Result<NamedCurve, Failure> {
-    let table = parse_table(path, text, &DICTIONARY, &Asked::default())?;
+    let table = parse_table(path, text, &DICTIONARY)?;
     let names = QUANTITIES.each_ref().map(|quantity| quantity.name);
     let columns = table.columns(names, &DICTIONARY)?;
     let mut curve = Curve::default();

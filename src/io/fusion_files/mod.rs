@@ -4,9 +4,7 @@
 use super::logs::LogOptions;
 use super::recordings::timing::{median_step, unit_of_step};
 use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
-use super::table::{
-    Asked, Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table,
-};
+use super::table::{Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table};
 use super::toml_file::{Between, Finite, Source};
 use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
 use chrono::{DateTime, NaiveDateTime};
@@ -139,7 +137,7 @@ const VELOCITY: [&str; 3] = ["v_n_m_s", "v_e_m_s", "v_d_m_s"];
 const VELOCITY_SIGMA: [&str; 3] = ["sd_vn_m_s", "sd_ve_m_s", "sd_vd_m_s"];
 
 /// Dictionary of fixes. Texts without a header are those of KF-GINS.
-const FIXES: Dictionary = Dictionary {
+const FIXES: Dictionary<'_> = Dictionary {
     bare: &[
         &[
             "t_s", "lat_deg", "lon_deg", "h_m", "sd_n_m", "sd_e_m", "sd_d_m",
@@ -170,7 +168,7 @@ const FIXES: Dictionary = Dictionary {
 };
 
 /// Dictionary of solutions, which have numbers that stand for none.
-const SOLUTION: Dictionary = Dictionary {
+const SOLUTION: Dictionary<'_> = Dictionary {
     is_partial: true,
     ..FIXES
 };
@@ -291,7 +289,7 @@ pub(crate) fn read_gnss(
                 let (table, said) = rtklib(&shown, &text, header, clock_s)?;
                 of_rows(&table, unsaid, vec![remark(said)])?
             } else {
-                let table = table::parse(&shown, &text, &FIXES, &Asked::default())?;
+                let table = table::parse(&shown, &text, &FIXES)?;
                 let velocity = match table.has(VELOCITY[0]) {
                     true => ", velocity",
                     false => "",
@@ -534,7 +532,7 @@ fn rtklib(
     // the difference of two numbers of 1e9 keeps 0.2 µs
     let on_clock = |t_s: f64| (1e6 * (t_s + gps_s - clock.origin_s)).round() / 1e6;
     t_s.iter_mut().for_each(|t_s| *t_s = on_clock(*t_s));
-    let mut table = table::of_columns(path, columns, lines, &SOLUTION, &Asked::default())?;
+    let mut table = table::of_columns(path, columns, lines, &SOLUTION)?;
     table.ignored.clear();
     Ok((table, format!("an RTKLIB solution, in {}", clock.name)))
 }
@@ -656,7 +654,7 @@ pub(crate) struct ImuFile {
 }
 
 /// Dictionary of recordings under way. Texts without a header are those of KF-GINS, with or without an odometer.
-const SAMPLES: Dictionary = Dictionary {
+const SAMPLES: Dictionary<'_> = Dictionary {
     bare: &[
         &[
             "t_s",
@@ -971,7 +969,7 @@ static SPEED_QUANTITIES: [Quantity; 5] = [
     ),
 ];
 
-const SPEEDS: Dictionary = Dictionary::new(
+const SPEEDS: Dictionary<'_> = Dictionary::new(
     &SPEED_QUANTITIES,
     "columns: t_s and wheel_m_s (or wheel_km_h, wheel_mph), negative in reverse",
 );
@@ -981,7 +979,7 @@ const SPEEDS: Dictionary = Dictionary::new(
 /// # Errors
 /// Whatever is wrong with it, with its line.
 pub(crate) fn read_wheel(path: &Path) -> Result<Vec<WheelSpeed>, Error> {
-    let table = table::read(path, &SPEEDS, &Asked::default())?;
+    let table = table::read(path, &SPEEDS)?;
     let [time, speed] = table.columns(["t_s", "speed"], &SPEEDS)?;
     if speed.factor.is_none() {
         return Err(table.no_unit(speed));

@@ -367,7 +367,6 @@ impl ModelFile {
     /// The worst disagreement of the model with its recordings, where a fit of it does not describe them.
     #[must_use]
     pub fn misfit(&self) -> Option<Misfit> {
-        let fits = self.provenance.as_ref()?.get("fits")?.as_array()?;
         let of_fit = |fit: &Value| {
             let number = |key| fit.get(key).and_then(Value::as_float);
             let (p_value, ratio) = (number("j_p_value"), number("worst_ratio"));
@@ -378,24 +377,22 @@ impl ModelFile {
             })
         };
         let size = |m: &Misfit| m.worst.map_or(0.0, |(ratio, _)| ratio.ln().abs());
-        fits.iter()
-            .filter_map(of_fit)
-            .max_by(|a, b| size(a).total_cmp(&size(b)))
+        let misfits = self.fits().filter_map(of_fit);
+        misfits.max_by(|a, b| size(a).total_cmp(&size(b)))
     }
 
-    /// The largest whole number of that name that the provenance has of a fit.
-    fn most_of_fits(&self, key: &str) -> Option<i64> {
-        let fits = self.provenance.as_ref()?.get("fits")?.as_array()?;
-        fits.iter()
-            .filter_map(|fit| fit.get(key)?.as_integer())
-            .max()
+    /// What the provenance has of each fit.
+    fn fits(&self) -> impl Iterator<Item = &Value> {
+        let fits = self.provenance.as_ref().and_then(|all| all.get("fits"));
+        fits.and_then(Value::as_array).into_iter().flatten()
     }
 
     /// The longest averaging time (s) that the calibration saw: half its longest scale.
     pub(crate) fn observed_s(&self) -> Option<f64> {
         let scales = self
-            .most_of_fits("scales")
-            .filter(|n| (1..63).contains(n))?;
+            .fits()
+            .filter_map(|fit| fit.get("scales")?.as_integer());
+        let scales = scales.max().filter(|n| (1..63).contains(n))?;
         Some((scales as f64 - 1.0).exp2() / self.model.rate_hz)
     }
 }

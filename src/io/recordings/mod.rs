@@ -6,8 +6,8 @@
 
 use super::logs::LogOptions;
 use super::table::{
-    ACCELERATION, ANGLE, ANGULAR_RATE, Asked, Bare, Column, Dictionary, NO_COLUMN, Quantity, TIME,
-    Table, Units, is_oxts, unreadable,
+    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, Column, Dictionary, NO_COLUMN, Quantity, TIME, Table,
+    Units, is_oxts, unreadable,
 };
 use super::{Failure, Place, help, table};
 use crate::report::six_digits;
@@ -24,7 +24,7 @@ use timing::Timing;
 pub(crate) mod timing;
 
 /// How recordings are read.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct ReadOptions {
     /// Sample rate (Hz) for files without a time column; where there is one, it must agree within 1 %, and wins where
     /// gaps are ignored.
@@ -41,20 +41,6 @@ pub struct ReadOptions {
     pub log: LogOptions,
     /// Fewest samples a recording must have (at least 2).
     pub min_samples: usize,
-}
-
-impl Default for ReadOptions {
-    fn default() -> Self {
-        Self {
-            rate_hz: None,
-            skip_s: 0.0,
-            gaps: Gaps::default(),
-            channels: None,
-            columns: None,
-            log: LogOptions::default(),
-            min_samples: 2,
-        }
-    }
 }
 
 /// What to do where a time step is over 1.5 or under 0.5 of the median step.
@@ -208,13 +194,13 @@ const SIX: [&str; 6] = [
 const SEVEN: [&str; 7] = ["t_s", SIX[0], SIX[1], SIX[2], SIX[3], SIX[4], SIX[5]];
 
 /// Dictionary of recordings.
-pub(crate) const DICTIONARY: Dictionary = Dictionary {
-    quantities: QUANTITIES.as_flattened(),
-    bare: &[],
+pub(crate) const DICTIONARY: Dictionary<'_> = Dictionary {
     array: &[&SIX, &SEVEN],
-    is_partial: false,
-    advice: "name the columns t_s, accel_x_m_s2 … gyro_z_rad_s (also _g, _mg, _deg_s, _deg_h; t_ms, t_us, t_ns)",
     bad_cell: "remove the line, or record again: a sample that is made up would change the noise",
+    ..Dictionary::new(
+        QUANTITIES.as_flattened(),
+        "name the columns t_s, accel_x_m_s2 … gyro_z_rad_s (also _g, _mg, _deg_s, _deg_h; t_ms, t_us, t_ns)",
+    )
 };
 
 /// The name of a channel's column in files of this program.
@@ -235,19 +221,20 @@ fn channel_of(column: &Column) -> Option<Channel> {
 pub(crate) fn load(
     path: &Path,
     options: &ReadOptions,
-    dictionary: &Dictionary,
+    dictionary: &Dictionary<'_>,
 ) -> Result<Table, Failure> {
     let wanted = options.channels.as_ref();
     let is_unwanted = |q: &Quantity| {
         let own = Channel::named(q.name);
         !q.axis.is_empty() && wanted.is_some_and(|w| !own.iter().any(|c| w.contains(c)))
     };
-    let asked = Asked {
+    let dictionary = &Dictionary {
         names: options.columns.as_deref(),
         unwanted: Some(&is_unwanted),
-        log: options.log.clone(),
+        log: Some(&options.log),
+        ..*dictionary
     };
-    let table = table::read(path, dictionary, &asked)?;
+    let table = table::read(path, dictionary)?;
     let is_gyro = |c: &&Column| c.factor.is_none() && c.quantity.name.starts_with("gyro");
     if let Some(column) = table.columns.iter().find(is_gyro) {
         return Err(table.no_unit(column));

@@ -1,6 +1,6 @@
 //! Tables of numbers in files of any kind, and the dictionaries that say which quantities their columns hold.
 //!
-//! A reader is `read(path, &DICTIONARY, &asked)`: columns with a factor to SI and the line of each row.
+//! A reader is `read(path, &DICTIONARY)`: columns with a factor to SI and the line of each row.
 
 use super::suggest::nearest;
 use super::{Failure, Place, help, logs, source};
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 mod quantity;
 
 /// Quantities of a kind of table, and words for what is refused.
-pub(crate) struct Dictionary {
+pub(crate) struct Dictionary<'a> {
     /// Quantities; of several columns of one with a rank, the first by rank is taken.
     pub(crate) quantities: &'static [Quantity],
     /// Names of the columns of texts without a header, by their number.
@@ -33,9 +33,15 @@ pub(crate) struct Dictionary {
     pub(crate) advice: &'static str,
     /// Advice where a cell is refused.
     pub(crate) bad_cell: &'static str,
+    /// Names of the columns, in place of a header or where there is none.
+    pub(crate) names: Option<&'a [String]>,
+    /// Quantities that are not wanted: neither parsed nor checked.
+    pub(crate) unwanted: Option<&'a (dyn Fn(&Quantity) -> bool + Sync)>,
+    /// Choice within a log.
+    pub(crate) log: Option<&'a logs::LogOptions>,
 }
 
-impl Dictionary {
+impl Dictionary<'_> {
     /// Finite numbers in named columns.
     pub(crate) const fn new(quantities: &'static [Quantity], advice: &'static str) -> Self {
         Self {
@@ -45,19 +51,11 @@ impl Dictionary {
             is_partial: false,
             advice,
             bad_cell: "",
+            names: None,
+            unwanted: None,
+            log: None,
         }
     }
-}
-
-/// Choices of who reads a table.
-#[derive(Default)]
-pub(crate) struct Asked<'a> {
-    /// Names of the columns, in place of a header or where there is none.
-    pub(crate) names: Option<&'a [String]>,
-    /// Quantities that are not wanted: neither parsed nor checked.
-    pub(crate) unwanted: Option<&'a (dyn Fn(&Quantity) -> bool + Sync)>,
-    /// Choice within a log.
-    pub(crate) log: logs::LogOptions,
 }
 
 /// Columns of a file, before anything is decided about time and units.
@@ -93,6 +91,8 @@ pub(crate) struct Column {
     pub(crate) factor: Option<f64>,
     /// Numbers as they stand in the file.
     pub(crate) values: Vec<f64>,
+    /// Its place among the columns of the file.
+    place: usize,
 }
 
 impl Column {
@@ -106,17 +106,13 @@ impl Column {
 ///
 /// # Errors
 /// When the file cannot be read, names no column that is known, or has a cell that is no number.
-pub(crate) fn read(
-    path: &Path,
-    dictionary: &Dictionary,
-    asked: &Asked<'_>,
-) -> Result<Table, Failure> {
+pub(crate) fn read(path: &Path, dictionary: &Dictionary<'_>) -> Result<Table, Failure> {
     let ends_in = |ending: &str| {
         path.extension()
             .is_some_and(|e| e.eq_ignore_ascii_case(ending))
     };
     let name = path.display().to_string();
-    let of = |columns| of_columns(&name, columns, vec![], dictionary, asked);
+    let of = |columns| of_columns(&name, columns, vec![], dictionary);
     let table = match logs::kind_of(path) {
         #[cfg(feature = "npz")]
         Some(LogKind::Npz) => {
@@ -126,8 +122,8 @@ pub(crate) fn read(
                 ..of(columns)?
             })
         }
-        Some(_) => log(path, asked, &of),
-        None if ends_in("npy") => of(npy(path, dictionary, asked)?),
+        Some(_) => log(path, dictionary.log, &of),
+        None if ends_in("npy") => of(npy(path, dictionary)?),
         #[cfg(feature = "parquet")]
         None if ends_in("parquet") => of(parquet(path)?),
         #[cfg(not(feature = "parquet"))]
@@ -145,7 +141,7 @@ pub(crate) fn read(
         }
         None => {
             let reader = source::table(path).map_err(|e| unreadable(path, e))?;
-            read_text(&name, reader, dictionary, asked)
+            read_text(&name, reader, dictionary)
         }
     }?;
     table.filled()
@@ -155,14 +151,9 @@ pub(crate) fn read(
 ///
 /// # Errors
 /// Those of [`read`].
-pub(crate) fn parse(
-    name: &str,
-    text: &str,
-    dictionary: &Dictionary,
-    asked: &Asked<'_>,
-) -> Result<Table, Failure> {
+pub(crate) fn parse(name: &str, text: &str, dictionary: &Dictionary<'_>) -> Result<Table, Failure> {
     let reader = Box::new(Cursor::new(text.to_owned()));
-    read_text(name, reader, dictionary, asked)?.filled()
+    read_text(name, reader, dictionary)?.filled()
 }
 
 /// Error of the system on a table, with a hint.
@@ -212,17 +203,15 @@ impl Table {
         path: &str,
         header_line: u64,
         names: &[String],
-        dictionary: &Dictionary,
-        asked: &Asked<'_>,
+        dictionary: &Dictionary<'_>,
         is_si: bool,
-    ) -> Result<(Self, Vec<Option<usize>>), Failure> {
+    ) -> Result<Self, Failure> {
         let mut table = Self {
             path: path.to_owned(),
             header_line,
             ..Self::default()
         };
-        let unwanted = |quantity: &Quantity| asked.unwanted.is_some_and(|is| is(quantity));
-        let mut places: Vec<usize> = Vec::new();
+        let unwanted = |quantity: &Quantity| dictionary.unwanted.is_some_and(|is| is(quantity));
         for (place, name) in names.iter().enumerate() {
             let name = name.trim().to_owned();
             match quantity::find(dictionary.quantities, &name) {
@@ -231,25 +220,24 @@ impl Table {
                     let values = Vec::new();
                     let is_signal = quantity.rank.is_none();
                     let factor = factor.or((is_si && is_signal).then_some(1.0));
-                    places.push(place);
                     table.columns.push(Column {
                         name,
                         quantity,
                         factor,
                         values,
+                        place,
                     });
                 }
                 None => table.ignored.push(name),
             }
         }
-        table.choose(&mut places)?;
-        table.no_unknown_unit(dictionary, asked)?;
-        let of_place = |place| places.iter().position(|p| *p == place);
-        Ok((table, (0..names.len()).map(of_place).collect()))
+        table.choose()?;
+        table.no_unknown_unit(dictionary)?;
+        Ok(table)
     }
 
     /// Keeps one column of each quantity.
-    fn choose(&mut self, places: &mut Vec<usize>) -> Result<(), Failure> {
+    fn choose(&mut self) -> Result<(), Failure> {
         let rank = |c: &Column| c.quantity.rank.map(|rank| (rank, c.factor.is_none()));
         let mut k = 1;
         while k < self.columns.len() {
@@ -268,20 +256,19 @@ impl Table {
                 return Err(self.refused(message).or_hint("remove one of them"));
             };
             let out = if second < first { i } else { k };
-            places.remove(out);
             self.ignored.push(self.columns.remove(out).name);
         }
         Ok(())
     }
 
     /// A column that is an axis by its name, but in a unit that is not known, must not be dropped in silence.
-    fn no_unknown_unit(&self, dictionary: &Dictionary, asked: &Asked<'_>) -> Result<(), Failure> {
+    fn no_unknown_unit(&self, dictionary: &Dictionary<'_>) -> Result<(), Failure> {
         for name in &self.ignored {
             let plain = normalised(name);
             let is_meant = |q: &&Quantity| {
                 q.is_in_unknown_unit(&plain)
                     && !self.has(q.name)
-                    && !asked.unwanted.is_some_and(|is| is(q))
+                    && !dictionary.unwanted.is_some_and(|is| is(q))
             };
             if let Some(quantity) = dictionary.quantities.iter().find(is_meant) {
                 let problem = "is in a unit that is not known";
@@ -315,7 +302,7 @@ impl Table {
         value: f64,
         written: Option<&[u8]>,
         line: u64,
-        dictionary: &Dictionary,
+        dictionary: &Dictionary<'_>,
     ) -> Result<(), Failure> {
         let own = &mut self.columns[column];
         let si = value * own.factor.unwrap_or(1.0);
@@ -347,7 +334,7 @@ impl Table {
         line: u64,
         value: &str,
         reason: &str,
-        dictionary: &Dictionary,
+        dictionary: &Dictionary<'_>,
     ) -> Failure {
         let error = Failure::cell(&self.path, line, column, value, reason);
         let point = value.trim_matches('"').replacen(',', ".", 1);
@@ -451,7 +438,7 @@ impl Table {
     pub(crate) fn require<'a>(
         &self,
         needed: impl IntoIterator<Item = &'a str>,
-        dictionary: &Dictionary,
+        dictionary: &Dictionary<'_>,
     ) -> Result<(), Failure> {
         let missing: Vec<&str> = needed.into_iter().filter(|q| !self.has(q)).collect();
         let slip = |name: &String| Some((name.clone(), nearest(name, missing.iter().copied())?));
@@ -475,7 +462,7 @@ impl Table {
     pub(crate) fn columns<const N: usize>(
         &self,
         needed: [&str; N],
-        dictionary: &Dictionary,
+        dictionary: &Dictionary<'_>,
     ) -> Result<[&Column; N], Failure> {
         self.require(needed, dictionary)?;
         self.all(needed)
@@ -507,26 +494,18 @@ const BUFFER: usize = 1 << 17;
 fn read_text(
     path: &str,
     mut reader: Reader,
-    dictionary: &Dictionary,
-    asked: &Asked<'_>,
+    dictionary: &Dictionary<'_>,
 ) -> Result<Table, Failure> {
-    let head = Head::read(path, &mut reader, dictionary, asked)?;
-    let (mut table, places) = Table::new(
-        path,
-        head.line,
-        &head.names,
-        dictionary,
-        asked,
-        head.is_xsens,
-    )?;
+    let head = Head::read(path, &mut reader, dictionary)?;
+    let mut table = Table::new(path, head.line, &head.names, dictionary, head.is_xsens)?;
     table.rate_hz = head.rate_hz.map(|rate_hz| (rate_hz, "head of the file"));
     table.is_bare = head.is_bare;
-    if head.is_latin_1 && asked.names.is_none() {
+    if head.is_latin_1 && dictionary.names.is_none() {
         let text = "header not in UTF-8, taken as ISO-8859-1";
         table.assumptions.push(text.to_owned());
     }
     if !table.columns.is_empty() {
-        head.rows(&mut table, reader, &places, dictionary)?;
+        head.rows(&mut table, reader, dictionary)?;
     }
     table.comments = head.comments;
     Ok(table)
@@ -553,12 +532,7 @@ struct Head {
 }
 
 impl Head {
-    fn read(
-        path: &str,
-        reader: &mut Reader,
-        dictionary: &Dictionary,
-        asked: &Asked<'_>,
-    ) -> Result<Self, Failure> {
+    fn read(path: &str, reader: &mut Reader, dictionary: &Dictionary<'_>) -> Result<Self, Failure> {
         let mut head = Self {
             delimiter: b',',
             ..Self::default()
@@ -624,16 +598,16 @@ impl Head {
                     (head.line, head.names) = (line, names);
                     return Ok(head);
                 }
-                head.is_bare = asked.names.is_none();
-                head.names = asked
+                head.is_bare = dictionary.names.is_none();
+                head.names = dictionary
                     .names
                     .map(<[String]>::to_vec)
                     .or_else(|| layout(dictionary.bare, cells.len()))
                     .ok_or_else(|| no_header(path, line, text, dictionary))?;
                 return Ok(head);
             }
-            let names = asked.names.map_or(cells, <[String]>::to_vec);
-            if known > 0 || asked.names.is_some() {
+            let names = dictionary.names.map_or(cells, <[String]>::to_vec);
+            if known > 0 || dictionary.names.is_some() {
                 head.names = names;
                 return Ok(head);
             }
@@ -647,8 +621,7 @@ impl Head {
         &self,
         table: &mut Table,
         reader: Reader,
-        places: &[Option<usize>],
-        dictionary: &Dictionary,
+        dictionary: &Dictionary<'_>,
     ) -> Result<(), Failure> {
         let path = table.path.clone();
         let rows = Cursor::new(self.first_row.clone()).chain(reader);
@@ -670,7 +643,7 @@ impl Head {
         let length = std::fs::metadata(&path).map_or(0, |m| m.len());
         let cannot = |e| unreadable(Path::new(&path), of_csv(e));
         let (mut record, mut row, mut has_units) = (csv::ByteRecord::new(), 0, false);
-        let expected = places.len();
+        let expected = self.names.len();
         while rows.read_byte_record(&mut record).map_err(cannot)? {
             let line = self.before + line_of(&record, rows.position().line());
             let found = record.len();
@@ -699,16 +672,13 @@ impl Head {
                 let all = (row as u64).saturating_mul(length) / rows.position().byte().max(1);
                 table.fits(all.max((row + BETWEEN) as u64))?;
             }
-            for (cell, column) in record.iter().zip(places) {
-                let Some(column) = *column else { continue };
-                let value = match number(cell, self.delimiter) {
-                    Some(value) => value,
-                    None => {
-                        let value = shown(&String::from_utf8_lossy(cell.trim_ascii()), 40);
-                        let (value, reason) = (format!("\"{value}\""), "is not a number");
-                        let name = &table.columns[column].name;
-                        return Err(table.bad_cell(name, line, &value, reason, dictionary));
-                    }
+            for column in 0..table.columns.len() {
+                let cell = record.get(table.columns[column].place).unwrap_or_default();
+                let Some(value) = number(cell, self.delimiter) else {
+                    let value = shown(&String::from_utf8_lossy(cell.trim_ascii()), 40);
+                    let (value, reason) = (format!("\"{value}\""), "is not a number");
+                    let name = &table.columns[column].name;
+                    return Err(table.bad_cell(name, line, &value, reason, dictionary));
                 };
                 table.push(column, value, Some(cell), line, dictionary)?;
             }
@@ -725,7 +695,7 @@ fn layout(layouts: &[&[&str]], columns: usize) -> Option<Vec<String>> {
     Some(found.iter().map(|name| (*name).to_owned()).collect())
 }
 
-fn no_header(path: &str, line: u64, text: &str, dictionary: &Dictionary) -> Failure {
+fn no_header(path: &str, line: u64, text: &str, dictionary: &Dictionary<'_>) -> Failure {
     let found = shown(text, 60);
     let message = format!("a header that names the columns is missing, found \"{found}\"");
     Failure::contents(path, line, message)
@@ -746,7 +716,7 @@ fn rate_in(comment: &str) -> Option<f64> {
 
 /// The separator of the cells of a line: of equals the last. Blanks do only where nothing else does and they are not inside
 /// one name.
-fn delimiter_of(line: &str, dictionary: &Dictionary) -> u8 {
+fn delimiter_of(line: &str, dictionary: &Dictionary<'_>) -> u8 {
     let count = |d: u8| line.bytes().filter(|b| *b == d).count();
     let most = [b',', b';', b'\t'].into_iter().max_by_key(|d| count(*d));
     let is_spaced = count(b' ') > 0 && find(dictionary.quantities, line).is_none();
@@ -873,23 +843,22 @@ pub(crate) fn of_columns(
     path: &str,
     columns: Columns,
     lines: Vec<u64>,
-    dictionary: &Dictionary,
-    asked: &Asked<'_>,
+    dictionary: &Dictionary<'_>,
 ) -> Result<Table, Failure> {
-    let names: Vec<String> = match asked.names {
+    let names: Vec<String> = match dictionary.names {
         Some(names) if names.len() != columns.len() => {
             return Err(Failure::row_length(path, 1, columns.len(), names.len()));
         }
         Some(names) => names.to_vec(),
         None => columns.iter().map(|(name, _)| name.clone()).collect(),
     };
-    let (mut table, places) = Table::new(path, 0, &names, dictionary, asked, false)?;
+    let mut table = Table::new(path, 0, &names, dictionary, false)?;
     table.lines = lines;
     table.fits(columns.first().map_or(0, |(_, values)| values.len() as u64))?;
-    for ((_, values), place) in columns.into_iter().zip(places) {
-        let Some(column) = place else { continue };
-        for (row, value) in values.into_iter().enumerate() {
-            table.push(column, value, None, table.line(row), dictionary)?;
+    for column in 0..table.columns.len() {
+        let (_, values) = &columns[table.columns[column].place];
+        for (row, value) in values.iter().enumerate() {
+            table.push(column, *value, None, table.line(row), dictionary)?;
         }
     }
     Ok(table)
@@ -907,7 +876,7 @@ fn strided(array: &Array, first: usize, step: usize) -> Vec<f64> {
 }
 
 /// Reads an array: columns named by who asks, or by their number.
-fn npy(path: &Path, dictionary: &Dictionary, asked: &Asked<'_>) -> Result<Columns, Failure> {
+fn npy(path: &Path, dictionary: &Dictionary<'_>) -> Result<Columns, Failure> {
     let array = npy::read(path).map_err(|e| logs::refused(path, e))?;
     let refused = |message: String| Failure::contents(path.display(), Place::Within, message);
     let count = match array.shape[..] {
@@ -920,7 +889,7 @@ fn npy(path: &Path, dictionary: &Dictionary, asked: &Asked<'_>) -> Result<Column
             )));
         }
     };
-    let named = asked.names.map(|_| vec![String::new(); count]);
+    let named = dictionary.names.map(|_| vec![String::new(); count]);
     let names = named.or_else(|| layout(dictionary.array, count));
     let names = names.ok_or_else(|| {
         refused(format!(
@@ -1082,14 +1051,22 @@ fn oxts_times(path: &Path) -> Result<Vec<f64>, Failure> {
 /// Reads the samples of the IMU of a log.
 fn log(
     path: &Path,
-    asked: &Asked<'_>,
+    options: Option<&logs::LogOptions>,
     of: &dyn Fn(Columns) -> Result<Table, Failure>,
 ) -> Result<Table, Failure> {
     let refused = |e| logs::refused(path, e);
     let log = logs::open(path)?;
-    let channel = log.channel(Content::Imu, asked.log.topic.as_deref());
+    let channel = log.channel(
+        Content::Imu,
+        options.and_then(|options| options.topic.as_deref()),
+    );
     let channel = channel.map_err(refused)?;
-    let samples = log.imu(channel, asked.log.stamp).map_err(refused)?;
+    let samples = log
+        .imu(
+            channel,
+            options.map(|options| options.stamp).unwrap_or_default(),
+        )
+        .map_err(refused)?;
     let times = samples.iter().map(|sample| in_seconds(sample.stamp_ns));
     let mut columns = vec![("t_s".to_owned(), times.collect())];
     for (k, (name, _)) in OXTS.iter().enumerate() {

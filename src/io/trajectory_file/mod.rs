@@ -2,9 +2,7 @@
 
 use super::fusion_files::{WEEK_S, check_jump, doubt_degrees};
 use super::recordings::timing::median_step;
-use super::table::{
-    self, Asked, Column, Dictionary, LATITUDE, LONGITUDE, Quantity, Table, normalised,
-};
+use super::table::{self, Column, Dictionary, LATITUDE, LONGITUDE, Quantity, Table, normalised};
 use super::{Failure, Failure as Error, Place, source};
 use crate::parse;
 use chrono::{DateTime, Utc};
@@ -140,7 +138,7 @@ const D: Quantity = Quantity::length("d_m", &["d", "down"]).with_unit();
 const V_D: Quantity = Quantity::speed("v_d_m_s", &["v_d", "vd", "v_down"]).with_unit();
 
 /// Dictionary of trajectories.
-const DICTIONARY: Dictionary = Dictionary {
+const DICTIONARY: Dictionary<'_> = Dictionary {
     bad_cell: "degrees: latitude within ±89.9, longitude and yaw in (−180, 180] or [0, 360), pitch within ±90",
     ..Dictionary::new(
         &QUANTITIES,
@@ -282,7 +280,7 @@ fn rows(
         },
         ..DICTIONARY
     };
-    let mut table = table::parse(path, text, &dictionary, &Asked::default())?;
+    let mut table = table::parse(path, text, &dictionary)?;
     let has = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
     let is_enu = table.has("qw");
     let is_local = is_enu || has(LOCAL) && !table.has("lat_deg");
