@@ -307,7 +307,7 @@ fn bad_fixes_are_refused_by_line_and_value() {
         gnss,
         cell(7, 1, "6.5"),
         "",
-        &["line 7: the fix is", "swapped"],
+        &["line 7: position jumps by 4343682 m in 1 s", "swapped"],
     );
     refused(
         gnss,

@@ -343,7 +343,11 @@ impl Table {
         }
         let is_time = value.matches(':').count() > 1;
         let time = "write the time in seconds, from any instant on, and name the column t_s";
-        error.or_hint(if is_time { time } else { dictionary.bad_cell })
+        match (is_time, dictionary.bad_cell) {
+            (true, _) => error.or_hint(time),
+            (false, "") => error,
+            (false, advice) => error.or_hint(advice),
+        }
     }
 
     /// Refuses a table without rows, or whose rows end before others.

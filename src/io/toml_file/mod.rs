@@ -96,11 +96,9 @@ impl Source {
     fn syntax(&self, e: &toml::de::Error) -> Failure {
         let span = e.span().unwrap_or_default();
         let line = self.line(span.start);
-        let written = self.text.get(span).unwrap_or_default();
-        self.at(
-            line,
-            format!("{}: {}", e.message(), shown(written.trim(), 40)),
-        )
+        let written = self.text.get(span).unwrap_or_default().trim();
+        let written = shown(written, 40);
+        self.at(line, format!("{}: \"{written}\"", e.message()))
     }
 
     /// The line (from 1) a byte stands in.

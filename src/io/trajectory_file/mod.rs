@@ -139,7 +139,7 @@ const V_D: Quantity = Quantity::speed("v_d_m_s", &["v_d", "vd", "v_down"]).with_
 
 /// Dictionary of trajectories.
 const DICTIONARY: Dictionary<'_> = Dictionary {
-    bad_cell: "degrees: latitude within ±89.9, longitude and yaw in (−180, 180] or [0, 360), pitch within ±90",
+    bad_cell: "write numbers; angles are in degrees: latitude within ±89.9, longitude and yaw in (−180, 180] or [0, 360), pitch within ±90",
     ..Dictionary::new(
         &QUANTITIES,
         "a trajectory has the columns t_s, lat_deg, lon_deg, h_m (or n_m, e_m, d_m) and may have roll_deg, pitch_deg, yaw_deg",
