@@ -64,8 +64,6 @@ pub(crate) enum Place {
     Itself,
     /// A line, from 1.
     Line(u64),
-    /// Line and column, from 1.
-    Character(u64, u64),
     /// A part that is no line: which.
     Part(String),
 }
@@ -167,10 +165,6 @@ impl Failure {
             Place::Within => (format!("{path}: {message}"), None),
             Place::Itself => (format!("{path} {message}"), None),
             Place::Line(line) => (format!("{path}, line {line}: {message}"), Some(line)),
-            Place::Character(line, column) => {
-                let message = format!("{path}, line {line}, column {column}: {message}");
-                (message, Some(line))
-            }
             Place::Part(part) => (format!("{path}, {part}: {message}"), None),
         };
         Self {

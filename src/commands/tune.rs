@@ -258,7 +258,7 @@ fn draws(path: &Path, file: &ModelFile, rate_hz: f64, seed: u64) -> Result<Draws
             draws_file::beside(path).display()
         )
     };
-    let found = draws_file::of_recordings(path, file, rate_hz, seed)
+    let found = draws_file::usable(path, file, rate_hz, Some(seed))
         .and_then(|draws| draws.ok_or_else(missing));
     found.map_err(|doubt| {
         Failure::input(doubt)

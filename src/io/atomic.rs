@@ -5,6 +5,7 @@
 //! A file takes the place of an earlier result.
 //! A directory takes the place of the same run; `--force` is for one of another configuration, inputs or seed.
 
+use super::trajectory_file::HEADER;
 use super::{Failure, Place, help, source};
 use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
@@ -506,8 +507,8 @@ pub(crate) fn claim_directory<'a>(
     let last = directory.join(files.last().map_or("", AsRef::as_ref));
     let found = match fs::read_to_string(&last) {
         // killed where it put its files in place
-        Err(_) if claim.is_left => Found::Same,
-        Err(_) => empty_or_new(directory),
+        Err(_) if claim.is_left || is_empty(directory) => Found::Same,
+        Err(_) => Found::Foreign,
         Ok(text) => recognise(&text),
     };
     match found {
@@ -521,60 +522,42 @@ pub(crate) fn claim_directory<'a>(
     }
 }
 
-/// Files of the same names would be lost in a directory that holds anything.
-fn empty_or_new(directory: &Path) -> Found {
-    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
-    let mut names = entries.map(|entry| entry.file_name());
-    match names.any(|name| !name.to_string_lossy().starts_with('.')) {
-        true => Found::Foreign,
-        false => Found::Same,
-    }
+/// True of a directory that is not there, or holds nothing: files of the same names would be lost.
+fn is_empty(directory: &Path) -> bool {
+    let mut entries = fs::read_dir(directory).into_iter().flatten().flatten();
+    entries.all(|entry| entry.file_name().to_string_lossy().starts_with('.'))
 }
 
-/// Texts that tell files of nav-sim, by the ending of their kind: models, exports, pages, pictures, studies.
-const MARKS: [(&str, &str); 6] = [
-    (".toml", "program = \"nav-sim "),
-    (".txt", "(nav-sim export)"),
-    (".html", "<meta name=\"generator\" content=\"nav-sim\">"),
-    (".svg", "class=\"chart wide\""),
+/// Texts without blanks that tell files of nav-sim, by the ending of their kind: models, exports, pages, pictures, studies,
+/// comparisons, curves.
+const MARKS: [(&str, &str); 9] = [
+    (".toml", "program=\"nav-sim"),
+    (".txt", "(nav-simexport)"),
+    (".html", "<metaname=\"generator\"content=\"nav-sim\">"),
+    (".svg", "class=\"chartwide\""),
     (".png", "Software\0nav-sim"),
     (
         "results.csv",
         ",method,filter,runs,diverged,outage,start_s,end_s,",
     ),
-];
-/// How studies, comparisons and curves begin, without blanks.
-const JSON: [(&str, &str); 3] = [
     ("summary.json", "{\"schema_version\":1,\"complete\""),
     ("comparison.json", "{\"schema_version\":1,\"reference\""),
     (".json", "{\"schema_version\":1,\"rate_hz\""),
 ];
-const TRAJECTORY: &str =
-    "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n";
 
 /// True of a text of this kind that nav-sim wrote, and of an empty one. Other programs write tables with the same header,
 /// but not each number in its shortest form.
 fn is_own(text: &str, kind: &str) -> bool {
     let is_shortest = |cell: &str| cell.parse::<f64>().is_ok_and(|x| x.to_string() == cell);
-    let mut rows = text
-        .strip_prefix(TRAJECTORY)
-        .filter(|_| kind.ends_with("trajectory.csv"))
-        .into_iter()
-        .flat_map(str::lines);
-    let is_kind = |(ending, _): &&(&str, &str)| kind.ends_with(ending);
-    let start: String = text.split_whitespace().take(4).collect();
+    let rows = text
+        .strip_prefix(HEADER)
+        .filter(|_| kind.ends_with("trajectory.csv"));
+    let first = rows.and_then(|rows| rows.lines().next());
+    let mark = MARKS.iter().find(|(ending, _)| kind.ends_with(ending));
+    let is_marked = |mark: &str| text.split_whitespace().collect::<String>().contains(mark);
     text.is_empty()
-        || JSON
-            .iter()
-            .find(is_kind)
-            .is_some_and(|(_, json)| start.starts_with(json))
-        || MARKS
-            .iter()
-            .find(is_kind)
-            .is_some_and(|(_, mark)| text.contains(mark))
-        || rows
-            .next()
-            .is_some_and(|row| row.split(',').all(is_shortest))
+        || mark.is_some_and(|(_, mark)| is_marked(mark))
+        || first.is_some_and(|row| row.split(',').all(is_shortest))
 }
 
 /// True of a file that a manifest beside it tells of: the result would no longer be whole.

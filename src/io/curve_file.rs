@@ -1,12 +1,11 @@
 //! Wavelet-variance curves to fit: CSV with columns `tau_samples,wv,edof`, or the JSON that `calibrate` or `wv`
 //! writes (the classical curve of a signal is GMWM's, the robust one RGMWM's).
 
-use super::table::{Asked, Dictionary, Quantity, parse as parse_table};
+use super::table::{Dictionary, Quantity, parse as parse_table};
 use super::{Failure, Place, source};
 use crate::report::{CurvesFile, FittedCurve, SignalsFile};
 use nav_sim_signal::imu::{Axis, Sensor};
 use nav_sim_signal::wavelet::{Curve, QuantizationResponse, Tuning};
-use std::fmt::Display;
 use std::path::Path;
 
 /// A curve and what it is of.
@@ -28,32 +27,13 @@ pub(crate) struct NamedCurve {
 const LAYOUT: &str = "a curve is a CSV with the columns tau_samples,wv,edof (tau_samples = 2, 4, 8, …), or a .wv.json \
                       written by calibrate or wv";
 
-/// A part of a file, for what is refused in it.
-struct Part<'a> {
-    path: &'a str,
-    place: Place,
-}
-
-impl Part<'_> {
-    /// Refuses a value of a column or key that means nothing.
-    fn refused<T>(&self, column: &str, value: impl Display, expected: &str) -> Result<T, Failure> {
-        let message = format!("{column} = {value} is not {expected}");
-        Err(Failure::contents(self.path, self.place.clone(), message))
-    }
-}
-
 /// Reads the curves of a file.
 ///
 /// # Errors
 /// When it cannot be read, or is no curve file.
 pub(crate) fn read(path: &Path) -> Result<Vec<NamedCurve>, Failure> {
-    let text = source::text(path).map_err(|e| Failure::io(path, e));
-    let curves = text.and_then(|text| parse(&path.display().to_string(), &text));
-    // what the system refuses is no matter of the layout
-    curves.map_err(|e| match e.code() {
-        1 => e,
-        _ => e.or_hint(LAYOUT),
-    })
+    let text = source::text(path).map_err(|e| Failure::io(path, e))?;
+    parse(&path.display().to_string(), &text).map_err(|e| e.or_hint(LAYOUT))
 }
 
 fn parse(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
@@ -74,17 +54,16 @@ static QUANTITIES: [Quantity; 3] = [
     Quantity::number("wv", &["wv"]),
     Quantity::number("edof", &["edof"]),
 ];
-const DICTIONARY: Dictionary = Dictionary::new(&QUANTITIES, "the first line names them");
+const DICTIONARY: Dictionary<'_> = Dictionary::new(&QUANTITIES, "the first line names them");
 
 fn csv(path: &str, text: &str) -> Result<NamedCurve, Failure> {
-    let table = parse_table(path, text, &DICTIONARY, &Asked::default())?;
+    let table = parse_table(path, text, &DICTIONARY)?;
     let names = QUANTITIES.each_ref().map(|quantity| quantity.name);
     let columns = table.columns(names, &DICTIONARY)?;
     let mut curve = Curve::default();
     for row in 0..table.rows() {
-        let place = Place::Line(table.line(row));
-        let point = columns.map(|column| column.si(row));
-        push(&mut curve, &Part { path, place }, point)?;
+        push(&mut curve, columns.map(|column| column.si(row)))
+            .map_err(|message| Failure::contents(path, table.line(row), message))?;
     }
     Ok(NamedCurve {
         sensor: None,
@@ -107,47 +86,50 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
         .map_err(syntax)?
         .signals
         .is_some();
-    let part = |name: String| Part {
-        path,
-        place: Place::Part(name),
-    };
-    let head = part("head".to_owned());
+    let refused =
+        |part: String, message: String| Failure::contents(path, Place::Part(part), message);
+    let of_head = |message| refused("head".to_owned(), message);
     let file = if is_of_wv {
         let file: SignalsFile = serde_json::from_str(text).map_err(syntax)?;
-        quantization(&head, Some(file.efficiency))?;
+        quantization(Some(file.efficiency)).map_err(of_head)?;
         CurvesFile::from(file)
     } else {
         serde_json::from_str(text).map_err(syntax)?
     };
     let (version, rate_hz) = (file.schema_version, file.rate_hz);
     if version != 1 {
-        return head.refused("schema_version", version, "1, which this version reads");
+        let message = format!("schema_version = {version} is not 1, which this version reads");
+        return Err(of_head(message));
     }
     if !(rate_hz.is_finite() && rate_hz > 0.0) {
-        return head.refused("rate_hz", rate_hz, "a finite number > 0");
+        return Err(of_head(format!(
+            "rate_hz = {rate_hz} is not a finite number > 0"
+        )));
     }
     let named = |(number, entry): (usize, &FittedCurve)| {
         let name = format!("curve {number}");
+        let of_curve = |message| refused(name.clone(), message);
         let (tau, wv, edof) = (entry.tau_s.len(), entry.wv.len(), entry.edof.len());
         if tau != wv || tau != edof {
-            let message = format!(
-                "{name} has {tau} scales, {wv} wavelet variances and {edof} degrees of freedom"
-            );
-            return Err(Failure::contents(path, Place::Within, message));
+            return Err(of_curve(format!(
+                "{tau} scales, {wv} wavelet variances and {edof} degrees of freedom"
+            )));
         }
-        let own = part(name.clone());
         let axis = Axis::ALL.into_iter().find(|a| a.name() == entry.axis);
         if axis.is_none() && entry.axis != "all" {
-            return own.refused("axis", &entry.axis, "x, y, z or all");
+            return Err(of_curve(format!(
+                "axis = {} is not x, y, z or all",
+                entry.axis
+            )));
         }
         let mut curve = Curve {
-            quantization: quantization(&own, entry.efficiency)?,
+            quantization: quantization(entry.efficiency).map_err(of_curve)?,
             ..Curve::default()
         };
         for i in 0..tau {
-            let scale = part(format!("{name}, scale {}", i + 1));
             let point = [entry.tau_s[i] * rate_hz, entry.wv[i], entry.edof[i]];
-            push(&mut curve, &scale, point)?;
+            push(&mut curve, point)
+                .map_err(|message| refused(format!("{name}, scale {}", i + 1), message))?;
         }
         let level = |tau_s: &f64| (tau_s * rate_hz).log2().round() as u32;
         curve.classical = entry.classical_tau_s.iter().map(level).collect();
@@ -163,38 +145,44 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
 }
 
 /// How robust variances of an efficiency read quantization noise.
-fn quantization(
-    part: &Part<'_>,
-    efficiency: Option<f64>,
-) -> Result<Option<QuantizationResponse>, Failure> {
+fn quantization(efficiency: Option<f64>) -> Result<Option<QuantizationResponse>, String> {
     let Some(efficiency) = efficiency else {
         return Ok(None);
     };
     // The efficiency in a file is the true one, which the other convention puts a little beyond the range.
-    let tuning = Tuning::new(efficiency.clamp(0.3, 0.99));
-    match tuning {
+    match Tuning::new(efficiency.clamp(0.3, 0.99)) {
         Ok(tuning) if efficiency > 0.0 && efficiency <= 1.0 => Ok(Some(*tuning.quantization())),
-        _ => part.refused("efficiency", efficiency, "a number above 0, up to 1"),
+        _ => Err(format!(
+            "efficiency = {efficiency} is not a number above 0, up to 1"
+        )),
     }
 }
 
 /// Appends a point (scale in samples, wavelet variance, degrees of freedom); scales are powers of two, ascending.
-fn push(curve: &mut Curve, part: &Part<'_>, [tau, wv, edof]: [f64; 3]) -> Result<(), Failure> {
+fn push(curve: &mut Curve, [tau, wv, edof]: [f64; 3]) -> Result<(), String> {
     let level = tau.log2().round();
     // Scales in seconds come back from a division by the rate.
     let is_power = (1.0..=62.0).contains(&level) && (tau / level.exp2() - 1.0).abs() < 1e-6;
-    if !is_power {
-        return part.refused("tau_samples", tau, "a power of two ≥ 2");
-    }
-    if curve.levels.last() >= Some(&(level as u32)) {
-        return part.refused("tau_samples", tau, "greater than the one before");
-    }
-    let is_in = |range: (f64, f64), value: f64| value >= range.0 && value <= range.1;
-    if !is_in(Curve::WV_RANGE, wv) {
-        return part.refused("wv", wv, "a number from 1e-100 to 1e100");
-    }
-    if !is_in(Curve::EDOF_RANGE, edof) {
-        return part.refused("edof", edof, "a number from 1e-15 to 1e15");
+    let is_later = curve.levels.last().is_none_or(|last| *last < level as u32);
+    let is_in = |(low, high): (f64, f64), value: f64| value >= low && value <= high;
+    let checks = [
+        (is_power, "tau_samples", tau, "a power of two ≥ 2"),
+        (is_later, "tau_samples", tau, "greater than the one before"),
+        (
+            is_in(Curve::WV_RANGE, wv),
+            "wv",
+            wv,
+            "a number from 1e-100 to 1e100",
+        ),
+        (
+            is_in(Curve::EDOF_RANGE, edof),
+            "edof",
+            edof,
+            "a number from 1e-15 to 1e15",
+        ),
+    ];
+    if let Some((_, name, value, expected)) = checks.into_iter().find(|(holds, ..)| !holds) {
+        return Err(format!("{name} = {value} is not {expected}"));
     }
     curve.levels.push(level as u32);
     curve.wv.push(wv);

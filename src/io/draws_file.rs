@@ -7,7 +7,7 @@ use super::model_file::ModelFile;
 use super::{Failure, source};
 use nav_sim_calibration::Outcome;
 use nav_sim_signal::imu::Channel;
-use nav_sim_signal::noise::{Composite, Model, Process, Spread, continuous};
+use nav_sim_signal::noise::{Composite, Model, Process, continuous};
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -56,50 +56,34 @@ pub(crate) fn beside(model: &Path) -> PathBuf {
     model.with_extension("draws.json")
 }
 
-/// The draws beside a model file, at the rate of an IMU, if there are any.
+/// The draws beside a model file, at the rate of an IMU, if there are any; with a seed those of single recordings: what is drawn
+/// about a model with a spread differs by that too.
 ///
 /// # Errors
 /// Why those that are there cannot be used, in words.
-pub(crate) fn usable(path: &Path, model: &Model, rate_hz: f64) -> Result<Option<Draws>, String> {
-    usable_as(path, model, rate_hz, &|_, model| model)
-}
-
-/// The same of single recordings: what is drawn about a model with a spread differs by that too.
-///
-/// # Errors
-/// As [`usable`].
-pub(crate) fn of_recordings(
+pub(crate) fn usable(
     path: &Path,
     file: &ModelFile,
     rate_hz: f64,
-    seed: u64,
+    seed: Option<u64>,
 ) -> Result<Option<Draws>, String> {
-    usable_as(path, &file.model, rate_hz, &|run, centre| {
-        let about = |spread: &Spread| spread.draw_about(&centre, &file.model, seed, run);
-        file.spread.as_ref().map(about).unwrap_or(centre)
-    })
-}
-
-fn usable_as(
-    path: &Path,
-    model: &Model,
-    rate_hz: f64,
-    of_recording: &dyn Fn(u64, Model) -> Model,
-) -> Result<Option<Draws>, String> {
-    let Some(file) = read(path).map_err(|e| e.to_string())? else {
+    let Some(read) = read(path).map_err(|e| e.to_string())? else {
         return Ok(None);
     };
-    let at_rate = |Draws { models, stretch }| {
-        let models = (0..).zip(models);
-        let models = models.map(|(run, model)| of_recording(run, model));
-        let models = models.map(|model| continuous::at_rate(&model, rate_hz).ok());
-        let models = models.collect::<Option<_>>()?;
-        Some(Draws { models, stretch })
+    let at_rate = |(run, centre): (u64, Model)| {
+        let model = match (&file.spread, seed) {
+            (Some(spread), Some(seed)) => spread.draw_about(&centre, &file.model, seed, run),
+            _ => centre,
+        };
+        continuous::at_rate(&model, rate_hz).ok()
     };
-    let draws = file.draws(model).and_then(at_rate);
-    draws
-        .map(Some)
-        .ok_or_else(|| format!("{} is not of {}", beside(path).display(), path.display()))
+    let draws = read.draws(&file.model).and_then(|draws| {
+        let models = (0..).zip(draws.models).map(at_rate);
+        let models = models.collect::<Option<_>>()?;
+        Some(Draws { models, ..draws })
+    });
+    let foreign = || format!("{} is not of {}", beside(path).display(), path.display());
+    draws.map(Some).ok_or_else(foreign)
 }
 
 /// The draws beside a model file; none where there is no such file.
@@ -113,19 +97,18 @@ pub fn read(model: &Path) -> Result<Option<DrawsFile>, Failure> {
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
         Err(e) => return Err(Failure::io(&path, e)),
     };
-    let refused = |line: usize, message: String| {
-        Failure::contents(path.display(), line as u64, message)
-            .or_hint("calibrate again, or remove the file")
-    };
-    let file: DrawsFile =
-        serde_json::from_str(&text).map_err(|e| refused(e.line(), e.to_string()))?;
-    match file.schema_version {
+    let read = serde_json::from_str(&text).map_err(|e| (e.line(), e.to_string()));
+    let of_version = |file: DrawsFile| match file.schema_version {
         SCHEMA_VERSION => Ok(Some(file)),
-        other => Err(refused(
+        other => Err((
             1,
             format!("\"schema_version\" is {other}; this nav-sim reads {SCHEMA_VERSION}"),
         )),
-    }
+    };
+    read.and_then(of_version).map_err(|(line, message)| {
+        Failure::contents(path.display(), line, message)
+            .or_hint("calibrate again, or remove the file")
+    })
 }
 
 fn values(composite: &Composite) -> Vec<f64> {
@@ -173,11 +156,8 @@ impl DrawsFile {
             let axis = model.axis(channel);
             let Some(signals) = self.signals.iter().find(|s| is_of(s, channel)) else {
                 // what was not calibrated is known for certain: it has no noise
-                if axis.processes.is_empty() {
-                    continue;
-                } else {
-                    return None;
-                };
+                axis.processes.is_empty().then_some(())?;
+                continue;
             };
             if signals.estimate != values(axis) {
                 return None;

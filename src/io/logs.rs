@@ -38,23 +38,20 @@ pub(crate) fn open(path: &Path) -> Result<Log, Failure> {
 /// The refusal of a log, with what helps.
 pub(crate) fn refused(path: &Path, error: Error) -> Failure {
     let hint = error.hint();
-    let shown = path.display().to_string();
-    match error {
-        Error::Io(source) => Failure::io(path, source),
-        Error::SeveralTopics { .. } | Error::NoTopic { .. } => {
-            Failure::contents(shown, Place::Within, error.to_string())
-                .or_hint("--topic NAME names one (nav-sim inspect lists them)")
+    let refusal = |place| Failure::contents(path.display(), place, &error);
+    match error.fault {
+        Fault::Topic => {
+            refusal(Place::Within).or_hint("--topic NAME names one (nav-sim inspect lists them)")
         }
-        Error::At(_, Fault::TimeBack { .. }) => {
-            Failure::contents(shown, Place::Within, error.to_string())
-                .or_option(("stamp", "--stamp log takes the times of arrival"))
+        Fault::TimeBack => {
+            refusal(Place::Within).or_option(("stamp", "--stamp log takes the times of arrival"))
         }
-        Error::NotRead(_) => {
-            let refusal = Failure::contents(shown, Place::Itself, format!("is {error}"));
-            refusal.or_hint_if(hint.map(|command| format!("convert it: {command}")))
+        Fault::NotRead(_) => {
+            Failure::contents(path.display(), Place::Itself, format!("is {error}"))
+                .or_hint_if(hint.map(|command| format!("convert it: {command}")))
         }
-        _ => Failure::contents(shown, Place::Within, error.to_string())
-            .or_hint_if(hint.map(str::to_owned)),
+        Fault::Io(source) => Failure::io(path, source),
+        _ => refusal(Place::Within).or_hint_if(hint.map(str::to_owned)),
     }
 }
 

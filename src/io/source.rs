@@ -67,8 +67,13 @@ const HEAD: u64 = 1 << 20;
 /// # Errors
 /// When the system refuses.
 pub(crate) fn head(path: &Path) -> io::Result<String> {
+    lossy(path, HEAD)
+}
+
+/// So much of a table as text.
+fn lossy(path: &Path, most: u64) -> io::Result<String> {
     let mut bytes = Vec::new();
-    table(path)?.take(HEAD).read_to_end(&mut bytes)?;
+    table(path)?.take(most).read_to_end(&mut bytes)?;
     Ok(without_mark(String::from_utf8_lossy(&bytes).into_owned()))
 }
 
@@ -95,11 +100,7 @@ impl<R: Read> Read for Unpacked<R> {
 /// # Errors
 /// When the system refuses.
 pub(crate) fn table_text(path: &Path) -> Result<String, Failure> {
-    let mut bytes = Vec::new();
-    table(path)
-        .and_then(|mut reader| reader.read_to_end(&mut bytes))
-        .map_err(|e| Failure::io(path, e))?;
-    Ok(without_mark(String::from_utf8_lossy(&bytes).into_owned()))
+    lossy(path, u64::MAX).map_err(|e| Failure::io(path, e))
 }
 
 /// A text of at most 64 MiB.

@@ -1,6 +1,6 @@
 //! Channels of a log.
 
-use crate::input::Error;
+use crate::input::{Error, Fault};
 
 /// Channel of a log.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -69,26 +69,24 @@ pub(crate) fn choose<'a>(
 ) -> Result<&'a Channel, Error> {
     let mut fitting: Vec<&Channel> = channels.iter().collect();
     fitting.retain(|c| c.content == content && c.messages > 0);
-    let topics = |fitting: &[&Channel]| fitting.iter().map(|c| c.topic.clone()).collect();
+    let topics =
+        |fitting: &[&Channel]| -> Vec<String> { fitting.iter().map(|c| c.topic.clone()).collect() };
+    let what = content.words();
     if let Some(topic) = topic {
         let named = fitting.iter().find(|c| c.topic == topic).copied();
-        return named.ok_or_else(|| Error::NoTopic {
-            what: format!("{} and the name {topic}", content.words()),
-            topics: topics(&fitting),
-        });
+        let wanted = format!("{what} and the name {topic}");
+        return named.ok_or_else(|| Error::no_topic(&wanted, &topics(&fitting)));
     }
     let rank = fitting.iter().map(|c| c.rank).min();
     fitting.retain(|c| Some(c.rank) == rank);
     match fitting[..] {
-        [] => Err(Error::NoTopic {
-            what: content.words().to_owned(),
-            topics: Vec::new(),
-        }),
+        [] => Err(Error::no_topic(what, &[])),
         [only] => Ok(only),
-        _ => Err(Error::SeveralTopics {
-            what: content.words(),
-            topics: topics(&fitting),
-        }),
+        _ => {
+            let (count, topics) = (fitting.len(), topics(&fitting).join(", "));
+            let message = format!("{count} topics have {what}: {topics}");
+            Err(Error::new(Fault::Topic, message))
+        }
     }
 }
 

@@ -65,11 +65,11 @@ fn walk(
             record => each(record, input)?,
         }
     }
-    match records.end {
-        0 => Err(Error::at(input.offset(), Fault::StillWritten)),
-        end if end > input.length() => Err(Error::at(input.offset(), Fault::StillWritten)),
-        _ => Ok(()),
+    if records.end == 0 || records.end > input.length() {
+        let message = "the end is missing: still being written, or its writer was stopped";
+        return Err(Error::at(input.offset(), Fault::Cut, message));
     }
+    Ok(())
 }
 
 /// Finds the channels of a container. Chunks stay packed where an index counts their messages and all channels are defined
@@ -148,8 +148,7 @@ impl Chunk {
     /// Unpacks it: the input stands at its first byte.
     pub(crate) fn open(&self, input: &mut Input) -> Result<Input, Error> {
         if self.unpacked > LARGEST_CHUNK {
-            let (bytes, limit) = (self.unpacked, LARGEST_CHUNK);
-            return Err(Error::at(self.offset, Fault::TooLarge { bytes, limit }));
+            return Err(Error::too_large(self.offset, self.unpacked, LARGEST_CHUNK));
         }
         let packed = input.bytes(self.packed, LARGEST_CHUNK)?;
         let bytes = match self.compression.as_slice() {
@@ -170,12 +169,8 @@ impl Chunk {
             ));
         }
         #[cfg(feature = "mcap")]
-        match (self.crc, crc32fast::hash(&bytes)) {
-            (0, _) => {}
-            (stored, computed) if stored == computed => {}
-            (stored, computed) => {
-                return Err(Error::at(self.offset, Fault::Crc { stored, computed }));
-            }
+        if self.crc != 0 && self.crc != crc32fast::hash(&bytes) {
+            return Err(Error::malformed(self.offset, "CRC failed"));
         }
         Ok(Input::chunk(bytes, self.offset))
     }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::fmt::{Display, Formatter};
 use std::fs::File;
-use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
+use std::io::{self, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// Bytes that are read at once.
@@ -65,7 +65,7 @@ impl Input {
         let left = self.left();
         match self.chunk {
             _ if needed <= left => Ok(()),
-            None => Err(Error::at(self.position, Fault::Truncated { needed, left })),
+            None => Err(Error::truncated(self.position, needed, left)),
             Some(chunk) => Err(Error::malformed(chunk, "a record goes beyond its chunk")),
         }
     }
@@ -117,8 +117,7 @@ impl Input {
     pub(crate) fn bytes(&mut self, count: u64, limit: u64) -> Result<Vec<u8>, Error> {
         self.expect(count)?;
         if count > limit {
-            let bytes = count;
-            return Err(Error::at(self.offset(), Fault::TooLarge { bytes, limit }));
+            return Err(Error::too_large(self.offset(), count, limit));
         }
         let mut bytes = vec![0; count as usize];
         self.fill(&mut bytes)?;
@@ -409,160 +408,126 @@ pub(crate) fn ubx_checksum(bytes: &[u8]) -> [u8; 2] {
 
 // Errors of reading a log.
 
-/// Place in a log: a byte of the file, and the topic that was read.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Place {
+/// Error of reading a log; what to do about it is its [`hint`](Self::hint).
+#[derive(Debug)]
+pub struct Error {
+    /// Kind of the error.
+    pub fault: Fault,
     /// Byte of the file; that of the chunk for what is packed within it.
-    pub offset: u64,
+    pub offset: Option<u64>,
     /// Topic, where one was being read.
-    pub topic: Option<String>,
+    topic: Option<String>,
+    message: String,
 }
 
-impl Display for Place {
+/// Kinds of errors.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum Fault {
+    /// The operating system refused.
+    Io(io::Error),
+    /// The file ends where its writer did not end it.
+    Cut,
+    /// An encoding or a compression that is not known.
+    Encoding,
+    /// Stamps of a topic run backwards.
+    TimeBack,
+    /// Bytes that do not follow the format.
+    Damage,
+    /// No topic is the one that is wanted, or several could be.
+    Topic,
+    /// A format that is known by its first bytes, and is not read.
+    NotRead(Kind),
+}
+
+impl Display for Error {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        write!(f, "byte {}", self.offset)?;
-        self.topic
-            .iter()
-            .try_for_each(|topic| write!(f, ", topic {topic}"))
+        if let Some(offset) = self.offset {
+            write!(f, "byte {offset}")?;
+            let mut topic = self.topic.iter();
+            topic.try_for_each(|topic| write!(f, ", topic {topic}"))?;
+            f.write_str(": ")?;
+        }
+        f.write_str(&self.message)
     }
 }
 
-/// Errors of reading a log; what to do about each is its [`hint`](Self::hint).
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum Error {
-    /// The operating system refused.
-    #[error("{0}")]
-    Io(#[from] std::io::Error),
-    /// Bytes at a place are at fault.
-    #[error("{0}: {1}")]
-    At(Place, Fault),
-    /// Several topics could be meant.
-    #[error("{} topics have {what}: {}", .topics.len(), .topics.join(", "))]
-    #[expect(missing_docs, reason = "the choice")]
-    SeveralTopics {
-        what: &'static str,
-        topics: Vec<String>,
-    },
-    /// No topic is the one that is wanted.
-    #[error("no topic has {what}{}", in_place_of(.topics))]
-    #[expect(missing_docs, reason = "the topics that are there instead")]
-    NoTopic { what: String, topics: Vec<String> },
-    /// A format that is known by its first bytes, and is not read.
-    #[error("{}, which is not read", .0.name())]
-    NotRead(Kind),
-    /// Not one of the known formats.
-    #[error("not a known log")]
-    Unknown,
-}
+impl std::error::Error for Error {}
 
-/// Faults of bytes.
-#[derive(Debug)]
-#[non_exhaustive]
-#[expect(missing_docs, reason = "the messages say what the fields are")]
-pub enum Fault {
-    /// A record goes beyond the end of the file.
-    Truncated { needed: u64, left: u64 },
-    /// The file lacks the end that its writer puts there last.
-    StillWritten,
-    /// A checksum differs.
-    Crc { stored: u32, computed: u32 },
-    /// An encoding or a compression that is not known.
-    Encoding(String),
-    /// A length beyond what any such message has.
-    TooLarge { bytes: u64, limit: u64 },
-    /// Stamps of a topic run backwards.
-    TimeBack { from_ns: i64, to_ns: i64 },
-    /// Bytes that do not follow the format.
-    Malformed(String),
-}
-
-impl Display for Fault {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Truncated { needed, left } => {
-                write!(f, "cut off, a record of {needed} bytes has {left}")
-            }
-            Self::StillWritten => {
-                f.write_str("the end is missing: still being written, or its writer was stopped")
-            }
-            Self::Crc { stored, computed } => {
-                write!(
-                    f,
-                    "CRC failed, stored {stored:08x}, computed {computed:08x}"
-                )
-            }
-            Self::Encoding(name) => write!(f, "unknown encoding {name:?}"),
-            Self::TooLarge { bytes, limit } => {
-                write!(f, "{bytes} bytes where at most {limit} make sense")
-            }
-            Self::TimeBack { from_ns, to_ns } => {
-                let [from, to] = [*from_ns, *to_ns].map(seconds);
-                write!(f, "time goes back from {from} s to {to} s")
-            }
-            Self::Malformed(what) => f.write_str(what),
-        }
+impl From<io::Error> for Error {
+    fn from(e: io::Error) -> Self {
+        let message = e.to_string();
+        Self::new(Fault::Io(e), message)
     }
 }
 
 impl Error {
-    pub(crate) const fn at(offset: u64, fault: Fault) -> Self {
-        let topic = None;
-        Self::At(Place { offset, topic }, fault)
+    pub(crate) fn new(fault: Fault, message: impl Into<String>) -> Self {
+        Self {
+            fault,
+            offset: None,
+            topic: None,
+            message: message.into(),
+        }
     }
 
-    pub(crate) fn malformed(offset: u64, what: impl Into<String>) -> Self {
-        Self::at(offset, Fault::Malformed(what.into()))
+    pub(crate) fn at(offset: u64, fault: Fault, message: impl Into<String>) -> Self {
+        Self {
+            offset: Some(offset),
+            ..Self::new(fault, message)
+        }
+    }
+
+    pub(crate) fn malformed(offset: u64, message: impl Into<String>) -> Self {
+        Self::at(offset, Fault::Damage, message)
+    }
+
+    /// A record beyond the end of the file.
+    pub(crate) fn truncated(offset: u64, needed: u64, left: u64) -> Self {
+        let message = format!("cut off, a record of {needed} bytes has {left}");
+        Self::at(offset, Fault::Cut, message)
+    }
+
+    /// A length beyond what any such message has.
+    pub(crate) fn too_large(offset: u64, bytes: u64, limit: u64) -> Self {
+        Self::malformed(
+            offset,
+            format!("{bytes} bytes where at most {limit} make sense"),
+        )
     }
 
     pub(crate) fn encoding(offset: u64, encoding: &[u8]) -> Self {
-        let encoding = String::from_utf8_lossy(encoding).into_owned();
-        Self::at(offset, Fault::Encoding(encoding))
+        let message = format!("unknown encoding {:?}", text(encoding));
+        Self::at(offset, Fault::Encoding, message)
+    }
+
+    /// No topic of what is wanted among these.
+    pub(crate) fn no_topic(what: &str, topics: &[String]) -> Self {
+        let there = match topics {
+            [] => String::new(),
+            _ => format!("; there are {}", topics.join(", ")),
+        };
+        Self::new(Fault::Topic, format!("no topic has {what}{there}"))
     }
 
     /// Byte at which a file ends that its writer did not end.
-    pub(crate) const fn cut(&self) -> Option<u64> {
-        match self {
-            Self::At(place, Fault::Truncated { .. } | Fault::StillWritten) => Some(place.offset),
-            _ => None,
-        }
+    pub(crate) fn cut(&self) -> Option<u64> {
+        self.offset.filter(|_| matches!(self.fault, Fault::Cut))
     }
 
     /// The same, said of a topic.
     pub(crate) fn of_topic(mut self, name: &str) -> Self {
-        if let Self::At(place, _) = &mut self {
-            place.topic.get_or_insert_with(|| name.to_owned());
-        }
+        self.topic.get_or_insert_with(|| name.to_owned());
         self
     }
 
     /// Advice on what to do.
     #[must_use]
     pub const fn hint(&self) -> Option<&'static str> {
-        match self {
-            Self::At(_, Fault::Encoding(_) | Fault::TooLarge { .. } | Fault::TimeBack { .. }) => {
-                None
-            }
-            Self::At(..) => Some("the file is damaged: copy it again"),
-            Self::NotRead(kind) => kind.conversion(),
+        match self.fault {
+            Fault::Cut | Fault::Damage => Some("the file is damaged: copy it again"),
+            Fault::NotRead(kind) => kind.conversion(),
             _ => None,
         }
-    }
-}
-
-fn seconds(ns: i64) -> String {
-    let sign = if ns < 0 { "-" } else { "" };
-    format!(
-        "{sign}{}.{:09}",
-        ns.unsigned_abs() / 1_000_000_000,
-        ns.unsigned_abs() % 1_000_000_000
-    )
-}
-
-fn in_place_of(topics: &[String]) -> String {
-    if topics.is_empty() {
-        String::new()
-    } else {
-        format!("; there are {}", topics.join(", "))
     }
 }

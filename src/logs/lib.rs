@@ -46,5 +46,5 @@ mod ulog;
 mod log;
 
 pub use channel::{Channel, Clock, Content, Fix, ImuSample, Stamp, in_seconds};
-pub use input::{Error, Fault, HEAD, Kind, Place, recognise};
+pub use input::{Error, Fault, HEAD, Kind, recognise};
 pub use log::{Damage, Log};

@@ -1,6 +1,6 @@
 //! A log of any format.
 
-use crate::channel::{Channel, Content, Each, Fix, ImuSample, Sample, Stamp, choose};
+use crate::channel::{Channel, Content, Each, Fix, ImuSample, Sample, Stamp, choose, in_seconds};
 #[cfg(any(feature = "mcap", feature = "bag"))]
 use crate::container;
 use crate::input::{Error, Fault, HEAD, Input, Kind, recognise};
@@ -60,7 +60,8 @@ impl Log {
         let mut input = Input::open(path)?;
         let file_bytes = input.length();
         let head = file_bytes.min(HEAD as u64);
-        let kind = recognise(&input.bytes(head, head)?).ok_or(Error::Unknown)?;
+        let kind = recognise(&input.bytes(head, head)?)
+            .ok_or_else(|| Error::at(0, Fault::Encoding, "not a known log"))?;
         let (survey, read): (Survey, Read) = match kind {
             #[cfg(feature = "mcap")]
             Kind::Mcap => (container::survey, container::read),
@@ -70,7 +71,10 @@ impl Log {
             Kind::Ulog => (crate::ulog::survey, crate::ulog::read),
             #[cfg(feature = "ubx")]
             Kind::Ubx => (crate::ubx::survey, crate::ubx::read),
-            _ => return Err(Error::NotRead(kind)),
+            _ => {
+                let message = format!("{}, which is not read", kind.name());
+                return Err(Error::new(Fault::NotRead(kind), message));
+            }
         };
         input.seek(0)?;
         let mut channels = BTreeMap::new();
@@ -155,7 +159,9 @@ impl Log {
         let outcome = (self.read)(&mut input, channel, stamp, &mut |offset, sample| {
             let to_ns = sample.stamp_ns();
             if to_ns < from_ns {
-                return Err(Error::at(offset, Fault::TimeBack { from_ns, to_ns }));
+                let [from, to] = [from_ns, to_ns].map(in_seconds);
+                let message = format!("time goes back from {from} s to {to} s");
+                return Err(Error::at(offset, Fault::TimeBack, message));
             }
             from_ns = to_ns;
             samples.extend(of(sample));

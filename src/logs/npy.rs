@@ -1,6 +1,6 @@
 //! Arrays in NumPy's own format, `.npy` (`numpy.lib.format`).
 
-use crate::input::{Bytes, Error, Fault, Input, Number};
+use crate::input::{Bytes, Error, Input, Number};
 use std::io;
 use std::io::Read;
 use std::path::Path;
@@ -32,10 +32,7 @@ pub fn read(path: &Path) -> Result<Array, Error> {
 /// Reads an array that has so many bytes with its header.
 pub(crate) fn read_from(from: &mut impl Read, size: u64, offset: u64) -> Result<Array, Error> {
     let fault = |error: io::Error| match error.kind() {
-        io::ErrorKind::UnexpectedEof => {
-            let (needed, left) = (size + 1, size);
-            Error::at(offset, Fault::Truncated { needed, left })
-        }
+        io::ErrorKind::UnexpectedEof => Error::truncated(offset, size + 1, size),
         _ => Error::malformed(offset, format!("not a NumPy array: {error}")),
     };
     let (text, header_bytes) = header_text(from).map_err(fault)?;
@@ -54,8 +51,7 @@ pub(crate) fn read_from(from: &mut impl Read, size: u64, offset: u64) -> Result<
     let left = size.saturating_sub(header_bytes);
     let needed = bytes.map_or(u64::MAX, |bytes| bytes as u64);
     let Some(bytes) = bytes.filter(|_| needed <= left) else {
-        let fault = Fault::Truncated { needed, left };
-        return Err(Error::at(offset + header_bytes, fault));
+        return Err(Error::truncated(offset + header_bytes, needed, left));
     };
     let mut values = Vec::new();
     let mut block = vec![0; BLOCK * number.size()];

@@ -13,7 +13,7 @@
 //! # }
 //! ```
 
-use crate::input::{Error, Fault};
+use crate::input::Error;
 use crate::npy;
 use crate::npy::Array;
 use std::fs::File;
@@ -60,15 +60,12 @@ impl Archive {
 
     fn array(&mut self, name: &str) -> Result<Array, Error> {
         let Some(index) = self.0.index_for_name(&format!("{name}{ENDING}")) else {
-            return Err(Error::NoTopic {
-                what: format!("the name {name}"),
-                topics: self.names(),
-            });
+            return Err(Error::no_topic(&format!("the name {name}"), &self.names()));
         };
         let mut file = self.0.by_index(index).map_err(|e| refused(0, &e))?;
         let (offset, bytes, limit) = (file.header_start(), file.size(), LARGEST_ARRAY);
         if bytes > limit {
-            return Err(Error::at(offset, Fault::TooLarge { bytes, limit }));
+            return Err(Error::too_large(offset, bytes, limit));
         }
         let array = npy::read_from(&mut file, bytes, offset)?;
         // the checksum is looked at where the file ends

@@ -58,13 +58,10 @@ pub(crate) fn read(
 
 // Fields of the messages of a topic.
 
-/// Formats within formats: deeper ones are not followed.
-const DEEPEST: usize = 8;
-
 /// Formats by their names, each a list of fields `type name;`.
 type Formats = HashMap<String, String>;
 
-/// Places of a message's own fields; those of formats within it are passed over.
+/// Places of a message's own fields, up to a format within it: no sample and no fix has one.
 #[derive(Default)]
 struct Layout {
     fields: HashMap<String, Field>,
@@ -96,16 +93,16 @@ fn number(name: &str) -> Option<Number> {
 }
 
 impl Layout {
-    /// The layout of a format; none where it does not parse.
     fn new(name: &str, formats: &Formats) -> Option<Self> {
         let mut layout = Self::default();
         let mut at = 0_usize;
         for (type_name, count, field) in fields(formats.get(name)?) {
-            if let Some(number) = number(type_name) {
-                let own = Field { at, number, count };
-                layout.fields.insert(field.to_owned(), own);
-            }
-            at = at.checked_add(size_of(type_name, formats, 0)?.checked_mul(count)?)?;
+            let Some(number) = number(type_name) else {
+                break;
+            };
+            let own = Field { at, number, count };
+            layout.fields.insert(field.to_owned(), own);
+            at = at.checked_add(number.size().checked_mul(count)?)?;
         }
         Some(layout)
     }
@@ -134,17 +131,6 @@ impl Layout {
         let us = Bytes::little(message.get(field.at..)?).u64()?;
         i64::try_from(us).ok()?.checked_mul(1000)
     }
-}
-
-/// Bytes of a type, or of a format.
-fn size_of(name: &str, formats: &Formats, depth: usize) -> Option<usize> {
-    if let Some(number) = number(name) {
-        return Some(number.size());
-    }
-    let mut fields = fields(formats.get(name).filter(|_| depth <= DEEPEST)?);
-    fields.try_fold(0_usize, |sum, (type_name, count, _)| {
-        sum.checked_add(size_of(type_name, formats, depth + 1)?.checked_mul(count)?)
-    })
 }
 
 /// Type, number and name of each field: `float[3] gyro_rad;`.

@@ -276,7 +276,12 @@ fn bad_studies_are_refused_before_anything_is_written() {
             "cell length_s=2_imu_rate_hz=nan",
             "\"run.gnss\" = { rate_hz = nan } is not finite",
         ),
-        ("seed = 5", "seed = ", "study.toml, line ", "column "),
+        (
+            "seed = 5",
+            "seed = ",
+            "study.toml, line 7",
+            "must be quoted",
+        ),
         (
             "wrong = {",
             "IMU = {",

@@ -295,7 +295,7 @@ fn bad_fixes_are_refused_by_line_and_value() {
         gnss,
         cell(7, 1, "89.95"),
         "",
-        &["line 7: column \"lat_deg\": 89.95 is too near a pole"],
+        &["line 7: column \"lat_deg\": 89.95 is not a latitude within ±89.9"],
     );
     refused(
         gnss,
@@ -307,7 +307,7 @@ fn bad_fixes_are_refused_by_line_and_value() {
         gnss,
         cell(7, 1, "6.5"),
         "",
-        &["line 7: the fix is", "swapped"],
+        &["line 7: position jumps by 4343682 m in 1 s", "swapped"],
     );
     refused(
         gnss,

@@ -4,21 +4,21 @@
 use super::logs::LogOptions;
 use super::recordings::timing::{median_step, unit_of_step};
 use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
-use super::table::{Asked, Bare, Column, Dictionary, NONE, Quantity, SPEED, Table, normalised};
+use super::table::{Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table};
 use super::toml_file::{Between, Finite, Source};
 use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
 use chrono::{DateTime, NaiveDateTime};
 use glam::DVec3;
 use nav_sim_document::{Importance, Note};
 use nav_sim_logs::{Clock, Content, Fix, Stamp, in_seconds};
-use nav_sim_navigation::earth::{MAX_LATITUDE, MAX_LATITUDE_DEG, geodetic_to_ecef};
+use nav_sim_navigation::earth::{MAX_LATITUDE_DEG, geodetic_to_ecef};
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::frames::{NavState, RollPitchYaw};
 use nav_sim_navigation::fusion::{LONGEST_GAP_S, Start, WheelSpeed, bridged};
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
 use nav_sim_navigation::strapdown::MAX_ROTATION;
 use nav_sim_signal::imu::ImuIncrement;
-use nav_sim_signal::units::{DEG, exactly_if};
+use nav_sim_signal::units::DEG;
 pub(crate) use nmea::is_nmea;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -59,15 +59,22 @@ pub(super) fn bare_row(text: &str) -> Option<Vec<f64>> {
     row.filter(|row| row.len() > 1)
 }
 
-/// Time that stands still or goes back.
-fn time_back(path: &str, line: u64, previous_s: f64, t_s: f64) -> Failure {
-    let advice = if previous_s - t_s > 500_000.0 {
-        "a new GPS week? Count the seconds on, in both files"
-    } else {
-        "sort the rows by time and remove repeated ones"
+/// Refuses times (s) that stand still or go back; `line` is that of the k-th.
+fn increasing(
+    path: &str,
+    line: impl Fn(usize) -> u64,
+    t_s: impl Iterator<Item = f64> + Clone,
+) -> Result<(), Failure> {
+    let mut steps = (1..).zip(t_s.clone().zip(t_s.skip(1)));
+    let Some((k, (from, to))) = steps.find(|(_, (from, to))| to <= from) else {
+        return Ok(());
     };
-    let message = format!("time goes from {previous_s} s to {t_s} s: it must increase");
-    Failure::contents(path, line, message).or_hint(advice)
+    let advice = match from - to > 500_000.0 {
+        true => "a new GPS week? Count the seconds on, in both files",
+        false => "sort the rows by time and remove repeated ones",
+    };
+    let message = format!("time goes from {from} s to {to} s: it must increase");
+    Err(Failure::contents(path, line(k), message).or_hint(advice))
 }
 
 // Recorded GNSS fixes.
@@ -80,54 +87,48 @@ const MAX_SPEED: f64 = 8000.0;
 /// Quantities of fixes; a deviation up is one down.
 static FIX_QUANTITIES: [Quantity; 15] = [
     Quantity::time(&["t", "time", "timestamp", "tow", "sow"]),
-    Quantity::angle("lat_deg", &["lat", "latitude"]),
-    Quantity::angle("lon_deg", &["lon", "lng", "longitude"]),
+    Quantity::angle("lat_deg", &["lat", "latitude"]).within(LATITUDE),
+    Quantity::angle("lon_deg", &["lon", "lng", "longitude"]).within(LONGITUDE),
     Quantity::length("h_m", &["h", "height", "alt", "altitude"]),
-    Quantity::length(
-        "sd_n_m",
-        &[
-            "sd_n",
-            "std_n",
-            "sigma_n",
-            "pos_std_n",
-            "sd_north",
-            "sd_lat",
-            "sdn",
-        ],
-    ),
-    Quantity::length(
-        "sd_e_m",
-        &[
-            "sd_e",
-            "std_e",
-            "sigma_e",
-            "pos_std_e",
-            "sd_east",
-            "sd_lon",
-            "sde",
-        ],
-    ),
-    Quantity::length(
-        "sd_d_m",
-        &[
-            "sd_d",
-            "std_d",
-            "sigma_d",
-            "pos_std_d",
-            "sd_u",
-            "std_u",
-            "sd_h",
-            "sdu",
-        ],
-    ),
+    Quantity::length("sd_n_m", SD_N).positive(),
+    Quantity::length("sd_e_m", SD_E).positive(),
+    Quantity::length("sd_d_m", SD_D).positive(),
     Quantity::speed("v_n_m_s", &["v_n", "vn"]),
     Quantity::speed("v_e_m_s", &["v_e", "ve"]),
     V_D,
     V_D.reversed(&["v_u", "vu"]),
-    Quantity::speed("sd_vn_m_s", &["sd_vn", "sd_v_n", "vel_std_n", "sdvn"]),
-    Quantity::speed("sd_ve_m_s", &["sd_ve", "sd_v_e", "vel_std_e", "sdve"]),
-    Quantity::speed("sd_vd_m_s", &["sd_vd", "sd_v_d", "vel_std_d", "sdvu"]),
+    Quantity::speed("sd_vn_m_s", &["sd_vn", "sd_v_n", "vel_std_n", "sdvn"]).positive(),
+    Quantity::speed("sd_ve_m_s", &["sd_ve", "sd_v_e", "vel_std_e", "sdve"]).positive(),
+    Quantity::speed("sd_vd_m_s", &["sd_vd", "sd_v_d", "vel_std_d", "sdvu"]).positive(),
     Quantity::number("week", &["week", "gps_week"]),
+];
+const SD_N: &[&str] = &[
+    "sd_n",
+    "std_n",
+    "sigma_n",
+    "pos_std_n",
+    "sd_north",
+    "sd_lat",
+    "sdn",
+];
+const SD_E: &[&str] = &[
+    "sd_e",
+    "std_e",
+    "sigma_e",
+    "pos_std_e",
+    "sd_east",
+    "sd_lon",
+    "sde",
+];
+const SD_D: &[&str] = &[
+    "sd_d",
+    "std_d",
+    "sigma_d",
+    "pos_std_d",
+    "sd_u",
+    "std_u",
+    "sd_h",
+    "sdu",
 ];
 const V_D: Quantity = Quantity::speed("v_d_m_s", &["v_d", "vd"]);
 const PLACE: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
@@ -136,7 +137,7 @@ const VELOCITY: [&str; 3] = ["v_n_m_s", "v_e_m_s", "v_d_m_s"];
 const VELOCITY_SIGMA: [&str; 3] = ["sd_vn_m_s", "sd_ve_m_s", "sd_vd_m_s"];
 
 /// Dictionary of fixes. Texts without a header are those of KF-GINS.
-const FIXES: Dictionary = Dictionary {
+const FIXES: Dictionary<'_> = Dictionary {
     bare: &[
         &[
             "t_s", "lat_deg", "lon_deg", "h_m", "sd_n_m", "sd_e_m", "sd_d_m",
@@ -157,7 +158,7 @@ const FIXES: Dictionary = Dictionary {
             "sd_vd_m_s",
         ],
     ],
-    bad_cell: |error, _| error.hint("remove the row: a fix that is not whole is no fix"),
+    bad_cell: "remove the row: a fix that is not whole is no fix; angles are in degrees, or named lat_rad, lon_rad",
     ..Dictionary::new(
         &FIX_QUANTITIES,
         "columns: t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m, sd_d_m; with velocity v_n_m_s … and \
@@ -166,86 +167,96 @@ const FIXES: Dictionary = Dictionary {
     )
 };
 
-/// The fixes of the rows of a table, each with its line. Position and its deviations are needed; velocity and its deviations
-/// come together or not at all. `unsaid` are the standard deviations where the file states none.
+/// Dictionary of solutions, which have numbers that stand for none.
+const SOLUTION: Dictionary<'_> = Dictionary {
+    is_partial: true,
+    ..FIXES
+};
+
+/// A fix as a file has it: line, time (s); where it states them, position (rad, m), its standard deviations, velocity and those.
+type Stated = (u64, f64, [Option<DVec3>; 4]);
+
+/// Fixes of a file, and remarks.
+type Fixes = (Vec<Stated>, Vec<Note>);
+
+/// The fixes of the rows of a table. Position and its deviations are needed; velocity and its deviations come together or not
+/// at all. `unsaid` are the standard deviations where the file states none.
 fn of_rows(
     table: &Table,
     unsaid: Option<&FixSigma>,
-    remarks: &mut Vec<Note>,
-) -> Result<Vec<(u64, GnssFix)>, Error> {
-    let any = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
-    let has_velocity = any(VELOCITY) || any(VELOCITY_SIGMA);
-    let own = ["t_s"].into_iter().chain(PLACE);
-    let own = own.chain(VELOCITY.into_iter().filter(|_| has_velocity));
-    table.require(own, &FIXES)?;
-    let mut sigmas = Vec::new();
+    mut remarks: Vec<Note>,
+) -> Result<Fixes, Error> {
+    let has = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
+    let has_velocity = has(VELOCITY) || has(VELOCITY_SIGMA);
+    let own = VELOCITY.into_iter().filter(|_| has_velocity);
+    table.require(["t_s"].into_iter().chain(PLACE).chain(own), &FIXES)?;
     // what is missing in all of a position or velocity may be given for the whole file
-    if unsaid.is_none() || any(PLACE_SIGMA) {
-        sigmas.extend(PLACE_SIGMA);
-    }
-    let given_velocity = unsaid.and_then(|sigma| sigma.vel_m_s);
-    if has_velocity && (given_velocity.is_none() || any(VELOCITY_SIGMA)) {
-        sigmas.extend(VELOCITY_SIGMA);
-    }
+    let is_unsaid = has_velocity && unsaid.is_none_or(|sigma| sigma.vel_m_s.is_none());
+    let sigmas = [(PLACE_SIGMA, unsaid.is_none()), (VELOCITY_SIGMA, is_unsaid)];
+    let sigmas = sigmas
+        .into_iter()
+        .filter(|(names, is_needed)| *is_needed || has(*names));
     // a receiver's log that has all but these
-    let found = table.require(sigmas, &FIXES);
+    let found = table.require(sigmas.flat_map(|(names, _)| names), &FIXES);
     found.map_err(|e| e.or_option(help::FIX_SIGMA))?;
-    let ([time], place) = (
-        table.columns(["t_s"], &FIXES)?,
-        table.columns(PLACE, &FIXES)?,
-    );
-    let place_sigma = table.all(PLACE_SIGMA);
-    let (velocity, velocity_sigma) = (table.all(VELOCITY), table.all(VELOCITY_SIGMA));
-    if place_sigma.is_none() || velocity.is_some() && velocity_sigma.is_none() {
-        remarks.push(remark("standard deviations as given for all fixes"));
-    }
+    let [time] = table.columns(["t_s"], &FIXES)?;
+    let groups = [PLACE, PLACE_SIGMA, VELOCITY, VELOCITY_SIGMA].map(|names| table.all(names));
+    let fix = |row: usize| {
+        let weeks = table.get("week").map_or(0.0, |week| week.si(row));
+        let stated = groups.map(|columns| Some(columns?.map(|column| column.si(row)).into()));
+        (table.line(row), time.si(row) + weeks * WEEK_S, stated)
+    };
     if !table.ignored.is_empty() {
         let text = format!("columns not used: {}", table.ignored.join(", "));
         remarks.push(remark(text));
     }
-    let fix = |row: usize| {
-        let triad = |columns: [&Column; 3]| DVec3::from(columns.map(|column| column.si(row)));
-        let [lat, lon, h] = place.map(|column| column.si(row));
-        let stated = place_sigma.map(triad);
-        let given = unsaid.map(|s| DVec3::from(s.pos_m));
-        let velocity = velocity.map(|columns| {
-            let sigma = velocity_sigma
-                .map(triad)
-                .or(given_velocity.map(DVec3::from));
-            GnssVelocity::new(triad(columns), sigma.unwrap_or(DVec3::NAN))
-        });
-        let weeks = table.get("week").map_or(0.0, |week| week.si(row));
-        let fix = GnssFix {
-            t_s: time.si(row) + weeks * WEEK_S,
-            lat,
-            lon,
-            h,
-            pos_sigma_n: stated.or(given).unwrap_or(DVec3::NAN),
-            velocity,
-        };
-        const DEGREES: &str = "latitude within ±89.9, longitude in (−180, 180] or [0, 360), in degrees (or lat_rad, lon_rad)";
-        const SIGMA: &str =
-            "a fix needs the standard deviations its receiver believes; remove rows without";
-        let sigmas = [place_sigma, velocity_sigma].into_iter().flatten();
-        let [first, second, _] = place;
-        let is_longitude = (-180.0 * DEG - 1e-9..=360.0 * DEG + 1e-9).contains(&lon);
-        let (column, reason, advice) = if lat.abs() > 90.0 * DEG {
-            (first, "is not a latitude", DEGREES)
-        } else if !is_longitude {
-            (second, "is not a longitude", DEGREES)
-        } else if lat.abs() > MAX_LATITUDE {
-            let reason = "is too near a pole to navigate in latitude and longitude";
-            (first, reason, DEGREES)
-        } else if let Some(column) = sigmas.flatten().find(|column| column.si(row) <= 0.0) {
-            let reason = "is not a standard deviation: it must be above 0";
-            (column, reason, SIGMA)
-        } else {
-            return Ok((table.line(row), fix));
-        };
-        let (line, value) = (table.line(row), column.values[row].to_string());
-        Err(Error::cell(&table.path, line, &column.name, value, reason).or_hint(advice))
+    remarks.extend(table.assumptions.iter().map(remark));
+    Ok(((0..table.rows()).map(fix).collect(), remarks))
+}
+
+/// The fix that is stated; `unsaid` are the standard deviations where it states none.
+fn fix(
+    path: &str,
+    (line, t_s, stated): &Stated,
+    unsaid: Option<&FixSigma>,
+) -> Result<GnssFix, Error> {
+    let refused = |message| Error::contents(path, *line, message);
+    let [place, sigma, velocity, velocity_sigma] = *stated;
+    let Some(place) = place.filter(|place| (*place + *t_s).is_finite()) else {
+        return Err(refused("a fix without a time, or a place to navigate from"));
     };
-    (0..table.rows()).map(fix).collect()
+    let sigma = sigma.filter(|sigma| sigma.is_finite());
+    let pos_sigma_n = sigma.or(unsaid.map(|sigma| sigma.pos_m.into()));
+    let velocity = velocity.and_then(|v| {
+        let given = || unsaid?.vel_m_s.map(DVec3::from);
+        let stated = velocity_sigma.filter(|sigma| sigma.truncate().is_finite());
+        let sigma = stated.or_else(given)?;
+        let horizontal = v.truncate();
+        horizontal.is_finite().then(|| GnssVelocity {
+            horizontal,
+            horizontal_sigma: sigma.truncate(),
+            down: (v.z + sigma.z).is_finite().then_some((v.z, sigma.z)),
+        })
+    });
+    Ok(GnssFix {
+        t_s: *t_s,
+        lat: place.x,
+        lon: place.y,
+        h: place.z,
+        pos_sigma_n: pos_sigma_n.ok_or_else(|| {
+            refused("a fix without standard deviations").or_option(help::FIX_SIGMA)
+        })?,
+        velocity,
+    })
+}
+
+/// The doubt about latitudes and longitudes (rad) of which none is too large for a number of radians that is taken as degrees.
+pub(super) fn doubt_degrees(mut places: impl Iterator<Item = [f64; 2]>) -> Option<&'static str> {
+    let is_small = |x: f64| x.abs() <= PI * DEG + 1e-8;
+    let all = places.all(|[lat, lon]| is_small(2.0 * lat) && is_small(0.5 * lon));
+    all.then_some(
+        "latitude and longitude never exceed π: radians? Then name the columns lat_rad, lon_rad",
+    )
 }
 
 /// Reads fixes: a table with a header, or the text of KF-GINS (time, latitude, longitude (deg), height (m),
@@ -262,8 +273,8 @@ pub(crate) fn read_gnss(
     topic: Option<&str>,
 ) -> Result<(Vec<GnssFix>, Vec<Note>), Error> {
     let shown = path.display().to_string();
-    let (fixes, remarks) = match logs::kind_of(path) {
-        Some(_) => of_log(path, (unsaid, topic), clock_s)?,
+    let (stated, mut remarks) = match logs::kind_of(path) {
+        Some(_) => of_log(path, topic, clock_s)?,
         None => {
             let text = source::table_text(path)?;
             if text.trim_start().starts_with('<') {
@@ -272,143 +283,94 @@ pub(crate) fn read_gnss(
                     "write its points as a table t_s, lat_deg, lon_deg, h_m on the clock of the IMU",
                 ));
             }
-            match is_nmea(&text) {
-                true => nmea::fixes(&shown, &text, unsaid, clock_s)?,
-                false => of_table(&shown, text, unsaid, clock_s)?,
+            if is_nmea(&text) {
+                nmea::fixes(&shown, &text, unsaid, clock_s)?
+            } else if let Some(header) = rtklib_header(&text) {
+                let (table, said) = rtklib(&shown, &text, header, clock_s)?;
+                of_rows(&table, unsaid, vec![remark(said)])?
+            } else {
+                let table = table::parse(&shown, &text, &FIXES)?;
+                let velocity = match table.has(VELOCITY[0]) {
+                    true => ", velocity",
+                    false => "",
+                };
+                let text = "no header: read as KF-GINS text, position";
+                let text = format!("{text}{velocity} and standard deviations");
+                let remarks = table.is_bare.then(|| remark(text));
+                of_rows(&table, unsaid, remarks.into_iter().collect())?
             }
         }
     };
-    for pair in fixes.windows(2) {
-        check_step(&shown, pair[1].0, &pair[0].1, &pair[1].1)?;
+    let fixes = stated.iter().map(|stated| fix(&shown, stated, unsaid));
+    let fixes: Vec<GnssFix> = fixes.collect::<Result<_, _>>()?;
+    if stated
+        .iter()
+        .any(|(.., [_, sigma, ..])| sigma.is_none_or(|sigma| !sigma.is_finite()))
+    {
+        remarks.push(remark(
+            "standard deviations as given where the file states none",
+        ));
     }
-    let fixes = fixes.into_iter().map(|(_, fix)| fix).collect();
+    remarks.extend(doubt_degrees(fixes.iter().map(|fix| [fix.lat, fix.lon])).map(doubt));
+    let times = fixes.iter().map(|fix| fix.t_s);
+    increasing(&shown, |k| stated[k].0, times)?;
+    for (pair, (line, ..)) in fixes.windows(2).zip(&stated[1..]) {
+        let place = |f: &GnssFix| (f.t_s, geodetic_to_ecef(f.lat, f.lon, f.h));
+        check_jump(&shown, *line, place(&pair[0]), place(&pair[1]))?;
+    }
     let remarks = remarks.into_iter().map(|note| of_file(note, &shown));
     Ok((fixes, remarks.collect()))
 }
 
-/// Fixes with their lines, and remarks.
-type Fixes = (Vec<(u64, GnssFix)>, Vec<Note>);
-
-/// The fixes of a table, of KF-GINS or of RTKLIB.
-fn of_table(
-    shown: &str,
-    mut text: String,
-    unsaid: Option<&FixSigma>,
-    clock_s: Option<(f64, f64)>,
-) -> Result<Fixes, Error> {
-    let mut clock = None;
-    if is_rtklib(&text) {
-        let (table, name) = table(shown, &text, clock_s)?;
-        (text, clock) = (table, Some(name));
+/// Refuses a step from one place (s, m) to the next that is no motion.
+pub(super) fn check_jump(
+    path: &str,
+    line: u64,
+    (from_s, from): (f64, DVec3),
+    (to_s, to): (f64, DVec3),
+) -> Result<(), Error> {
+    let (seconds, metres) = (to_s - from_s, to.distance(from));
+    if seconds <= 0.0 || metres <= MAX_SPEED * seconds {
+        return Ok(());
     }
-    let mut table = table::parse(shown, &text, &FIXES, &Asked::default())?;
-    let has_all = |table: &Table, columns: [&Column; 3]| {
-        (0..table.rows()).all(|row| columns.iter().all(|c| c.si(row) > 0.0))
-    };
-    if clock.is_some() {
-        table.ignored.clear();
-        let sigma = table.all(VELOCITY_SIGMA);
-        // what states no deviation of one velocity states none
-        if !sigma.is_some_and(|sigma| has_all(&table, sigma)) {
-            let velocity = VELOCITY.into_iter().chain(VELOCITY_SIGMA);
-            velocity.for_each(|name| drop(table.take(name)));
-        }
-    }
-    let velocity = match table.has(VELOCITY[0]) {
-        true => ", velocity",
-        false => "",
-    };
-    let mut remarks = Vec::new();
-    if table.is_bare {
-        remarks.push(remark(format!(
-            "no header: read as KF-GINS text, position{velocity} and standard deviations"
-        )));
-    }
-    remarks.extend(clock.map(|clock| {
-        remark(format!(
-            "an RTKLIB solution: position{velocity} and standard deviations, in {clock}"
-        ))
-    }));
-    let fixes = of_rows(&table, unsaid, &mut remarks)?;
-    remarks.extend(table.assumptions.iter().map(remark));
-    let small =
-        |(_, f): &(u64, GnssFix)| f.lat.abs() <= 0.5 * PI * DEG && f.lon.abs() <= 2.0 * PI * DEG;
-    if fixes.iter().all(small) {
-        let text = "latitude and longitude never exceed π: radians? Then name the columns lat_rad, lon_rad";
-        remarks.push(doubt(text));
-    }
-    Ok((fixes, remarks))
+    let seconds = (1e6 * seconds).round() / 1e6;
+    let message = format!("position jumps by {metres:.0} m in {seconds} s");
+    let advice = "is a latitude swapped with a longitude, a sign lost, or a row damaged?";
+    Err(Error::contents(path, line, message).or_hint(advice))
 }
 
-/// Reads fixes of a topic, of several; `unsaid` are the standard deviations where the log states none, `imu_s` is when the IMU
-/// begins and ends.
+/// Reads fixes of a topic, of several; `imu_s` is when the IMU begins and ends.
 ///
 /// # Errors
-/// When the log is damaged, has no fixes, or states no standard deviations where none are given.
-fn of_log(
-    path: &Path,
-    (unsaid, topic): (Option<&FixSigma>, Option<&str>),
-    imu_s: Option<(f64, f64)>,
-) -> Result<Fixes, Error> {
+/// When the log is damaged, or has no fixes.
+fn of_log(path: &Path, topic: Option<&str>, imu_s: Option<(f64, f64)>) -> Result<Fixes, Error> {
     let refused = |e| logs::refused(path, e);
     let log = logs::open(path)?;
     let channel = log.channel(Content::Fix, topic).map_err(refused)?;
     let read = log.fixes(channel, Stamp::default()).map_err(refused)?;
-    let unstated = || {
-        let message = "the fixes have no standard deviations";
-        Error::contents(path.display(), Place::Within, message).or_option(help::FIX_SIGMA)
+    let span = read.first().zip(read.last());
+    let span = span.filter(|_| channel.clock == Clock::Unix);
+    let [first_s, last_s] = span
+        .map(|(a, b)| [a, b])
+        .map_or([0.0; 2], |ends| ends.map(|fix| in_seconds(fix.stamp_ns)));
+    let clock = clock((first_s, last_s), imu_s).filter(|_| span.is_some());
+    let (origin_s, name) = clock.map_or((0.0, String::new()), |c| {
+        (c.origin_s, format!(", in {}", c.name))
+    });
+    let fix = |(line, fix): (u64, Fix)| {
+        let place = DVec3::new(fix.lat_deg * DEG, fix.lon_deg * DEG, fix.h_m);
+        let [sigma, v, v_sigma] =
+            [fix.sd_ned_m, fix.v_ned_m_s, fix.sd_v_ned_m_s].map(|own| own.map(DVec3::from));
+        let t_s = in_seconds(fix.stamp_ns) - origin_s;
+        (line, t_s, [Some(place), sigma, v, v_sigma])
     };
-    let fixes = (1..)
-        .zip(read)
-        .map(|(row, fix)| Some((row, in_radians(&fix, unsaid)?)));
-    let mut fixes: Vec<(u64, GnssFix)> = fixes.collect::<Option<_>>().ok_or_else(unstated)?;
-    let mut said = format!("fixes of {}", channel.topic);
-    let span_s = fixes.first().zip(fixes.last());
-    let clock = span_s
-        .filter(|_| channel.clock == Clock::Unix)
-        .and_then(|((_, first), (_, last))| clock((first.t_s, last.t_s), imu_s));
-    if let Some(clock) = clock.filter(|clock| clock.origin_s != 0.0) {
-        fixes
-            .iter_mut()
-            .for_each(|(_, fix)| fix.t_s -= clock.origin_s);
-        said = format!("{said}, in {}", clock.name);
-    }
     let cut = log.damage().map(logs::cut_off);
     let remarks = cut.map(doubt).into_iter();
-    Ok((fixes, remarks.chain([remark(said)]).collect()))
-}
-
-/// The same fix with angles in radians; none without standard deviations.
-fn in_radians(fix: &Fix, unsaid: Option<&FixSigma>) -> Option<GnssFix> {
-    let pos_sigma_n = fix.sd_ned_m.or(unsaid.map(|sigma| sigma.pos_m))?;
-    let velocity_sigma = fix.sd_v_ned_m_s.or(unsaid.and_then(|sigma| sigma.vel_m_s));
-    let velocity = fix.v_ned_m_s.zip(velocity_sigma);
-    Some(GnssFix {
-        t_s: in_seconds(fix.stamp_ns),
-        lat: fix.lat_deg * DEG,
-        lon: fix.lon_deg * DEG,
-        h: fix.h_m,
-        pos_sigma_n: DVec3::from(pos_sigma_n),
-        velocity: velocity.map(|(v, sigma)| GnssVelocity::new(v.into(), sigma.into())),
-    })
-}
-
-fn check_step(path: &str, line: u64, before: &GnssFix, fix: &GnssFix) -> Result<(), Error> {
-    let seconds = fix.t_s - before.t_s;
-    if seconds <= 0.0 {
-        return Err(time_back(path, line, before.t_s, fix.t_s));
-    }
-    let place = |f: &GnssFix| geodetic_to_ecef(f.lat, f.lon, f.h);
-    let metres = place(fix).distance(place(before));
-    if metres <= MAX_SPEED * seconds {
-        return Ok(());
-    }
-    let message = format!(
-        "the fix is {metres:.0} m from the one {} s before",
-        (1e6 * seconds).round() / 1e6
-    );
-    Err(Error::contents(path, line, message)
-        .or_hint("is a latitude swapped with a longitude, a sign lost, or a row damaged?"))
+    let said = remark(format!("fixes of {}{name}", channel.topic));
+    Ok((
+        (1..).zip(read).map(fix).collect(),
+        remarks.chain([said]).collect(),
+    ))
 }
 
 #[cfg(test)]
@@ -434,8 +396,8 @@ mod fix_tests {
     #[test]
     fn fixes_of_a_log_are_those_of_its_writer() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/logs/tests/data/ros2_zstd.mcap");
-        let (fixes, _) = of_log(&path, (None, None), None).unwrap();
-        let sum = |of: fn(&GnssFix) -> f64| fixes.iter().map(|(_, fix)| of(fix)).sum::<f64>();
+        let (fixes, _) = read_gnss(&path, None, None, None).unwrap();
+        let sum = |of: fn(&GnssFix) -> f64| fixes.iter().map(of).sum::<f64>();
         assert_eq!(fixes.len(), 4);
         assert!((sum(|f| f.lat) / DEG - 186.000_007_999_999_98).abs() < 1e-11);
         assert!((sum(|f| f.lon) / DEG - 26.399_984).abs() < 1e-11);
@@ -460,11 +422,11 @@ const LEAPS: [(f64, f64); 6] = [
 
 /// True if a text is such a solution.
 pub(crate) fn is_rtklib(text: &str) -> bool {
-    header(text).is_some()
+    rtklib_header(text).is_some()
 }
 
 /// The line that names the columns.
-fn header(text: &str) -> Option<(usize, &str)> {
+fn rtklib_header(text: &str) -> Option<(usize, &str)> {
     let comments = text
         .lines()
         .enumerate()
@@ -477,7 +439,7 @@ fn header(text: &str) -> Option<(usize, &str)> {
 struct ClockOfImu {
     /// Subtracted from Unix times of the fixes (s).
     origin_s: f64,
-    pub(super) name: String,
+    name: String,
 }
 
 /// Unix time at which GPS time is 0, by the leap seconds of a time (Unix s).
@@ -510,14 +472,13 @@ fn clock(span_s: (f64, f64), imu_s: Option<(f64, f64)>) -> Option<ClockOfImu> {
         .find(|clock| first_s <= span_s.1 - clock.origin_s && span_s.0 - clock.origin_s <= last_s)
 }
 
-/// The same as a table with one column of time, line by line, and the name of the clock of its times: that of the IMU, which
-/// begins and ends at `imu_s`, else seconds of the GPS week.
-pub(super) fn table(
+/// The fixes of a solution, in the clock of the IMU, which begins and ends at `imu_s`, else in seconds of the GPS week.
+fn rtklib(
     path: &str,
     text: &str,
+    (at, names): (usize, &str),
     imu_s: Option<(f64, f64)>,
-) -> Result<(String, String), Error> {
-    let (at, names) = header(text).unwrap_or_default();
+) -> Result<(Table, String), Error> {
     let refuse = |line: usize, message: &str, advice: &'static str| {
         Error::contents(path, line + 1, message).or_hint(advice)
     };
@@ -525,50 +486,55 @@ pub(super) fn table(
         let advice = "write the solution in GPS time, as the IMU's clock is";
         return Err(refuse(at, "times that are not GPST", advice));
     }
-    let is_blank = |c: char| matches!(c, ' ' | ',' | '\t' | '%');
-    let cells = |line| -> Vec<&str> {
-        str::split(line, is_blank)
-            .filter(|c| !c.is_empty())
-            .collect()
+    let cells = |line: &'_ str| -> Vec<String> {
+        let cells = line.split([' ', ',', '\t', '%']).filter(|c| !c.is_empty());
+        cells.map(str::to_owned).collect()
     };
-    let names = cells(names);
-    let mut rows = Vec::new();
-    for (i, line) in text.lines().enumerate() {
-        if line.starts_with('%') || line.trim().is_empty() {
-            continue;
-        }
+    let mut columns: Vec<(String, Vec<f64>)> = cells(names)
+        .into_iter()
+        .map(|name| (name, vec![]))
+        .collect();
+    "t_s".clone_into(&mut columns[0].0);
+    let mut lines = Vec::new();
+    let rows = text.lines().enumerate();
+    for (i, line) in rows.filter(|(_, l)| !(l.starts_with('%') || l.trim().is_empty())) {
         let row = cells(line);
-        let t_s = row
-            .first()
-            .zip(row.get(1))
-            .and_then(|(a, b)| gps_time_s(a, b));
-        let advice = "2021/03/01 00:00:01.000 (or 2147 86401.000), latitude, longitude, height, Q, ns, sdn, sde, sdu";
-        let refused = || {
-            refuse(
-                i,
-                "not a row of time, position, quality, satellites and standard deviations",
-                advice,
-            )
+        let t_s = match &row[..] {
+            [first, second, ..] if row.len() > columns.len() => gps_time_s(first, second),
+            _ => None,
         };
-        rows.push((i, t_s.ok_or_else(refused)?, row));
+        let t_s = t_s.ok_or_else(|| {
+            let message = "not a row of time, position, quality, satellites and standard deviations";
+            let advice = "2021/03/01 00:00:01.000 (or 2147 86401.000), latitude, longitude, height, Q, ns, sdn, sde, sdu";
+            refuse(i, message, advice)
+        })?;
+        columns[0].1.push(t_s);
+        for ((name, values), cell) in columns[1..].iter_mut().zip(&row[2..]) {
+            values.push(cell.parse().map_err(|_| {
+                Error::cell(
+                    path,
+                    i as u64 + 1,
+                    name,
+                    format!("\"{cell}\""),
+                    "is not a number",
+                )
+            })?);
+        }
+        lines.push(i as u64 + 1);
     }
-    let span = rows.first().zip(rows.last());
-    let (first_s, last_s) = span.map_or((0.0, 0.0), |(first, last)| (first.1, last.1));
+    let t_s = &mut columns[0].1;
+    let span = t_s.first().copied().zip(t_s.last().copied());
+    let (first_s, last_s) = span.unwrap_or_default();
     let gps_s = gps_origin_s(first_s + GPS_EPOCH_S as f64);
     let span_s = (first_s + gps_s, last_s + gps_s);
     let [.., of_week] = clocks(span_s.0);
     let clock = clock(span_s, imu_s).unwrap_or(of_week);
-    let mut out = "\n".repeat(at) + "t_s " + &names[1..].join(" ") + "\n";
-    let mut lines = at + 1;
-    for (i, t_s, row) in rows {
-        // line by line, so that a refusal names that of the file; the difference of two numbers of 1e9 keeps 0.2 µs
-        let rest = row[2..].iter().take(names.len() - 1);
-        let rest: Vec<&str> = rest.copied().collect();
-        out += &"\n".repeat(i - lines);
-        out += &format!("{:.6} {}\n", t_s + gps_s - clock.origin_s, rest.join(" "));
-        lines = i + 1;
-    }
-    Ok((out, clock.name))
+    // the difference of two numbers of 1e9 keeps 0.2 µs
+    let on_clock = |t_s: f64| (1e6 * (t_s + gps_s - clock.origin_s)).round() / 1e6;
+    t_s.iter_mut().for_each(|t_s| *t_s = on_clock(*t_s));
+    let mut table = table::of_columns(path, columns, lines, &SOLUTION)?;
+    table.ignored.clear();
+    Ok((table, format!("an RTKLIB solution, in {}", clock.name)))
 }
 
 /// Seconds since GPS weeks are counted, of a date and a time of day or of a week and its second.
@@ -591,7 +557,16 @@ mod rtklib_tests {
 
     const HEAD: &str = "% program : RTKLIB\n%  GPST  latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m)\n";
 
-    const TABLE: &str = "\nt_s latitude(deg) longitude(deg) height(m) Q ns sdn(m) sde(m) sdu(m)\n";
+    fn read(text: &str, imu_s: Option<(f64, f64)>) -> Result<(Vec<f64>, String), Error> {
+        let header = rtklib_header(text).unwrap();
+        let (table, said) = rtklib("a.pos", text, header, imu_s)?;
+        assert_eq!(
+            (table.line(0), table.get("sd_d_m").unwrap().si(0)),
+            (3, 4.0)
+        );
+        let t_s = table.get("t_s").unwrap().values.clone();
+        Ok((t_s, said))
+    }
 
     /// 2021-03-01 was a Monday, the second day of GPS week 2147.
     #[test]
@@ -600,12 +575,9 @@ mod rtklib_tests {
         let counted = format!("{HEAD}2147 86401.250   46.5 6.5 400.8  5  8  2.0 2.1 4.0\n");
         assert!(is_rtklib(&dated) && !is_rtklib("t_s,lat_deg\n") && !is_rtklib(""));
         for text in [dated, counted] {
-            let (table, clock) = table("a.pos", &text, None).unwrap();
-            assert_eq!(
-                table,
-                format!("{TABLE}86401.250000 46.5 6.5 400.8 5 8 2.0 2.1 4.0\n")
-            );
-            assert_eq!(clock, "seconds of GPS week 2147");
+            let (t_s, said) = read(&text, None).unwrap();
+            assert_eq!(t_s, [86_401.25]);
+            assert_eq!(said, "an RTKLIB solution, in seconds of GPS week 2147");
         }
     }
 
@@ -619,9 +591,9 @@ mod rtklib_tests {
         let unix_s = 1_614_556_801.25 - 18.0;
         for (start_s, words) in [(gps_s, "seconds of GPS time"), (unix_s, "Unix time")] {
             let imu_s = Some((start_s - 5.0, start_s + 5.0));
-            let (table, said) = table("a.pos", &text, imu_s).unwrap();
-            assert_eq!(table, format!("{TABLE}{start_s:.6} {row}"));
-            assert_eq!(said, words);
+            let (t_s, said) = read(&text, imu_s).unwrap();
+            assert_eq!(t_s, [start_s]);
+            assert_eq!(said, format!("an RTKLIB solution, in {words}"));
         }
     }
 
@@ -649,16 +621,12 @@ mod rtklib_tests {
     fn the_week_counts_on() {
         let text =
             format!("{HEAD}2147 604799 46.5 6.5 400 5 8 2 2 4\n2148 0.5 46.5 6.5 400 5 8 2 2 4\n");
-        let (table, _) = table("a.pos", &text, None).unwrap();
-        assert!(
-            table.contains("604799.000000 ") && table.contains("604800.500000 "),
-            "{table}"
-        );
+        assert_eq!(read(&text, None).unwrap().0, [604_799.0, 604_800.5]);
     }
 
     #[test]
     fn what_is_not_such_a_row_is_refused_with_its_line() {
-        let error = |text: &str| table("a.pos", text, None).unwrap_err().to_string();
+        let error = |text: &str| read(text, None).unwrap_err().to_string();
         let short = format!("{HEAD}2021/03/01 46.5 6.5\n");
         assert!(error(&short).starts_with("a.pos, line 3: not a row of time, position"));
         assert!(
@@ -686,7 +654,7 @@ pub(crate) struct ImuFile {
 }
 
 /// Dictionary of recordings under way. Texts without a header are those of KF-GINS, with or without an odometer.
-const SAMPLES: Dictionary = Dictionary {
+const SAMPLES: Dictionary<'_> = Dictionary {
     bare: &[
         &[
             "t_s",
@@ -753,12 +721,21 @@ pub(crate) fn read_imu(
         remarks.push(remark(format!("{text}{odometer}")));
     }
     let t_s: Vec<f64> = time.values.iter().map(|t| t * unit_s).collect();
-    let sample = |k: usize, dt_s: f64| {
+    if t_s.len() < 3 {
+        let message = format!("{} samples, but at least 3 are needed", t_s.len());
+        return Err(Error::contents(&table.path, Place::Within, message));
+    }
+    increasing(&table.path, |k| table.line(k), t_s.iter().copied())?;
+    let step = median_step(&t_s);
+    let since_s = |k: usize| if k == 0 { step } else { t_s[k] - t_s[k - 1] };
+    let samples = (0..t_s.len()).map(|k| {
+        // those after a hole last a step like any other
+        let dt_s = Some(since_s(k))
+            .filter(|s| *s <= GAP * step)
+            .unwrap_or(step);
         let three = |own: &[&Column]| {
-            let value = |axis: usize| {
-                let Column { values, factor, .. } = own[axis];
-                values[k] * factor.unwrap_or(from_gravity)
-            };
+            let value =
+                |axis: usize| own[axis].values[k] * own[axis].factor.unwrap_or(from_gravity);
             let seconds = if own[0].quantity.per_sample {
                 1.0
             } else {
@@ -772,55 +749,19 @@ pub(crate) fn read_imu(
             dtheta: three(&signals[3..]),
             dv: three(&signals[..3]),
         }
-    };
-    let samples = increments(&table, &t_s, &sample, &mut remarks)?;
-    let step = median_step(&t_s);
-    Ok(ImuFile {
-        samples: bridged(&samples, step),
-        rate_hz: 1.0 / step,
-        remarks: remarks
-            .into_iter()
-            .map(|note| of_file(note, &table.path))
-            .collect(),
-    })
-}
-
-/// The k-th sample, over so many seconds.
-type Sample<'a> = &'a dyn Fn(usize, f64) -> ImuIncrement;
-
-/// The samples; those after a hole last a step like any other.
-fn increments(
-    table: &Table,
-    t_s: &[f64],
-    sample: Sample<'_>,
-    remarks: &mut Vec<Note>,
-) -> Result<Vec<ImuIncrement>, Error> {
-    let path = &table.path;
-    if t_s.len() < 3 {
-        let message = format!("{} samples, but at least 3 are needed", t_s.len());
-        return Err(Error::contents(path, Place::Within, message));
-    }
-    if let Some(k) = (1..t_s.len()).find(|k| t_s[*k] <= t_s[k - 1]) {
-        return Err(time_back(path, table.line(k), t_s[k - 1], t_s[k]));
-    }
-    let step = median_step(t_s);
-    doubt_units((path, t_s.len(), step), sample, remarks)?;
-    let mut samples = Vec::with_capacity(t_s.len());
+    });
+    let samples: Vec<ImuIncrement> = samples.collect();
+    remarks.extend(doubt_units(&table.path, &samples)?.map(doubt));
     let mut holes = Vec::new();
-    for k in 0..t_s.len() {
-        let since_s = if k == 0 { step } else { t_s[k] - t_s[k - 1] };
-        let is_hole = since_s > GAP * step;
-        let sample = sample(k, if is_hole { step } else { since_s });
-        let refuse = |message: String| Error::contents(path, table.line(k), message);
-        if is_hole && since_s - step > LONGEST_GAP_S + 0.5 * step {
-            let message = format!(
-                "no samples from {} s to {} s: {LONGEST_GAP_S} s can be bridged",
-                t_s[k - 1],
-                t_s[k]
-            );
-            return Err(
-                refuse(message).or_hint("fuse the stretches before and after it one by one")
-            );
+    for (k, sample) in samples.iter().enumerate() {
+        let refuse = |message: String| Error::contents(&table.path, table.line(k), message);
+        let missing_s = since_s(k) - step;
+        if missing_s > LONGEST_GAP_S + 0.5 * step {
+            let [from, to] = [k - 1, k].map(|k| t_s[k]);
+            let message =
+                format!("no samples from {from} s to {to} s: {LONGEST_GAP_S} s can be bridged");
+            let advice = "fuse the stretches before and after it one by one";
+            return Err(refuse(message).or_hint(advice));
         }
         let angle = sample.dtheta.length();
         if angle > MAX_ROTATION {
@@ -830,49 +771,50 @@ fn increments(
                 "is the unit right? gyro_x_deg_s is in degrees, gyro_x_rad_s in radians a second";
             return Err(refuse(message).or_hint(advice));
         }
-        if is_hole {
-            holes.push((k, since_s - step));
+        if missing_s > (GAP - 1.0) * step {
+            holes.push(format!(
+                "{missing_s:.2} s before {:.2} s (line {})",
+                t_s[k],
+                table.line(k)
+            ));
         }
-        samples.push(sample);
     }
-    if let Some((k, seconds)) = holes.first() {
-        let (at_s, line, more) = (t_s[*k], table.line(*k), holes.len() - 1);
+    if let Some((first, more)) = holes.split_first() {
+        let more = more.len();
         remarks.push(doubt(format!(
-                "samples missing: {seconds:.2} s before {at_s:.2} s (line {line}) and {more} more gaps; bridged"
-            )));
+            "samples missing: {first} and {more} more gaps; bridged"
+        )));
     }
-    Ok(samples)
+    let remarks = remarks.into_iter().map(|note| of_file(note, &table.path));
+    Ok(ImuFile {
+        samples: bridged(&samples, step),
+        rate_hz: 1.0 / step,
+        remarks: remarks.collect(),
+    })
 }
 
 /// Over a whole recording the specific force is gravity in the mean, and nothing turns all the time.
-fn doubt_units(
-    (path, count, step): (&str, usize, f64),
-    sample: Sample<'_>,
-    remarks: &mut Vec<Note>,
-) -> Result<(), Error> {
-    let mean = |of: fn(ImuIncrement) -> DVec3| {
-        let lengths = (0..count).map(|k| of(sample(k, step)).length() / step);
-        lengths.sum::<f64>() / count as f64
+fn doubt_units(path: &str, samples: &[ImuIncrement]) -> Result<Option<String>, Error> {
+    let mean = |of: fn(&ImuIncrement) -> DVec3| {
+        let lengths = samples
+            .iter()
+            .map(|sample| of(sample).length() / sample.dt_s);
+        lengths.sum::<f64>() / samples.len() as f64
     };
     let (force, rate) = (mean(|sample| sample.dv), mean(|sample| sample.dtheta));
     if !(4.0..25.0).contains(&force) {
         check_gravity(path, force.max(0.3))?;
     }
-    if rate > FAST {
-        let degrees = rate / DEG;
-        let text =
-            format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?");
-        remarks.push(doubt(text));
-    }
-    Ok(())
+    let degrees = rate / DEG;
+    let text = format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?");
+    Ok((rate > FAST).then_some(text))
 }
 
 // An initial state (TOML).
 
 /// Where and how a drive begins: nav-sim fuse --initial
 #[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(title = "Initial state")]
+#[schemars(title = "Initial state", deny_unknown_fields)]
 struct Description {
     /// Time (s)
     t_s: Finite,
@@ -898,38 +840,14 @@ struct Description {
     pitch_deg: Between<-90, 90, false>,
     /// Yaw (degrees)
     yaw_deg: Between<-360, 360, false>,
-    /// Standard deviations of the position north, east, down (m; default: as in scenarios)
-    #[serde(default, deserialize_with = "exactly_if")]
-    pos_sigma_m: Option<[f64; 3]>,
-    /// Of the velocity (m/s)
-    #[serde(default, deserialize_with = "exactly_if")]
-    vel_sigma_m_s: Option<[f64; 3]>,
-    /// Of roll, pitch, yaw (degrees)
-    #[serde(default, deserialize_with = "exactly_if")]
-    att_sigma_deg: Option<[f64; 3]>,
-    /// Of a turn-on bias of the accelerometers that the filter expects (m/s²)
-    accel_bias_sigma_m_s2: Option<f64>,
-    /// Of a turn-on bias of the gyroscopes (rad/s)
-    gyro_bias_sigma_rad_s: Option<f64>,
-    /// Of a scale-factor error of the accelerometers (parts per million)
-    accel_scale_sigma_ppm: Option<f64>,
-    /// Of a scale-factor error of the gyroscopes (parts per million)
-    gyro_scale_sigma_ppm: Option<f64>,
+    #[schemars(flatten)]
+    sigma: InitialSettings,
 }
 
-/// The JSON schema of such a file; the ranges of standard deviations are those of scenarios.
+/// The JSON schema of such a file.
 #[must_use]
 pub(crate) fn initial_schema() -> serde_json::Value {
-    let mut schema = schemars::schema_for!(Description).to_value();
-    let of_scenarios = schemars::schema_for!(InitialSettings).to_value();
-    for (key, own) in schema["properties"].as_object_mut().into_iter().flatten() {
-        if let Some(said) = of_scenarios["properties"].get(key) {
-            let description = own["description"].take();
-            *own = said.clone();
-            own["description"] = description;
-        }
-    }
-    schema
+    schemars::schema_for!(Description).to_value()
 }
 
 /// Reads an initial state: time, position of the IMU, velocity (0 where it is not said), attitude of the
@@ -954,17 +872,10 @@ fn parse(source: &Source) -> Result<Start, Failure> {
         v_n: DVec3::new(d.v_n_m_s.0, d.v_e_m_s.0, d.v_d_m_s.0),
         q_b_n: RollPitchYaw { roll, pitch, yaw }.to_quat(),
     };
-    let default = InitialSettings::default();
-    let sigma = InitialSettings {
-        pos_sigma_m: d.pos_sigma_m.unwrap_or(default.pos_sigma_m),
-        vel_sigma_m_s: d.vel_sigma_m_s.unwrap_or(default.vel_sigma_m_s),
-        att_sigma_deg: d.att_sigma_deg.unwrap_or(default.att_sigma_deg),
-        accel_bias_sigma_m_s2: d.accel_bias_sigma_m_s2,
-        gyro_bias_sigma_rad_s: d.gyro_bias_sigma_rad_s,
-        accel_scale_sigma_ppm: d.accel_scale_sigma_ppm,
-        gyro_scale_sigma_ppm: d.gyro_scale_sigma_ppm,
-        perfect: false,
-    };
+    let sigma = d.sigma;
+    if sigma.perfect {
+        return Err(source.refused("perfect", "is for simulations only"));
+    }
     sigma.validate().map_err(|e| source.setting(&e))?;
     Ok(Start {
         t_s: d.t_s.0,
@@ -1033,83 +944,53 @@ mod initial_tests {
 
 // Recorded speeds of a wheel.
 
-/// Speeds by the words of their names.
+/// Speeds and their times.
 static SPEED_QUANTITIES: [Quantity; 5] = [
     Quantity::time(OF_CLOCK),
     Quantity::time(STAMP),
     Quantity::time(OF_RECEIVER),
     Quantity::new("t_s", &["timeus"], NONE, Bare::Is(1e-6)),
-    Quantity {
-        of_words: true,
-        ..Quantity::new(
+    Quantity::new(
+        "speed",
+        &[
             "speed",
-            &[
-                "speed", "velocity", "vel", "v", "wheel", "wheels", "odometer", "odo", "forward",
-                "rear",
-            ],
-            SPEED,
-            Bare::Unknown,
-        )
-    },
+            "velocity",
+            "vel",
+            "v",
+            "wheel",
+            "wheel_speed",
+            "odometer",
+            "odo",
+            "forward",
+            "forward_speed",
+        ],
+        SPEED,
+        Bare::Unknown,
+    ),
 ];
 
-const SPEEDS: Dictionary = Dictionary::new(
+const SPEEDS: Dictionary<'_> = Dictionary::new(
     &SPEED_QUANTITIES,
-    "columns: t_s and wheel_m_s (or wheel_km_h, wheel_mph), negative in reverse; or rear_left_m_s and rear_right_m_s",
+    "columns: t_s and wheel_m_s (or wheel_km_h, wheel_mph), negative in reverse",
 );
 
-/// Reads speeds: a table with a time, and a speed or those of both rear wheels, whose mean is taken.
+/// Reads speeds: a table with a time and a speed.
 ///
 /// # Errors
 /// Whatever is wrong with it, with its line.
 pub(crate) fn read_wheel(path: &Path) -> Result<Vec<WheelSpeed>, Error> {
-    let table = table::read(path, &SPEEDS, &Asked::default())?;
-    let [time] = table.columns(["t_s"], &SPEEDS)?;
-    let speeds = speed_columns(&table)?;
-    let speed = |row| speeds.iter().map(|c| c.si(row)).sum::<f64>() / speeds.len() as f64;
-    let rows = (0..table.rows()).map(|row| WheelSpeed {
-        t_s: time.si(row),
-        m_s: speed(row),
+    let table = table::read(path, &SPEEDS)?;
+    let [time, speed] = table.columns(["t_s", "speed"], &SPEEDS)?;
+    if speed.factor.is_none() {
+        return Err(table.no_unit(speed));
+    }
+    let t_s = (0..table.rows()).map(|row| time.si(row));
+    increasing(&table.path, |k| table.line(k), t_s.clone())?;
+    let rows = t_s.enumerate().map(|(row, t_s)| {
+        let m_s = speed.si(row);
+        WheelSpeed { t_s, m_s }
     });
-    let read: Vec<WheelSpeed> = rows.collect();
-    match read.windows(2).position(|w| w[1].t_s <= w[0].t_s) {
-        Some(k) => {
-            let line = table.line(k + 1);
-            Err(time_back(&table.path, line, read[k].t_s, read[k + 1].t_s))
-        }
-        None => Ok(read),
-    }
-}
-
-/// The speed, or those of both rear wheels.
-fn speed_columns(table: &Table) -> Result<Vec<&Column>, Error> {
-    let has = |c: &Column, word: &str| normalised(&c.name).split('_').any(|w| w == word);
-    let is_candidate = |c: &&Column| c.quantity.of_words && !has(c, "front");
-    let all: Vec<&Column> = table.columns.iter().filter(is_candidate).collect();
-    let rear = |side: &str| all.iter().find(|c| has(c, "rear") && has(c, side));
-    let chosen = match (rear("left"), rear("right"), &all[..]) {
-        (Some(left), Some(right), _) => vec![*left, *right],
-        (_, _, []) => {
-            let refusal = table.refused("no speed of a wheel");
-            return Err(refusal.or_hint(SPEEDS.advice));
-        }
-        (_, _, [one]) => vec![*one],
-        (_, _, many) => {
-            let names: Vec<_> = many.iter().map(|c| format!("\"{}\"", c.name)).collect();
-            let message = format!("several speeds: {}", names.join(", "));
-            return Err(table.refused(message).or_hint("keep one of them"));
-        }
-    };
-    for column in &chosen {
-        let name = &column.name;
-        if column.factor.is_none() {
-            let message = format!("column \"{name}\" has no unit of speed in its name");
-            return Err(table
-                .refused(message)
-                .or_hint("end its name in _m_s, _km_h or _mph"));
-        }
-    }
-    Ok(chosen)
+    Ok(rows.collect())
 }
 
 #[cfg(test)]
@@ -1141,50 +1022,24 @@ mod wheel_tests {
     }
 
     #[test]
-    fn of_four_wheels_it_is_the_mean_of_the_rear() {
-        let header = "t_ms,front_left_m_s,front_right_m_s,rear_left_m_s,rear_right_m_s";
-        let speeds = read(&format!("{header}\n1000,9,9,7,8\n1010,9,9,8,9\n")).unwrap();
-        assert_eq!(
-            speeds,
-            [
-                WheelSpeed { t_s: 1.0, m_s: 7.5 },
-                WheelSpeed {
-                    t_s: 1.01,
-                    m_s: 8.5
-                }
-            ]
-        );
-    }
-
-    #[test]
     fn what_is_no_speed_is_refused_with_its_line_and_column() {
         for (text, said, hint) in [
             (
                 "# a\nt_s,wheel_ticks\n0,1\n",
-                "line 2: column \"wheel_ticks\" has no unit",
-                "_m_s, _km_h or _mph",
-            ),
-            (
-                "t_s,wheel_rpm\n0,1\n",
-                "line 1: column \"wheel_rpm\" has no unit",
-                "_m_s, _km_h or _mph",
+                "line 2: column speed is missing",
+                "",
             ),
             (
                 "t_s,wheel\n0,1\n",
                 "line 1: column \"wheel\" has no unit",
-                "_m_s, _km_h or _mph",
-            ),
-            (
-                "t_s,speed_ft_s\n0,1\n",
-                "line 1: column \"speed_ft_s\" has no unit",
-                "_m_s, _km_h or _mph",
+                "_m_s, _km_h, _mph",
             ),
             (
                 "t_s,wheel_m_s,speed_m_s\n0,1,1\n",
-                "several speeds: \"wheel_m_s\", \"speed_m_s\"",
-                "keep one",
+                "columns \"wheel_m_s\" and \"speed_m_s\" both give speed",
+                "remove one",
             ),
-            ("t_s,gear\n0,1\n", "no speed of a wheel", "wheel_m_s"),
+            ("t_s,gear\n0,1\n", "column speed is missing", "wheel_m_s"),
             ("wheel_m_s\n1\n", "column t_s is missing", "t_s"),
             (
                 "t_s,wheel_m_s\n1,2\n1,2\n",

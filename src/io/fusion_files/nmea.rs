@@ -5,10 +5,10 @@
 //! specifications).
 
 use super::{Fixes, clock, doubt, remark};
-use crate::io::{Failure as Error, help};
+use crate::io::Failure as Error;
 use chrono::NaiveDate;
 use glam::{DVec2, DVec3};
-use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
+use nav_sim_navigation::gnss::FixSigma;
 use nav_sim_signal::units::DEG;
 
 /// Seconds of a day.
@@ -20,12 +20,12 @@ const KNOT: f64 = 1852.0 / 3600.0;
 #[derive(Default)]
 struct Epoch {
     /// Line of its position.
-    line: usize,
+    line: u64,
     /// Time of day as written (s), and since the midnight before the first sentence.
     time_s: f64,
     since_s: f64,
     /// Latitude, longitude (rad), height above the ellipsoid (m).
-    position: Option<[f64; 3]>,
+    position: Option<DVec3>,
     sigma: Option<DVec3>,
     /// North and east (m/s), and what an unknown course leaves open of them (m/s).
     velocity: Option<(DVec2, f64)>,
@@ -49,7 +49,7 @@ pub(crate) fn is_nmea(text: &str) -> bool {
 
 impl Log {
     /// A sentence, whatever a logger wrote before it in its line.
-    fn sentence(&mut self, line: usize, text: &str) -> Result<(), &'static str> {
+    fn sentence(&mut self, line: u64, text: &str) -> Result<(), &'static str> {
         let fields = fields(text)?;
         let field = |i: usize| fields.get(i).copied().unwrap_or_default();
         let number = |i: usize| field(i).parse::<f64>().ok();
@@ -85,12 +85,12 @@ impl Log {
                 let lon = lon.ok_or("not a longitude dddmm.mmmm,E or W")?;
                 let altitude = number(9).ok_or("not an altitude")?;
                 epoch.line = line;
-                epoch.position = Some([lat, lon, altitude + number(11).unwrap_or(0.0)]);
+                epoch.position = Some(DVec3::new(lat, lon, altitude + number(11).unwrap_or(0.0)));
                 self.has_separation |= number(11).is_some();
             }
             "GST" => {
-                let north_east = number(6).zip(number(7)).zip(number(8));
-                epoch.sigma = north_east.map(|((n, e), d)| DVec3::new(n, e, d));
+                let sigma = [6, 7, 8].map(|i| number(i).unwrap_or_default());
+                epoch.sigma = Some(DVec3::from(sigma)).filter(|sigma| sigma.min_element() > 0.0);
             }
             "RMC" => {
                 if field(2) == "A" {
@@ -117,11 +117,11 @@ impl Log {
     }
 }
 
-/// The fixes of a log, each with its line, and what is to be said of it. `unsaid` are the standard deviations where `GST` states none;
+/// The fixes of a log, and what is to be said of it. `unsaid` are the standard deviations where `GST` states none;
 /// `imu_s` is when the IMU begins and ends.
 ///
 /// # Errors
-/// A damaged sentence, no position at all, standard deviations that nobody states.
+/// A damaged sentence, no position at all.
 pub(super) fn fixes(
     path: &str,
     text: &str,
@@ -130,64 +130,42 @@ pub(super) fn fixes(
 ) -> Result<Fixes, Error> {
     let mut log = Log::default();
     let lines = (1..).zip(text.lines().map(str::trim));
-    let lines: Vec<(usize, &str)> = lines.filter(|(_, line)| !line.is_empty()).collect();
-    let ends = [lines.first().map(|l| l.0), lines.last().map(|l| l.0)];
+    let lines: Vec<(u64, &str)> = lines.filter(|(_, line)| !line.is_empty()).collect();
+    let ends = [lines.first(), lines.last()].map(|end| end.map(|(i, _)| *i));
     for (i, line) in lines {
-        match log.sentence(i, line) {
-            // cut at its ends by whatever logged it
-            Err(message) if !ends.contains(&Some(i)) => {
-                let found: String = line.chars().take(60).collect();
-                let refused = Error::contents(path, i, format!("{message}: {found}"));
-                return Err(refused.or_hint("remove the line, if no more than it is damaged"));
-            }
-            _ => {}
+        // cut at its ends by whatever logged it
+        if let Err(message) = log.sentence(i, line)
+            && !ends.contains(&Some(i))
+        {
+            let found: String = line.chars().take(60).collect();
+            let refused = Error::contents(path, i, format!("{message}: {found}"));
+            return Err(refused.or_hint("remove the line, if no more than it is damaged"));
         }
     }
     let day = || (0.0, "seconds of the day (UTC)".to_owned());
     let (origin_s, clock) = log.clock(imu_s).unwrap_or_else(day);
-    let (mut fixes, mut is_given) = (Vec::new(), false);
     let vel_sigma = unsaid.and_then(|s| s.vel_m_s);
-    for epoch in &log.epochs {
-        let Some([lat, lon, h]) = epoch.position else {
-            continue;
-        };
-        let given = unsaid.map(|s| DVec3::from(s.pos_m));
-        is_given |= epoch.sigma.is_none();
-        let stated = epoch.sigma.filter(|sigma| sigma.min_element() > 0.0);
-        let pos_sigma_n = stated.or(given).ok_or_else(|| {
-            let message =
-                "a fix without standard deviations: no GST sentence of its time states them";
-            Error::contents(path, epoch.line, message).or_option(help::FIX_SIGMA)
-        })?;
-        let velocity = epoch.velocity.zip(vel_sigma);
-        let velocity = velocity.map(|((horizontal, course), [n, e, _])| GnssVelocity {
-            horizontal,
-            horizontal_sigma: DVec2::new(n.hypot(course), e.hypot(course)),
-            down: None,
-        });
-        let fix = GnssFix {
-            t_s: origin_s + epoch.since_s,
-            lat,
-            lon,
-            h,
-            pos_sigma_n,
-            velocity,
-        };
-        fixes.push((epoch.line as u64, fix));
-    }
-    if fixes.is_empty() {
+    let fix = |epoch: &Epoch| {
+        let (v, sigma) = epoch
+            .velocity
+            .zip(vel_sigma)
+            .map(|((v, course), [n, e, _])| {
+                let sigma = DVec2::new(n.hypot(course), e.hypot(course));
+                (v.extend(f64::NAN), sigma.extend(f64::NAN))
+            })
+            .unzip();
+        let stated = [Some(epoch.position?), epoch.sigma, v, sigma];
+        Some((epoch.line, origin_s + epoch.since_s, stated))
+    };
+    let fixes: Vec<_> = log.epochs.iter().filter_map(fix).collect();
+    let count = fixes.len();
+    if count == 0 {
         let message = "NMEA sentences without a position: no GGA with a fix";
         return Err(Error::contents(path, 1_u64, message)
             .or_hint("let the receiver write GGA, RMC and GST"));
     }
-    let count = fixes.len();
-    let mut remarks = vec![remark(format!(
-        "NMEA sentences: {count} fixes, times are {clock}"
-    ))];
-    if is_given {
-        let text = "standard deviations without GST as given";
-        remarks.push(remark(text));
-    }
+    let text = format!("NMEA sentences: {count} fixes, times are {clock}");
+    let mut remarks = vec![remark(text)];
     if vel_sigma.is_none() && log.epochs.iter().any(|e| e.velocity.is_some()) {
         let text =
             "speed and course are not used without standard deviations: --gnss-sigma 2,2,4:0.1";

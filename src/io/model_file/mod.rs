@@ -31,7 +31,7 @@ use nav_sim_signal::noise::{
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
-use serde_json::Map;
+use serde_json::{Map, json};
 use std::fmt;
 use std::fmt::Write;
 use std::path::Path;
@@ -367,7 +367,6 @@ impl ModelFile {
     /// The worst disagreement of the model with its recordings, where a fit of it does not describe them.
     #[must_use]
     pub fn misfit(&self) -> Option<Misfit> {
-        let fits = self.provenance.as_ref()?.get("fits")?.as_array()?;
         let of_fit = |fit: &Value| {
             let number = |key| fit.get(key).and_then(Value::as_float);
             let (p_value, ratio) = (number("j_p_value"), number("worst_ratio"));
@@ -378,24 +377,22 @@ impl ModelFile {
             })
         };
         let size = |m: &Misfit| m.worst.map_or(0.0, |(ratio, _)| ratio.ln().abs());
-        fits.iter()
-            .filter_map(of_fit)
-            .max_by(|a, b| size(a).total_cmp(&size(b)))
+        let misfits = self.fits().filter_map(of_fit);
+        misfits.max_by(|a, b| size(a).total_cmp(&size(b)))
     }
 
-    /// The largest whole number of that name that the provenance has of a fit.
-    fn most_of_fits(&self, key: &str) -> Option<i64> {
-        let fits = self.provenance.as_ref()?.get("fits")?.as_array()?;
-        fits.iter()
-            .filter_map(|fit| fit.get(key)?.as_integer())
-            .max()
+    /// What the provenance has of each fit.
+    fn fits(&self) -> impl Iterator<Item = &Value> {
+        let fits = self.provenance.as_ref().and_then(|all| all.get("fits"));
+        fits.and_then(Value::as_array).into_iter().flatten()
     }
 
     /// The longest averaging time (s) that the calibration saw: half its longest scale.
     pub(crate) fn observed_s(&self) -> Option<f64> {
         let scales = self
-            .most_of_fits("scales")
-            .filter(|n| (1..63).contains(n))?;
+            .fits()
+            .filter_map(|fit| fit.get("scales")?.as_integer());
+        let scales = scales.max().filter(|n| (1..63).contains(n))?;
         Some((scales as f64 - 1.0).exp2() / self.model.rate_hz)
     }
 }
@@ -432,7 +429,7 @@ pub fn from_text(path: &Path, text: &str) -> Result<ModelFile, Failure> {
 
 pub(super) fn parse(source: &Source) -> Result<ModelFile, Failure> {
     let Description {
-        rate_hz: Finite(rate_hz),
+        rate_hz: Between(rate_hz),
         accel,
         gyro,
         turn_on,
@@ -508,8 +505,7 @@ fn read_turn_on(source: &Source, table: &TurnOnTable) -> Result<TurnOn, Failure>
     let axes = |sensor: Sensor, given: &Option<OneOrEach<Finite, [Finite; 3]>>, limit: f64| {
         let axes = match given {
             None => return Ok(None),
-            Some(OneOrEach::One(all)) => [all.0; 3],
-            Some(OneOrEach::Each(each)) => each.map(|sigma| sigma.0),
+            Some(given) => [0, 1, 2].map(|axis| given.of(axis)),
         };
         if axes.iter().all(|sigma| (0.0..=limit).contains(sigma)) {
             return Ok(Some(axes));
@@ -692,11 +688,9 @@ fn turn_on(file: &ModelFile) -> String {
         let Some(axes) = turn_on.axes(sensor) else {
             continue;
         };
-        let alike = axes.iter().all(|sigma| *sigma == axes[0]);
-        let value = if alike {
-            format!("{:?}", axes[0])
-        } else {
-            format!("{axes:?}")
+        let value = match axes {
+            [x, y, z] if x == y && y == z => format!("{x:?}"),
+            axes => format!("{axes:?}"),
         };
         let _ = writeln!(out, "{} = {value}", TurnOn::key(sensor));
     }
@@ -760,32 +754,12 @@ fn laws(file: &ModelFile, channel: Channel) -> Option<Vec<String>> {
 }
 
 fn law(v: &Variation) -> String {
-    let constants = match v.law {
-        Law::Beta { a, b, low, width } => {
-            format!(
-                "distribution = \"beta\"\na = {a:?}\nb = {b:?}\nlow = {low:?}\nwidth = {width:?}"
-            )
-        }
-        Law::Normal { sd } => format!("distribution = \"normal\"\nsd = {sd:?}"),
-        Law::Lognormal {
-            median,
-            median_ci95,
-            sd,
-            sd_ci95,
-        } => {
-            let ends = |name, ends: Option<[f64; 2]>| {
-                ends.map_or(String::new(), |ends| format!("\n{name}{CI} = {ends:?}"))
-            };
-            format!(
-                "distribution = \"lognormal\"\nmedian = {median:?}{}\nsd = {sd:?}{}",
-                ends("median", median_ci95),
-                ends("sd", sd_ci95)
-            )
-        }
-    };
-    format!(
-        "process = \"{}\"\nparameter = \"{}\"\n{constants}\n",
-        v.process,
-        v.of.parameter.name()
-    )
+    let mut table = toml::Table::new();
+    for (distribution, constants) in json!(v.law).as_object().into_iter().flatten() {
+        table = known(constants.clone());
+        table.insert("distribution".into(), distribution.as_str().into());
+    }
+    table.insert("process".into(), v.process.as_str().into());
+    table.insert("parameter".into(), v.of.parameter.name().into());
+    table.to_string()
 }

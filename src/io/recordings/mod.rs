@@ -6,8 +6,8 @@
 
 use super::logs::LogOptions;
 use super::table::{
-    ACCELERATION, ANGLE, ANGULAR_RATE, Asked, Bare, Column, Dictionary, NO_COLUMN, NONE, Numbers,
-    Quantity, TIME, Table, Units, is_oxts, unreadable,
+    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, Column, Dictionary, NO_COLUMN, Quantity, TIME, Table,
+    Units, is_oxts, unreadable,
 };
 use super::{Failure, Place, help, table};
 use crate::report::six_digits;
@@ -24,7 +24,7 @@ use timing::Timing;
 pub(crate) mod timing;
 
 /// How recordings are read.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct ReadOptions {
     /// Sample rate (Hz) for files without a time column; where there is one, it must agree within 1 %, and wins where
     /// gaps are ignored.
@@ -41,20 +41,6 @@ pub struct ReadOptions {
     pub log: LogOptions,
     /// Fewest samples a recording must have (at least 2).
     pub min_samples: usize,
-}
-
-impl Default for ReadOptions {
-    fn default() -> Self {
-        Self {
-            rate_hz: None,
-            skip_s: 0.0,
-            gaps: Gaps::default(),
-            channels: None,
-            columns: None,
-            log: LogOptions::default(),
-            min_samples: 2,
-        }
-    }
 }
 
 /// What to do where a time step is over 1.5 or under 0.5 of the median step.
@@ -177,9 +163,8 @@ const fn gyro(name: &'static str) -> [Quantity; 3] {
     signal(name, [GYRO, GYRO_SI, &["dtheta"]], [ANGULAR_RATE, ANGLE])
 }
 
-/// Quantities of a recording. A packet counter starts again at 0 after 65535; ticks of 0.1 ms do after 2^32 − 1, and an
-/// exporter may leave them empty.
-static QUANTITIES: [[Quantity; 3]; 9] = [
+/// Quantities of a recording. A packet counter starts again at 0 after 65535.
+static QUANTITIES: [[Quantity; 3]; 8] = [
     [
         time(STAMP, Bare::Unknown, 0),
         time(OF_CLOCK, Bare::Unknown, 1),
@@ -187,16 +172,8 @@ static QUANTITIES: [[Quantity; 3]; 9] = [
     ],
     [
         time(&["timeus"], Bare::Is(1e-6), 1),
-        time(&["timems"], Bare::Is(1e-3), 1),
-        time(&["itow"], Bare::Is(1e-3), 1),
-    ],
-    [
-        Quantity::new("counter", &["packetcounter"], NONE, Bare::Is(1.0)),
-        Quantity::new("counter", &["packet_counter"], NONE, Bare::Is(1.0)),
-        Quantity {
-            may_be_empty: true,
-            ..Quantity::new("ticks", &["sampletimefine"], NONE, Bare::Is(1.0))
-        },
+        time(&["timems", "itow"], Bare::Is(1e-3), 1),
+        Quantity::number("counter", &["packetcounter", "packet_counter"]),
     ],
     accel("accel.x"),
     accel("accel.y"),
@@ -217,21 +194,13 @@ const SIX: [&str; 6] = [
 const SEVEN: [&str; 7] = ["t_s", SIX[0], SIX[1], SIX[2], SIX[3], SIX[4], SIX[5]];
 
 /// Dictionary of recordings.
-pub(crate) const DICTIONARY: Dictionary = Dictionary {
-    quantities: QUANTITIES.as_flattened(),
-    bare: &[],
+pub(crate) const DICTIONARY: Dictionary<'_> = Dictionary {
     array: &[&SIX, &SEVEN],
-    numbers: Numbers::Finite,
-    advice: "name the columns t_s, accel_x_m_s2 … gyro_z_rad_s (also _g, _mg, _deg_s, _deg_h; t_ms, t_us, t_ns)",
-    bad_cell: |error, value| match value.matches(':').count() > 1 {
-        _ if error.advice().is_some() => error,
-        true => {
-            error.or_hint("write the time in seconds, from any instant on, and name the column t_s")
-        }
-        false => error
-            .or_hint("remove the line")
-            .or_hint("record again: a sample that is made up would change the noise"),
-    },
+    bad_cell: "remove the line, or record again: a sample that is made up would change the noise",
+    ..Dictionary::new(
+        QUANTITIES.as_flattened(),
+        "name the columns t_s, accel_x_m_s2 … gyro_z_rad_s (also _g, _mg, _deg_s, _deg_h; t_ms, t_us, t_ns)",
+    )
 };
 
 /// The name of a channel's column in files of this program.
@@ -252,22 +221,23 @@ fn channel_of(column: &Column) -> Option<Channel> {
 pub(crate) fn load(
     path: &Path,
     options: &ReadOptions,
-    dictionary: &Dictionary,
+    dictionary: &Dictionary<'_>,
 ) -> Result<Table, Failure> {
     let wanted = options.channels.as_ref();
     let is_unwanted = |q: &Quantity| {
         let own = Channel::named(q.name);
         !q.axis.is_empty() && wanted.is_some_and(|w| !own.iter().any(|c| w.contains(c)))
     };
-    let asked = Asked {
+    let dictionary = &Dictionary {
         names: options.columns.as_deref(),
         unwanted: Some(&is_unwanted),
-        log: options.log.clone(),
+        log: Some(&options.log),
+        ..*dictionary
     };
-    let table = table::read(path, dictionary, &asked)?;
+    let table = table::read(path, dictionary)?;
     let is_gyro = |c: &&Column| c.factor.is_none() && c.quantity.name.starts_with("gyro");
     if let Some(column) = table.columns.iter().find(is_gyro) {
-        return Err(no_unit(&table, &column.name));
+        return Err(table.no_unit(column));
     }
     if table.columns.iter().all(|c| c.quantity.axis.is_empty()) {
         let known = table.columns.iter().map(|c| &c.name);
@@ -289,24 +259,12 @@ pub(crate) fn load(
     Ok(table)
 }
 
-/// A column without a unit that cannot be known.
-fn no_unit(table: &Table, column: &str) -> Failure {
-    let units = if column.to_lowercase().starts_with('a') {
-        "end its name in _m_s2, _g or _mg"
-    } else {
-        "end its name in _rad_s, _deg_s or _deg_h"
-    };
-    table
-        .refused(format!("column \"{column}\" has no unit in its name"))
-        .or_hint(units)
-        .or_option(help::COLUMN_NAMES)
-}
-
 /// Fewer samples than are needed.
 fn too_short(path: &str, samples: usize, needed: usize) -> Failure {
     let message = format!("{samples} samples, but {needed} are needed");
     Failure::contents(path, Place::Within, message)
         .or_hint("record for longer, or ask for fewer scales")
+        .or_option(("skip-s", "a smaller --skip-s"))
 }
 
 /// Reads recordings; those of a directory in name order (numbers in names by value). All are held.
@@ -338,13 +296,13 @@ pub(crate) fn visit<T: Send>(
     for some in files.chunks(AT_ONCE) {
         let outcomes: Vec<_> = some
             .par_iter()
-            .map(|file| held(&file.path, options, look))
+            .map(|(path, _)| held(path, options, look))
             .collect();
-        for (file, outcome) in some.iter().zip(outcomes) {
+        for ((path, is_found), outcome) in some.iter().zip(outcomes) {
             match outcome {
                 // the output of this very command, say, when it goes to a file in the directory
-                Err(e) if file.from_directory && e.passed_over().is_some() => {
-                    let (path, why) = (file.path.display(), e.passed_over().unwrap_or_default());
+                Err(e) if *is_found && e.passed_over().is_some() => {
+                    let (path, why) = (path.display(), e.passed_over().unwrap_or_default());
                     let text = format!("{path}: passed over, {why}");
                     report.warnings.push(text);
                 }
@@ -386,55 +344,33 @@ mod tests;
 
 // Which files are meant: directories stand for the recordings in them.
 
-/// A file to read.
-struct File {
-    pub(super) path: PathBuf,
-    /// Found in a directory, not named: may turn out to be something else.
-    from_directory: bool,
-}
-
 const ENDINGS: [&str; 10] = [
     "csv", "tsv", "txt", "npy", "npz", "mcap", "bag", "ulg", "ubx", "parquet",
 ];
 
-/// The files, in the order given, those of a directory in name order.
-fn expand(paths: &[PathBuf]) -> Result<Vec<File>, Failure> {
+/// The files, in the order given, those of a directory in name order; true where it was found in one, not named: it may turn out
+/// to be something else.
+fn expand(paths: &[PathBuf]) -> Result<Vec<(PathBuf, bool)>, Failure> {
     let mut files = Vec::new();
     for path in paths {
-        let io = |e: std::io::Error| {
-            let is_missing = e.kind() == std::io::ErrorKind::NotFound;
-            let advice = "check the path; a directory stands for all its recordings";
-            unreadable(path, e).or_hint_if(is_missing.then(|| advice.to_owned()))
-        };
+        let io = |e| unreadable(path, e);
         if std::fs::metadata(path).map_err(io)?.is_dir() && !is_oxts(path) {
             let inside = listing(path).map_err(io)?;
             if inside.is_empty() {
                 return Err(no_files(path.display().to_string()));
             }
-            files.extend(inside.into_iter().map(|path| File {
-                path,
-                from_directory: true,
-            }));
+            files.extend(inside.into_iter().map(|path| (path, true)));
         } else {
-            files.push(File {
-                path: path.clone(),
-                from_directory: false,
-            });
+            files.push((path.clone(), false));
         }
     }
     let mut seen = HashSet::new();
-    for file in &files {
+    for (path, _) in &files {
         // A pipe has no path of its own.
-        if !seen.insert(
-            file.path
-                .canonicalize()
-                .unwrap_or_else(|_| file.path.clone()),
-        ) {
+        if !seen.insert(path.canonicalize().unwrap_or_else(|_| path.clone())) {
             let message = "is given twice: it would count as two replicates";
-            return Err(
-                Failure::contents(file.path.display(), Place::Itself, message)
-                    .or_hint("name each file once; a directory stands for all its recordings"),
-            );
+            return Err(Failure::contents(path.display(), Place::Itself, message)
+                .or_hint("name each file once; a directory stands for all its recordings"));
         }
     }
     Ok(files)
@@ -699,17 +635,14 @@ pub(super) fn recordings(
 
 /// The samples of a stretch with NaN where some are missing.
 fn with_holes(samples: &[f64], piece: &Range<usize>, holes: &[(usize, usize)]) -> Vec<f64> {
-    let is_inside = |(sample, _): &&(usize, usize)| *sample > piece.start && *sample < piece.end;
-    let inside = holes.iter().filter(is_inside);
-    let lost: usize = inside.clone().map(|(_, lost)| lost).sum();
-    let (mut whole, mut done) = (Vec::with_capacity(samples.len() + lost), 0);
-    for (sample, lost) in inside {
-        let next = sample - piece.start;
-        whole.extend_from_slice(&samples[done..next]);
-        whole.extend(std::iter::repeat_n(f64::NAN, *lost));
-        done = next;
+    let inside = holes.iter().filter(|(sample, _)| *sample > piece.start);
+    let (mut inside, mut whole) = (inside.peekable(), Vec::with_capacity(samples.len()));
+    for (k, value) in piece.clone().zip(samples) {
+        if let Some((_, lost)) = inside.next_if(|(sample, _)| *sample == k) {
+            whole.extend(std::iter::repeat_n(f64::NAN, *lost));
+        }
+        whole.push(*value);
     }
-    whole.extend_from_slice(&samples[done..]);
     whole
 }
 
@@ -733,18 +666,6 @@ fn pieces(
     let all = || ends.windows(2).map(|w| w[0]..w[1]);
     let longest = all().map(|p| p.len()).max().unwrap_or(0);
     let needed = options.min_samples.max(2);
-    if longest < needed && options.skip_s > 0.0 {
-        let (skip_s, seconds) = (
-            options.skip_s,
-            crate::report::seconds(samples as f64 / timing.rate_hz),
-        );
-        let message = format!(
-            "leaving out the first {skip_s} s leaves {longest} samples of {seconds} s, but {needed} are needed"
-        );
-        return Err(Failure::contents(path, Place::Within, message)
-            .or_option(("skip-s", "a smaller --skip-s"))
-            .or_hint("a longer recording"));
-    }
     if longest < needed {
         return Err(too_short(path, longest, needed));
     }
@@ -767,11 +688,13 @@ fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
     let from_gravity = gravity_factor(raw)?;
     let factor = |column: &Column| {
         let channel = column.quantity.name;
-        if let Some(value) = only_value(&column.values) {
-            let message = format!(
-                "{channel} (column \"{}\") is dead: every sample is {value}",
-                column.name
-            );
+        let [value, others @ ..] = &column.values[..] else {
+            return Ok(1.0);
+        };
+        let is_same = |other: &f64| other.to_bits() == value.to_bits();
+        if !others.is_empty() && others.iter().all(is_same) {
+            let name = &column.name;
+            let message = format!("{channel} (column \"{name}\") is dead: every sample is {value}");
             return Err(Failure::contents(&raw.path, Place::Within, message)
                 .or_option(help::CHANNELS)
                 .or_hint("record again"));
@@ -808,14 +731,7 @@ pub(crate) fn gravity_factor(raw: &Table) -> Result<f64, Failure> {
             }
         }
     }
-    Err(no_unit(raw, &first.name))
-}
-
-/// The value of all samples, if two or more have the same.
-fn only_value(values: &[f64]) -> Option<f64> {
-    let (first, rest) = values.split_first()?;
-    let is_same = |value: &f64| value.to_bits() == first.to_bits();
-    (!rest.is_empty() && rest.iter().all(is_same)).then_some(*first)
+    Err(raw.no_unit(first))
 }
 
 /// Mean of values times a factor, summed about the first of them so that a large offset costs no digits.
@@ -835,20 +751,13 @@ fn norm(vector: &[f64]) -> f64 {
 
 /// Static specific force is gravity, or nothing where the mean was removed before; rates are small.
 fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Failure> {
-    let means_of_sensor = |sensor| -> Vec<f64> {
-        means
-            .iter()
-            .filter(|(channel, _)| channel.sensor == sensor)
-            .map(|(_, mean)| *mean)
-            .collect()
-    };
-    let (accel, gyro) = (
-        means_of_sensor(Sensor::Accel),
-        means_of_sensor(Sensor::Gyro),
-    );
-    let is_gravity = |mean: &[f64]| (norm(mean) / STANDARD_GRAVITY - 1.0).abs() < 0.1;
-    if accel.len() == 3 && gyro.len() == 3 && norm(&accel) < NO_GRAVITY && is_gravity(&gyro) {
-        let (f, rate) = (norm(&accel), norm(&gyro));
+    let [accel, gyro] = Sensor::ALL.map(|sensor| -> Vec<f64> {
+        let own = means.iter().filter(|(channel, _)| channel.sensor == sensor);
+        own.map(|(_, mean)| *mean).collect()
+    });
+    let (f, rate) = (norm(&accel), norm(&gyro));
+    let is_gravity = (rate / STANDARD_GRAVITY - 1.0).abs() < 0.1;
+    if accel.len() == 3 && gyro.len() == 3 && f < NO_GRAVITY && is_gravity {
         let message = format!(
             "accelerometers and gyroscopes are exchanged: |f| is {f:.4} m/s², the mean rate {rate:.4} rad/s"
         );
@@ -857,10 +766,10 @@ fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Fa
             .or_option(help::COLUMN_NAMES));
     }
     if accel.len() == 3 {
-        check_gravity(&report.file, norm(&accel))?;
+        check_gravity(&report.file, f)?;
     }
-    if norm(&gyro) > 0.1 {
-        let degrees = norm(&gyro).to_degrees();
+    if rate > 0.1 {
+        let degrees = rate.to_degrees();
         report.warn(format!(
             "mean angular rate {degrees:.1} deg/s: not static, or deg/s named rad/s?"
         ));

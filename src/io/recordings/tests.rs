@@ -222,12 +222,6 @@ fn xsens_counter_wraps_and_tells_what_was_lost() {
     )
     .unwrap();
     assert_close(&[r.rate_hz], &[50.0]);
-    // A fine clock that is not filled in is passed over.
-    let empty = "// MT Manager version: 2022.2.0\nPacketCounter\tSampleTimeFine\tGyr_X\n51400\tNaN\t0.1\n51401\t\t0.2\n";
-    assert_eq!(read_one("mt.txt", empty, &at_100_hz()).unwrap().len(), 2);
-    // No rate in the head: the fine clock has it, over its own wrap.
-    let r = read_one("mt.txt", xsens("", 0..12), &ReadOptions::default()).unwrap();
-    assert_close(&[r.rate_hz], &[100.0]);
 }
 
 #[test]

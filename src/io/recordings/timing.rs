@@ -21,60 +21,58 @@ pub(super) fn timing(
     options: &ReadOptions,
     report: &mut FileReport,
 ) -> Result<Timing, Failure> {
-    let wrong_rate = |raw: &Table, message: String| {
+    let [time, counter] = ["t_s", "counter"].map(|clock| raw.take(clock));
+    let wrong_rate = |message: String| {
         Err(Failure::contents(&raw.path, Place::Within, message).or_option(help::WRONG_RATE))
     };
     if let Some(rate_hz) = options.rate_hz.filter(|r| !(r.is_finite() && *r > 0.0)) {
-        return wrong_rate(raw, format!("{rate_hz} Hz is not a sample rate"));
-    }
-    let [time, counter, ticks] = ["t_s", "counter", "ticks"].map(|clock| raw.take(clock));
-    if let (None, None, Some(given), Some((stated, source))) =
-        (&time, &ticks, options.rate_hz, raw.rate_hz)
-        && (stated / given - 1.0).abs() > DISAGREEING
-    {
-        let stated = six_digits(stated);
-        let message = format!("the {source} says {stated} Hz, but {given} Hz is given");
-        return wrong_rate(raw, message);
+        return wrong_rate(format!("{rate_hz} Hz is not a sample rate"));
     }
     let known = options.rate_hz.map(|rate_hz| (rate_hz, "given"));
-    let known = known.or(raw.rate_hz);
-    let clock = match (time, counter, ticks, known) {
-        (Some(time), ..) => {
-            let mut clock = Clock::new(time, f64::MAX, options.gaps, "time column".to_owned());
-            let first = clock.start_s;
+    let clock = match (time, known.or(raw.rate_hz)) {
+        (Some(time), _) => {
+            let mut clock = Clock::new(time, options.gaps, "time column".to_owned());
             if clock.unit_s.is_nan() {
-                let (unit_s, unit) = guess(clock.step, first, known.map(|(rate_hz, _)| rate_hz));
+                let (unit_s, unit) = unit_of_step(clock.step);
                 let text = format!("column \"{}\" taken as {unit}", clock.name);
                 let is_told = !clock.steps.is_empty();
                 report.assumptions.extend(is_told.then_some(text));
                 clock.unit_s = unit_s;
             }
-            clock.start_s = first * clock.unit_s;
+            clock.start_s *= clock.unit_s;
             clock
         }
-        (None, Some(counter), _, Some((rate_hz, source))) => {
-            let source = format!("{source}, packet counter");
-            let clock = Clock::new(counter, 65536.0, options.gaps, source);
+        (None, Some((rate_hz, source))) => {
+            let stated = raw.rate_hz.map(|(stated, of)| (six_digits(stated), of));
+            let is_other = |(stated, _): &(f64, _)| (stated / rate_hz - 1.0).abs() > DISAGREEING;
+            if let Some((stated, of)) = stated.filter(is_other) {
+                let message = format!("the {of} says {stated} Hz, but {rate_hz} Hz is given");
+                return wrong_rate(message);
+            }
+            let Some(mut counter) = counter else {
+                report.rate_from = source.into();
+                return Ok(Timing {
+                    rate_hz,
+                    ..Timing::default()
+                });
+            };
+            let (mut last, mut turned) = (0.0, 0.0);
+            for value in &mut counter.values {
+                turned += 65_536.0 * f64::from(*value - last < -32_768.0);
+                last = *value;
+                *value += turned;
+            }
+            let clock = Clock::new(counter, options.gaps, format!("{source}, packet counter"));
             // The counter tells what was lost, not the rate: with a skip factor it counts by more than one.
             let unit_s = 1.0 / (rate_hz * clock.median.max(1.0));
-            Clock { unit_s, ..clock }
-        }
-        (None, _, Some(ticks), _) => {
-            let source = format!("column \"{}\"", ticks.name);
-            let clock = Clock::new(ticks, 4_294_967_296.0, options.gaps, source);
+            let start_s = 0.0;
             Clock {
-                unit_s: 1e-4,
+                unit_s,
+                start_s,
                 ..clock
             }
         }
-        (None, _, None, Some((rate_hz, source))) => {
-            report.rate_from = source.into();
-            return Ok(Timing {
-                rate_hz,
-                ..Timing::default()
-            });
-        }
-        (None, _, None, None) => {
+        (None, None) => {
             let message = "no time column, and no rate is given";
             return Err(Failure::contents(&raw.path, Place::Within, message)
                 .or_option(("rate-hz", "give the rate with --rate-hz")));
@@ -111,42 +109,29 @@ struct Clock {
 }
 
 impl Clock {
-    /// A clock that starts again at 0 when it reaches `modulus`; a fall of more than half of that is the start.
-    fn new(column: Column, modulus: f64, gaps: Gaps, source: String) -> Self {
-        let Column {
-            name,
-            factor,
-            values: mut since,
-            ..
-        } = column;
+    fn new(column: Column, gaps: Gaps, source: String) -> Self {
+        let mut since = column.values;
         let first = since.first().copied().unwrap_or(0.0);
-        let (mut last, mut turns) = (first, 0.0);
-        for value in &mut since {
-            turns += f64::from(*value - last < -0.5 * modulus);
-            last = *value;
-            *value = last - first + turns * modulus;
-        }
+        since.iter_mut().for_each(|value| *value -= first);
         let steps: Vec<f64> = since.windows(2).map(|w| w[1] - w[0]).collect();
         let median = median_step(&since);
         let long = steps.iter().filter(|s| **s > 1.5 * median).count();
         let is_lossy = long > 0
             && (long as f64) < MOST_LOST * since.len() as f64
             && !steps.iter().any(|s| *s < 0.5 * median);
-        let mean = since
-            .last()
-            .map_or(0.0, |last| last / steps.len().max(1) as f64);
+        let step = match gaps {
+            Gaps::Ignore if !is_lossy => since.last().unwrap_or(&0.0) / steps.len().max(1) as f64,
+            _ => median,
+        };
         Self {
-            name,
+            name: column.name,
             source,
-            start_s: if modulus == f64::MAX { first } else { 0.0 },
+            start_s: first,
             since,
             steps,
-            unit_s: factor.unwrap_or(f64::NAN),
+            unit_s: column.factor.unwrap_or(f64::NAN),
             median,
-            step: match gaps {
-                Gaps::Ignore if !is_lossy => mean,
-                _ => median,
-            },
+            step,
             is_lossy,
         }
     }
@@ -332,9 +317,6 @@ const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 0.5..=20_000.0;
 /// The units of time and their length (s).
 const UNITS: [(f64, &str); 4] = [(1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")];
 
-/// Unix time of the years 2000 to 2100 (s): in no two units of a thousand are the numbers of these the same.
-const UNIX_S: std::ops::Range<f64> = 9.4e8..4.2e9;
-
 /// The unit in which a step is that of 10 Hz … 10 kHz: the four ranges do not overlap.
 pub(crate) fn unit_of_step(step: f64) -> (f64, &'static str) {
     UNITS[match step {
@@ -343,20 +325,4 @@ pub(crate) fn unit_of_step(step: f64) -> (f64, &'static str) {
         s if s > 0.1 => 1,
         _ => 0,
     }]
-}
-
-/// The unit that is assumed from the step, the first time and a rate that is known otherwise (Hz).
-fn guess(step: f64, first: f64, known_hz: Option<f64>) -> (f64, &'static str) {
-    // The units are thousands apart: the nearest ratio is the one that is meant.
-    let apart = |unit_s: f64| known_hz.map_or(0.0, |hz| (hz * step * unit_s).ln().abs());
-    let is_known = known_hz.is_some() && step > 0.0;
-    let is_meant = |(unit_s, _): &(f64, &str)| match is_known {
-        true => UNITS.iter().all(|other| apart(*unit_s) <= apart(other.0)),
-        false => {
-            let is_usual = USUAL_RATES_HZ.contains(&(1.0 / (step * unit_s)));
-            is_usual && UNIX_S.contains(&(first * unit_s))
-        }
-    };
-    let found = UNITS.into_iter().find(is_meant);
-    found.unwrap_or_else(|| unit_of_step(step))
 }

@@ -1,6 +1,6 @@
 //! Tables of numbers in files of any kind, and the dictionaries that say which quantities their columns hold.
 //!
-//! A reader is `read(path, &DICTIONARY, &asked)`: columns with a factor to SI and the line of each row.
+//! A reader is `read(path, &DICTIONARY)`: columns with a factor to SI and the line of each row.
 
 use super::suggest::nearest;
 use super::{Failure, Place, help, logs, source};
@@ -10,7 +10,8 @@ use nav_sim_logs::npy::Array;
 use nav_sim_logs::{Channel, Clock, Content, Kind as LogKind, in_seconds, npy};
 pub(crate) use quantity::find;
 pub(crate) use quantity::{
-    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, NONE, Quantity, SPEED, TIME, Units, normalised,
+    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, TIME,
+    Units, normalised,
 };
 use std::fmt::Display;
 use std::io::{BufRead, Cursor, Read};
@@ -19,53 +20,42 @@ use std::path::{Path, PathBuf};
 mod quantity;
 
 /// Quantities of a kind of table, and words for what is refused.
-pub(crate) struct Dictionary {
+pub(crate) struct Dictionary<'a> {
     /// Quantities; of several columns of one with a rank, the first by rank is taken.
     pub(crate) quantities: &'static [Quantity],
     /// Names of the columns of texts without a header, by their number.
     pub(crate) bare: &'static [&'static [&'static str]],
     /// Names of the columns of arrays without names.
     pub(crate) array: &'static [&'static [&'static str]],
-    /// Numbers that a cell may hold.
-    pub(crate) numbers: Numbers,
+    /// True if cells that hold no number of their range are NaN: who reads them leaves those rows out.
+    pub(crate) is_partial: bool,
     /// Advice where columns are not found.
     pub(crate) advice: &'static str,
-    /// Advice of a cell that is refused.
-    pub(crate) bad_cell: fn(Failure, &str) -> Failure,
+    /// Advice where a cell is refused.
+    pub(crate) bad_cell: &'static str,
+    /// Names of the columns, in place of a header or where there is none.
+    pub(crate) names: Option<&'a [String]>,
+    /// Quantities that are not wanted: neither parsed nor checked.
+    pub(crate) unwanted: Option<&'a (dyn Fn(&Quantity) -> bool + Sync)>,
+    /// Choice within a log.
+    pub(crate) log: Option<&'a logs::LogOptions>,
 }
 
-impl Dictionary {
+impl Dictionary<'_> {
     /// Finite numbers in named columns.
     pub(crate) const fn new(quantities: &'static [Quantity], advice: &'static str) -> Self {
         Self {
             quantities,
             bare: &[],
             array: &[],
-            numbers: Numbers::Finite,
+            is_partial: false,
             advice,
-            bad_cell: |error, _| error,
+            bad_cell: "",
+            names: None,
+            unwanted: None,
+            log: None,
         }
     }
-}
-
-/// Numbers that a table may hold.
-#[derive(Clone, Copy, PartialEq)]
-pub(crate) enum Numbers {
-    /// Finite ones.
-    Finite,
-    /// Any: who reads it leaves those rows out.
-    Any,
-}
-
-/// Choices of who reads a table.
-#[derive(Default)]
-pub(crate) struct Asked<'a> {
-    /// Names of the columns, in place of a header or where there is none.
-    pub(crate) names: Option<&'a [String]>,
-    /// Quantities that are not wanted: neither parsed nor checked.
-    pub(crate) unwanted: Option<&'a (dyn Fn(&Quantity) -> bool + Sync)>,
-    /// Choice within a log.
-    pub(crate) log: logs::LogOptions,
 }
 
 /// Columns of a file, before anything is decided about time and units.
@@ -101,6 +91,8 @@ pub(crate) struct Column {
     pub(crate) factor: Option<f64>,
     /// Numbers as they stand in the file.
     pub(crate) values: Vec<f64>,
+    /// Its place among the columns of the file.
+    place: usize,
 }
 
 impl Column {
@@ -114,17 +106,13 @@ impl Column {
 ///
 /// # Errors
 /// When the file cannot be read, names no column that is known, or has a cell that is no number.
-pub(crate) fn read(
-    path: &Path,
-    dictionary: &Dictionary,
-    asked: &Asked<'_>,
-) -> Result<Table, Failure> {
+pub(crate) fn read(path: &Path, dictionary: &Dictionary<'_>) -> Result<Table, Failure> {
     let ends_in = |ending: &str| {
         path.extension()
             .is_some_and(|e| e.eq_ignore_ascii_case(ending))
     };
     let name = path.display().to_string();
-    let of = |columns| table(path, columns, dictionary, asked);
+    let of = |columns| of_columns(&name, columns, vec![], dictionary);
     let table = match logs::kind_of(path) {
         #[cfg(feature = "npz")]
         Some(LogKind::Npz) => {
@@ -134,14 +122,14 @@ pub(crate) fn read(
                 ..of(columns)?
             })
         }
-        Some(_) => log(path, dictionary, asked),
-        None if ends_in("npy") => of(npy(path, dictionary, asked)?),
+        Some(_) => log(path, dictionary.log, &of),
+        None if ends_in("npy") => of(npy(path, dictionary)?),
         #[cfg(feature = "parquet")]
         None if ends_in("parquet") => of(parquet(path)?),
         #[cfg(not(feature = "parquet"))]
         None if ends_in("parquet") => {
             let message = "is Apache Parquet, which this build does not read";
-            let refusal = Failure::contents(name, Place::Itself, message);
+            let refusal = Failure::contents(&name, Place::Itself, message);
             Err(refusal.or_hint("build with --features parquet, or write CSV"))
         }
         None if is_oxts(path) => {
@@ -153,7 +141,7 @@ pub(crate) fn read(
         }
         None => {
             let reader = source::table(path).map_err(|e| unreadable(path, e))?;
-            read_text(&name, reader, dictionary, asked)
+            read_text(&name, reader, dictionary)
         }
     }?;
     table.filled()
@@ -163,14 +151,9 @@ pub(crate) fn read(
 ///
 /// # Errors
 /// Those of [`read`].
-pub(crate) fn parse(
-    name: &str,
-    text: &str,
-    dictionary: &Dictionary,
-    asked: &Asked<'_>,
-) -> Result<Table, Failure> {
+pub(crate) fn parse(name: &str, text: &str, dictionary: &Dictionary<'_>) -> Result<Table, Failure> {
     let reader = Box::new(Cursor::new(text.to_owned()));
-    read_text(name, reader, dictionary, asked)?.filled()
+    read_text(name, reader, dictionary)?.filled()
 }
 
 /// Error of the system on a table, with a hint.
@@ -220,17 +203,15 @@ impl Table {
         path: &str,
         header_line: u64,
         names: &[String],
-        dictionary: &Dictionary,
-        asked: &Asked<'_>,
+        dictionary: &Dictionary<'_>,
         is_si: bool,
-    ) -> Result<(Self, Vec<Option<usize>>), Failure> {
+    ) -> Result<Self, Failure> {
         let mut table = Self {
             path: path.to_owned(),
             header_line,
             ..Self::default()
         };
-        let unwanted = |quantity: &Quantity| asked.unwanted.is_some_and(|is| is(quantity));
-        let mut places: Vec<usize> = Vec::new();
+        let unwanted = |quantity: &Quantity| dictionary.unwanted.is_some_and(|is| is(quantity));
         for (place, name) in names.iter().enumerate() {
             let name = name.trim().to_owned();
             match quantity::find(dictionary.quantities, &name) {
@@ -239,33 +220,27 @@ impl Table {
                     let values = Vec::new();
                     let is_signal = quantity.rank.is_none();
                     let factor = factor.or((is_si && is_signal).then_some(1.0));
-                    places.push(place);
                     table.columns.push(Column {
                         name,
                         quantity,
                         factor,
                         values,
+                        place,
                     });
                 }
                 None => table.ignored.push(name),
             }
         }
-        table.choose(&mut places)?;
-        table.no_unknown_unit(dictionary, asked)?;
-        let of_place = |place| places.iter().position(|p| *p == place);
-        Ok((table, (0..names.len()).map(of_place).collect()))
+        table.choose()?;
+        table.no_unknown_unit(dictionary)?;
+        Ok(table)
     }
 
     /// Keeps one column of each quantity.
-    fn choose(&mut self, places: &mut Vec<usize>) -> Result<(), Failure> {
+    fn choose(&mut self) -> Result<(), Failure> {
         let rank = |c: &Column| c.quantity.rank.map(|rank| (rank, c.factor.is_none()));
         let mut k = 1;
         while k < self.columns.len() {
-            // speeds are chosen by who reads them
-            if self.columns[k].quantity.of_words {
-                k += 1;
-                continue;
-            }
             let (name, later) = (self.columns[k].quantity.name, &self.columns[k]);
             let Some(i) = self.columns[..k]
                 .iter()
@@ -281,36 +256,43 @@ impl Table {
                 return Err(self.refused(message).or_hint("remove one of them"));
             };
             let out = if second < first { i } else { k };
-            places.remove(out);
             self.ignored.push(self.columns.remove(out).name);
         }
         Ok(())
     }
 
     /// A column that is an axis by its name, but in a unit that is not known, must not be dropped in silence.
-    fn no_unknown_unit(&self, dictionary: &Dictionary, asked: &Asked<'_>) -> Result<(), Failure> {
+    fn no_unknown_unit(&self, dictionary: &Dictionary<'_>) -> Result<(), Failure> {
         for name in &self.ignored {
             let plain = normalised(name);
             let is_meant = |q: &&Quantity| {
                 q.is_in_unknown_unit(&plain)
                     && !self.has(q.name)
-                    && !asked.unwanted.is_some_and(|is| is(q))
+                    && !dictionary.unwanted.is_some_and(|is| is(q))
             };
             if let Some(quantity) = dictionary.quantities.iter().find(is_meant) {
-                let endings: Vec<String> = quantity
-                    .units
-                    .iter()
-                    .map(|(names, _)| format!("_{}", names[0]))
-                    .collect();
-                let message = format!("column \"{name}\" is in a unit that is not known");
-                return Err(self
-                    .refused(message)
-                    .or_hint(format!("end its name in one of {}", endings.join(", ")))
-                    .or_option(help::COLUMN_NAMES)
-                    .or_option(help::CHANNELS));
+                let problem = "is in a unit that is not known";
+                return Err(self.unit(name, quantity, problem).or_option(help::CHANNELS));
             }
         }
         Ok(())
+    }
+
+    /// The refusal of the unit of a column.
+    fn unit(&self, name: &str, quantity: &Quantity, problem: &str) -> Failure {
+        let endings = quantity
+            .units
+            .iter()
+            .map(|(names, _)| format!("_{}", names[0]));
+        let endings: Vec<String> = endings.collect();
+        self.refused(format!("column \"{name}\" {problem}"))
+            .or_hint(format!("end its name in one of {}", endings.join(", ")))
+            .or_option(help::COLUMN_NAMES)
+    }
+
+    /// The refusal of a column whose unit cannot be known.
+    pub(crate) fn no_unit(&self, column: &Column) -> Failure {
+        self.unit(&column.name, column.quantity, "has no unit in its name")
     }
 
     /// Appends a number to a column; `written`: as the file has it.
@@ -320,22 +302,28 @@ impl Table {
         value: f64,
         written: Option<&[u8]>,
         line: u64,
-        dictionary: &Dictionary,
+        dictionary: &Dictionary<'_>,
     ) -> Result<(), Failure> {
         let own = &mut self.columns[column];
+        let si = value * own.factor.unwrap_or(1.0);
+        let outside = own
+            .quantity
+            .range
+            .filter(|(low, high, _)| !(*low..=*high).contains(&si));
         let is_measured = value.is_finite() && value.abs() <= LARGEST;
-        if is_measured || dictionary.numbers != Numbers::Finite || own.quantity.may_be_empty {
-            own.values.push(value);
+        if is_measured && outside.is_none() || dictionary.is_partial {
+            let is_inside = value.is_nan() || outside.is_none();
+            own.values.push(if is_inside { value } else { f64::NAN });
             return Ok(());
         }
         let text = written.map_or_else(
             || value.to_string(),
             |cell| shown(&String::from_utf8_lossy(cell.trim_ascii()), 40),
         );
-        let (text, reason) = match value.is_finite() {
-            true if written.is_none() => (format!("{value:e}"), BEYOND),
-            true => (text, BEYOND),
-            false => (format!("\"{text}\""), "is not finite"),
+        let (text, reason) = match outside {
+            _ if !value.is_finite() => (format!("\"{text}\""), "is not finite"),
+            Some((.., reason)) if is_measured => (text, reason),
+            _ => (text, BEYOND),
         };
         Err(self.bad_cell(&self.columns[column].name, line, &text, reason, dictionary))
     }
@@ -346,21 +334,24 @@ impl Table {
         line: u64,
         value: &str,
         reason: &str,
-        dictionary: &Dictionary,
+        dictionary: &Dictionary<'_>,
     ) -> Failure {
-        let mut error = Failure::cell(&self.path, line, column, value, reason);
+        let error = Failure::cell(&self.path, line, column, value, reason);
         let point = value.trim_matches('"').replacen(',', ".", 1);
         if point.len() + 2 == value.len() && value.contains(',') && point.parse::<f64>().is_ok() {
-            error = error.or_hint("write decimals with a point: 0.5, not 0,5");
+            return error.or_hint("write decimals with a point: 0.5, not 0,5");
         }
-        (dictionary.bad_cell)(error, value)
+        let is_time = value.matches(':').count() > 1;
+        let time = "write the time in seconds, from any instant on, and name the column t_s";
+        match (is_time, dictionary.bad_cell) {
+            (true, _) => error.or_hint(time),
+            (false, "") => error,
+            (false, advice) => error.or_hint(advice),
+        }
     }
 
     /// Refuses a table without rows, or whose rows end before others.
-    fn filled(mut self) -> Result<Self, Failure> {
-        let is_clock =
-            |c: &Column| !(c.quantity.may_be_empty && c.values.iter().any(|v| v.is_nan()));
-        self.columns.retain(is_clock);
+    fn filled(self) -> Result<Self, Failure> {
         let uneven = |c: &&Column| c.values.len() != self.columns[0].values.len();
         if let Some(other) = self.columns.iter().find(uneven) {
             let (rows, first) = (other.values.len(), &self.columns[0]);
@@ -430,13 +421,17 @@ impl Table {
         Some(self.columns.swap_remove(at))
     }
 
-    /// Keeps the rows of which that holds.
-    pub(crate) fn retain(&mut self, keep: impl Fn(&Self, usize) -> bool) {
-        let kept: Vec<usize> = (0..self.rows()).filter(|row| keep(self, *row)).collect();
+    /// Keeps the rows of finite numbers; what was left out, in words.
+    pub(crate) fn keep_whole(&mut self) -> Option<String> {
+        let all = self.rows();
+        let is_whole = |row: &usize| self.columns.iter().all(|c| c.values[*row].is_finite());
+        let kept: Vec<usize> = (0..all).filter(is_whole).collect();
         self.lines = kept.iter().map(|row| self.line(*row)).collect();
         for column in &mut self.columns {
             column.values = kept.iter().map(|row| column.values[*row]).collect();
         }
+        let count = all - kept.len();
+        (count > 0).then(|| format!("{count} rows left out: values not finite, or out of range"))
     }
 
     /// Refuses a table without one of the quantities that are needed; a column that nearly has the name of a missing one
@@ -447,7 +442,7 @@ impl Table {
     pub(crate) fn require<'a>(
         &self,
         needed: impl IntoIterator<Item = &'a str>,
-        dictionary: &Dictionary,
+        dictionary: &Dictionary<'_>,
     ) -> Result<(), Failure> {
         let missing: Vec<&str> = needed.into_iter().filter(|q| !self.has(q)).collect();
         let slip = |name: &String| Some((name.clone(), nearest(name, missing.iter().copied())?));
@@ -471,7 +466,7 @@ impl Table {
     pub(crate) fn columns<const N: usize>(
         &self,
         needed: [&str; N],
-        dictionary: &Dictionary,
+        dictionary: &Dictionary<'_>,
     ) -> Result<[&Column; N], Failure> {
         self.require(needed, dictionary)?;
         self.all(needed)
@@ -503,28 +498,20 @@ const BUFFER: usize = 1 << 17;
 fn read_text(
     path: &str,
     mut reader: Reader,
-    dictionary: &Dictionary,
-    asked: &Asked<'_>,
+    dictionary: &Dictionary<'_>,
 ) -> Result<Table, Failure> {
-    let head = Head::read(path, &mut reader, dictionary, asked)?;
-    let (mut table, places) = Table::new(
-        path,
-        head.line,
-        &head.names,
-        dictionary,
-        asked,
-        head.is_xsens,
-    )?;
+    let head = Head::read(path, &mut reader, dictionary)?;
+    let mut table = Table::new(path, head.line, &head.names, dictionary, head.is_xsens)?;
     table.rate_hz = head.rate_hz.map(|rate_hz| (rate_hz, "head of the file"));
     table.is_bare = head.is_bare;
-    if head.is_latin_1 && asked.names.is_none() {
+    if head.is_latin_1 && dictionary.names.is_none() {
         let text = "header not in UTF-8, taken as ISO-8859-1";
         table.assumptions.push(text.to_owned());
     }
     if !table.columns.is_empty() {
-        head.rows(&mut table, reader, &places, dictionary)?;
+        head.rows(&mut table, reader, dictionary)?;
     }
-    table.comments.splice(..0, head.comments);
+    table.comments = head.comments;
     Ok(table)
 }
 
@@ -549,12 +536,7 @@ struct Head {
 }
 
 impl Head {
-    fn read(
-        path: &str,
-        reader: &mut Reader,
-        dictionary: &Dictionary,
-        asked: &Asked<'_>,
-    ) -> Result<Self, Failure> {
+    fn read(path: &str, reader: &mut Reader, dictionary: &Dictionary<'_>) -> Result<Self, Failure> {
         let mut head = Self {
             delimiter: b',',
             ..Self::default()
@@ -620,16 +602,16 @@ impl Head {
                     (head.line, head.names) = (line, names);
                     return Ok(head);
                 }
-                head.is_bare = asked.names.is_none();
-                head.names = asked
+                head.is_bare = dictionary.names.is_none();
+                head.names = dictionary
                     .names
                     .map(<[String]>::to_vec)
                     .or_else(|| layout(dictionary.bare, cells.len()))
-                    .ok_or_else(|| no_header(path, line, &cells, text, dictionary))?;
+                    .ok_or_else(|| no_header(path, line, text, dictionary))?;
                 return Ok(head);
             }
-            let names = asked.names.map_or(cells, <[String]>::to_vec);
-            if known > 0 || asked.names.is_some() {
+            let names = dictionary.names.map_or(cells, <[String]>::to_vec);
+            if known > 0 || dictionary.names.is_some() {
                 head.names = names;
                 return Ok(head);
             }
@@ -643,8 +625,7 @@ impl Head {
         &self,
         table: &mut Table,
         reader: Reader,
-        places: &[Option<usize>],
-        dictionary: &Dictionary,
+        dictionary: &Dictionary<'_>,
     ) -> Result<(), Failure> {
         let path = table.path.clone();
         let rows = Cursor::new(self.first_row.clone()).chain(reader);
@@ -658,6 +639,7 @@ impl Head {
         let mut rows = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
+            .comment(Some(b'#'))
             .delimiter(self.delimiter)
             .buffer_capacity(BUFFER)
             .from_reader(rows);
@@ -665,19 +647,10 @@ impl Head {
         let length = std::fs::metadata(&path).map_or(0, |m| m.len());
         let cannot = |e| unreadable(Path::new(&path), of_csv(e));
         let (mut record, mut row, mut has_units) = (csv::ByteRecord::new(), 0, false);
-        let expected = places.len();
+        let expected = self.names.len();
         while rows.read_byte_record(&mut record).map_err(cannot)? {
             let line = self.before + line_of(&record, rows.position().line());
             let found = record.len();
-            let first = record.get(0).unwrap_or_default().trim_ascii_start();
-            if first.starts_with(b"#") || first.starts_with(b"%") {
-                let cells: Vec<&[u8]> = record.iter().collect();
-                let text = String::from_utf8_lossy(&cells.join(&self.delimiter)).into_owned();
-                table
-                    .comments
-                    .push(text.trim_start_matches(['#', '%', ' ']).to_owned());
-                continue;
-            }
             if row == 0 && !has_units && found == expected && is_words(&record) {
                 has_units = true;
                 let text = format!("line {line} has words and no numbers: passed over");
@@ -703,17 +676,13 @@ impl Head {
                 let all = (row as u64).saturating_mul(length) / rows.position().byte().max(1);
                 table.fits(all.max((row + BETWEEN) as u64))?;
             }
-            for (cell, column) in record.iter().zip(places) {
-                let Some(column) = *column else { continue };
-                let value = match number(cell, self.delimiter) {
-                    Some(value) => value,
-                    None if table.columns[column].quantity.may_be_empty => f64::NAN,
-                    None => {
-                        let value = shown(&String::from_utf8_lossy(cell.trim_ascii()), 40);
-                        let (value, reason) = (format!("\"{value}\""), "is not a number");
-                        let name = &table.columns[column].name;
-                        return Err(table.bad_cell(name, line, &value, reason, dictionary));
-                    }
+            for column in 0..table.columns.len() {
+                let cell = record.get(table.columns[column].place).unwrap_or_default();
+                let Some(value) = number(cell, self.delimiter) else {
+                    let value = shown(&String::from_utf8_lossy(cell.trim_ascii()), 40);
+                    let (value, reason) = (format!("\"{value}\""), "is not a number");
+                    let name = &table.columns[column].name;
+                    return Err(table.bad_cell(name, line, &value, reason, dictionary));
                 };
                 table.push(column, value, Some(cell), line, dictionary)?;
             }
@@ -730,39 +699,28 @@ fn layout(layouts: &[&[&str]], columns: usize) -> Option<Vec<String>> {
     Some(found.iter().map(|name| (*name).to_owned()).collect())
 }
 
-fn no_header(
-    path: &str,
-    line: u64,
-    cells: &[String],
-    text: &str,
-    dictionary: &Dictionary,
-) -> Failure {
-    let refused =
-        |message: String| Failure::contents(path, line, message).or_hint(dictionary.advice);
-    if !dictionary.bare.is_empty() {
-        return refused(format!("{} columns without a header", cells.len()));
-    }
+fn no_header(path: &str, line: u64, text: &str, dictionary: &Dictionary<'_>) -> Failure {
     let found = shown(text, 60);
-    refused(format!(
-        "a header that names the columns is missing, found \"{found}\""
-    ))
-    .or_option(help::COLUMN_NAMES)
+    let message = format!("a header that names the columns is missing, found \"{found}\"");
+    Failure::contents(path, line, message)
+        .or_hint(dictionary.advice)
+        .or_option(help::COLUMN_NAMES)
 }
 
 /// The rate in a comment such as `Update Rate: 100.0Hz`.
 fn rate_in(comment: &str) -> Option<f64> {
     let lower = comment.to_lowercase();
-    let words = ["update rate", "sample rate", "sampling rate", "output rate"];
-    let after = words.iter().find_map(|w| lower.split_once(w))?.1;
+    let after = lower.split_once("update rate")?.1;
     let value = after.trim_start_matches(|c: char| !c.is_ascii_digit());
-    let end = value.find(|c: char| !c.is_ascii_digit() && c != '.');
-    let digits = &value[..end.unwrap_or(value.len())];
+    let digits = value
+        .split(|c: char| !c.is_ascii_digit() && c != '.')
+        .next()?;
     digits.parse().ok().filter(|r: &f64| *r > 0.0)
 }
 
 /// The separator of the cells of a line: of equals the last. Blanks do only where nothing else does and they are not inside
 /// one name.
-fn delimiter_of(line: &str, dictionary: &Dictionary) -> u8 {
+fn delimiter_of(line: &str, dictionary: &Dictionary<'_>) -> u8 {
     let count = |d: u8| line.bytes().filter(|b| *b == d).count();
     let most = [b',', b';', b'\t'].into_iter().max_by_key(|d| count(*d));
     let is_spaced = count(b' ') > 0 && find(dictionary.quantities, line).is_none();
@@ -798,12 +756,11 @@ fn split(text: &str, delimiter: u8) -> Vec<String> {
 
 /// True if a row has units, say, below the names: no cell begins as a number does.
 fn is_words(record: &csv::ByteRecord) -> bool {
-    let first = |cell: &[u8]| cell.trim_ascii().first().copied();
     let is_word = |cell: &[u8]| {
-        let begins = |b: u8| !b.is_ascii_digit() && !b"+-.".contains(&b);
-        number(cell, b',').is_none() && first(cell).is_none_or(begins)
+        let first = cell.trim_ascii().first();
+        number(cell, b',').is_none() && first.is_none_or(|b| !b"+-.0123456789".contains(b))
     };
-    record.iter().all(is_word) && record.iter().any(|cell| first(cell).is_some())
+    record.iter().all(is_word) && record.iter().any(|cell| !cell.trim_ascii().is_empty())
 }
 
 /// Error of the system, with its kind.
@@ -885,27 +842,27 @@ impl<R: Read> Read for Blanks<R> {
 /// Columns by their names.
 type Columns = Vec<(String, Vec<f64>)>;
 
-/// The table of such columns.
-pub(super) fn table(
-    path: &Path,
+/// The table of such columns; the rows stand in these lines, or are counted from 1.
+pub(crate) fn of_columns(
+    path: &str,
     columns: Columns,
-    dictionary: &Dictionary,
-    asked: &Asked<'_>,
+    lines: Vec<u64>,
+    dictionary: &Dictionary<'_>,
 ) -> Result<Table, Failure> {
-    let path = path.display().to_string();
-    let names: Vec<String> = match asked.names {
+    let names: Vec<String> = match dictionary.names {
         Some(names) if names.len() != columns.len() => {
-            return Err(Failure::row_length(&path, 1, columns.len(), names.len()));
+            return Err(Failure::row_length(path, 1, columns.len(), names.len()));
         }
         Some(names) => names.to_vec(),
         None => columns.iter().map(|(name, _)| name.clone()).collect(),
     };
-    let (mut table, places) = Table::new(&path, 0, &names, dictionary, asked, false)?;
+    let mut table = Table::new(path, 0, &names, dictionary, false)?;
+    table.lines = lines;
     table.fits(columns.first().map_or(0, |(_, values)| values.len() as u64))?;
-    for ((_, values), place) in columns.into_iter().zip(places) {
-        let Some(column) = place else { continue };
-        for (line, value) in (1..).zip(values) {
-            table.push(column, value, None, line, dictionary)?;
+    for column in 0..table.columns.len() {
+        let (_, values) = &columns[table.columns[column].place];
+        for (row, value) in values.iter().enumerate() {
+            table.push(column, *value, None, table.line(row), dictionary)?;
         }
     }
     Ok(table)
@@ -923,7 +880,7 @@ fn strided(array: &Array, first: usize, step: usize) -> Vec<f64> {
 }
 
 /// Reads an array: columns named by who asks, or by their number.
-fn npy(path: &Path, dictionary: &Dictionary, asked: &Asked<'_>) -> Result<Columns, Failure> {
+fn npy(path: &Path, dictionary: &Dictionary<'_>) -> Result<Columns, Failure> {
     let array = npy::read(path).map_err(|e| logs::refused(path, e))?;
     let refused = |message: String| Failure::contents(path.display(), Place::Within, message);
     let count = match array.shape[..] {
@@ -936,7 +893,7 @@ fn npy(path: &Path, dictionary: &Dictionary, asked: &Asked<'_>) -> Result<Column
             )));
         }
     };
-    let named = asked.names.map(|_| vec![String::new(); count]);
+    let named = dictionary.names.map(|_| vec![String::new(); count]);
     let names = named.or_else(|| layout(dictionary.array, count));
     let names = names.ok_or_else(|| {
         refused(format!(
@@ -959,14 +916,14 @@ const RATE: &str = "rate_hz";
 /// it is stated.
 #[cfg(feature = "npz")]
 fn npz(path: &Path) -> Result<(Columns, Option<f64>), Failure> {
-    use nav_sim_logs::{Error, Fault, npz::Archive};
+    use nav_sim_logs::{Fault, npz::Archive};
     let refused = |e| logs::refused(path, e);
     let mut archive = Archive::open(path).map_err(refused)?;
     let (mut columns, mut rate_hz) = (Vec::new(), None);
     for name in archive.names() {
         let Array { shape, values } = match archive.read(&name) {
             // texts and the like are passed over
-            Err(Error::At(_, Fault::Encoding(_))) => {
+            Err(e) if matches!(e.fault, Fault::Encoding) => {
                 columns.push((name, Vec::new()));
                 continue;
             }
@@ -1096,16 +1053,24 @@ fn oxts_times(path: &Path) -> Result<Vec<f64>, Failure> {
 }
 
 /// Reads the samples of the IMU of a log.
-pub(super) fn log(
+fn log(
     path: &Path,
-    dictionary: &Dictionary,
-    asked: &Asked<'_>,
+    options: Option<&logs::LogOptions>,
+    of: &dyn Fn(Columns) -> Result<Table, Failure>,
 ) -> Result<Table, Failure> {
     let refused = |e| logs::refused(path, e);
     let log = logs::open(path)?;
-    let channel = log.channel(Content::Imu, asked.log.topic.as_deref());
+    let channel = log.channel(
+        Content::Imu,
+        options.and_then(|options| options.topic.as_deref()),
+    );
     let channel = channel.map_err(refused)?;
-    let samples = log.imu(channel, asked.log.stamp).map_err(refused)?;
+    let samples = log
+        .imu(
+            channel,
+            options.map(|options| options.stamp).unwrap_or_default(),
+        )
+        .map_err(refused)?;
     let times = samples.iter().map(|sample| in_seconds(sample.stamp_ns));
     let mut columns = vec![("t_s".to_owned(), times.collect())];
     for (k, (name, _)) in OXTS.iter().enumerate() {
@@ -1115,7 +1080,7 @@ pub(super) fn log(
         });
         columns.push(((*name).to_owned(), values.collect()));
     }
-    let mut table = table(path, columns, dictionary, asked)?;
+    let mut table = of(columns)?;
     table.assumptions.push(format!("topic {}", channel.topic));
     table.warnings.extend(log.damage().map(logs::cut_off));
     let is_other = |c: &&Channel| c.topic != channel.topic && c.clock == Clock::Unix;

@@ -12,6 +12,7 @@
 //! | ArduPilot | `TimeUS` |
 //! | loggers | `ax_mps2`, `gx_radps`, `gyro_x_dps`, `acc_x [mg]`, … |
 
+use nav_sim_navigation::earth::MAX_LATITUDE_DEG;
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 
 /// Endings of names, each with the SI units in one of that.
@@ -61,6 +62,15 @@ pub(crate) enum Bare {
     Not,
 }
 
+/// Ends of a range, and the reason for which what is beyond them is refused.
+pub(crate) type Range = (f64, f64, &'static str);
+pub(crate) const LATITUDE: Range = (
+    -MAX_LATITUDE_DEG,
+    MAX_LATITUDE_DEG,
+    "is not a latitude within ±89.9",
+);
+pub(crate) const LONGITUDE: Range = (-180.0, 360.0, "is not a longitude");
+
 /// A quantity that a column may hold.
 #[derive(Debug)]
 pub(crate) struct Quantity {
@@ -73,14 +83,12 @@ pub(crate) struct Quantity {
     pub(crate) bare: Bare,
     /// Sign of what the file has.
     pub(crate) sign: f64,
-    /// True if a stem is one word of the name.
-    pub(crate) of_words: bool,
     /// Preference among columns of the quantity; without it there may be but one.
     pub(crate) rank: Option<u8>,
     /// True if it is an increment over the sample.
     pub(crate) per_sample: bool,
-    /// True if empty cells make it a column that is passed over.
-    pub(crate) may_be_empty: bool,
+    /// Numbers that it may be (SI).
+    pub(crate) range: Option<Range>,
 }
 
 impl Quantity {
@@ -97,10 +105,9 @@ impl Quantity {
             units,
             bare,
             sign: 1.0,
-            of_words: false,
             rank: None,
             per_sample: false,
-            may_be_empty: false,
+            range: None,
         }
     }
 
@@ -132,6 +139,23 @@ impl Quantity {
         }
     }
 
+    /// The same between such ends (degrees).
+    pub(crate) const fn within(self, (low, high, reason): Range) -> Self {
+        Self {
+            range: Some((low * DEG - 1e-9, high * DEG + 1e-9, reason)),
+            ..self
+        }
+    }
+
+    /// The same where it is above 0, as a standard deviation is.
+    pub(crate) const fn positive(self) -> Self {
+        const REASON: &str = "is not a standard deviation: it must be above 0";
+        Self {
+            range: Some((f64::MIN_POSITIVE, f64::MAX, REASON)),
+            ..self
+        }
+    }
+
     /// The same where no unit may be left out.
     pub(crate) const fn with_unit(self) -> Self {
         Self {
@@ -153,11 +177,8 @@ impl Quantity {
         let Some(stem) = stem.strip_suffix(self.axis) else {
             return false;
         };
-        match (self.of_words, self.axis) {
-            (true, _) => stem.split('_').any(|word| self.stems.contains(&word)),
-            (_, "") => self.stems.contains(&stem),
-            _ => self.stems.contains(&stem.trim_end_matches('_')),
-        }
+        let is_axis = !self.axis.is_empty();
+        self.stems.contains(&stem) || is_axis && self.stems.contains(&stem.trim_end_matches('_'))
     }
 
     /// The factor of a column of this name, of none without a unit; nothing of another quantity.

@@ -12,11 +12,11 @@ fn found(name: &str) -> Option<(&'static str, Option<f64>)> {
 fn with_header(names: &[&str], unwanted: &[&str]) -> Result<Table, Failure> {
     let names: Vec<String> = names.iter().map(|n| (*n).to_owned()).collect();
     let is_unwanted = |q: &Quantity| unwanted.contains(&q.name);
-    let asked = Asked {
+    let dictionary = Dictionary {
         unwanted: Some(&is_unwanted),
-        ..Asked::default()
+        ..DICTIONARY
     };
-    Ok(Table::new("a.csv", 1, &names, &DICTIONARY, &asked, false)?.0)
+    Table::new("a.csv", 1, &names, &dictionary, false)
 }
 
 #[test]
@@ -117,17 +117,17 @@ fn the_stamp_of_the_measurement_is_the_time() {
 #[test]
 fn lines_before_the_header_and_decimal_commas_are_read() {
     let text = "Logger 7;\nStarted;2026-11-26\n\nt_s;Gyro X (deg/s)\n0,00;1,5\n0,01;-2\n";
-    let table = parse("a.csv", text, &DICTIONARY, &Asked::default()).unwrap();
+    let table = parse("a.csv", text, &DICTIONARY).unwrap();
     assert_eq!((table.header_line, table.line(1)), (4, 6));
     let gyro = table.get("gyro.x").unwrap();
     assert_eq!(gyro.values, [1.5, -2.0]);
     let quoted = "t_s,gyro_x_rad_s,note\n0,1,\"a, b\"\n1,2,\"c\nd\"\n2,3,e\n";
-    let table = parse("a.csv", quoted, &DICTIONARY, &Asked::default()).unwrap();
+    let table = parse("a.csv", quoted, &DICTIONARY).unwrap();
     assert_eq!((table.rows(), table.line(2)), (3, 5));
     let comments = "# made by hand\nt_s,gyro_x_rad_s\n0,1\n# a gap\n1,2\n";
-    let table = parse("a.csv", comments, &DICTIONARY, &Asked::default()).unwrap();
+    let table = parse("a.csv", comments, &DICTIONARY).unwrap();
     assert_eq!(table.rows(), 2);
-    assert_eq!(table.comments, ["made by hand", "a gap"]);
+    assert_eq!(table.comments, ["made by hand"]);
 }
 
 #[test]
@@ -145,6 +145,6 @@ proptest! {
     #[test]
     fn never_panics_on_bytes(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
         let reader = Box::new(Cursor::new(bytes));
-        let _ = read_text("a.csv", reader, &DICTIONARY, &Asked::default());
+        let _ = read_text("a.csv", reader, &DICTIONARY);
     }
 }

@@ -3,6 +3,7 @@
 //! Keys have paths, `outage[2].end_s`; entries of lists of tables are counted from 1.
 
 use super::suggest::nearest;
+use super::table::shown;
 use super::{Failure, Place, source};
 use nav_sim_signal::units::SettingError;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -11,7 +12,7 @@ use serde::de::{
     DeserializeOwned, DeserializeSeed, Deserializer, Error as DeserializeError, Expected,
     IgnoredAny, IntoDeserializer, MapAccess, SeqAccess, Unexpected, Visitor,
 };
-use serde::{Deserialize, Serialize, forward_to_deserialize_any};
+use serde::{Deserialize, forward_to_deserialize_any};
 use std::borrow::Cow;
 use std::fmt;
 use std::fmt::Display;
@@ -19,7 +20,7 @@ use std::io::ErrorKind;
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::path::Path;
-use toml::Spanned;
+use std::slice;
 use toml::de::{DeTable, DeValue};
 
 /// A key with the path of its table before it.
@@ -61,20 +62,13 @@ impl Source {
     /// When it cannot be read.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let text = source::text(path).map_err(|e| {
-            let kind = e.kind();
-            let error = Failure::io(path, e);
-            match kind {
-                ErrorKind::NotFound => {
-                    error.or_hint("start from the files that nav-sim init makes")
-                }
-                ErrorKind::InvalidData => error.or_hint("a TOML file is text in UTF-8"),
-                _ => error,
-            }
+            let advice = match e.kind() {
+                ErrorKind::NotFound => Some("start from the files that nav-sim init makes"),
+                _ => None,
+            };
+            Failure::io(path, e).or_hint_if(advice.map(str::to_owned))
         })?;
-        Ok(Self {
-            path: path.display().to_string(),
-            text,
-        })
+        Ok(Self::new(&path.display().to_string(), &text))
     }
 
     /// A text that is in no file.
@@ -92,24 +86,19 @@ impl Source {
     /// The file as its description has it.
     ///
     /// # Errors
-    /// Line and column of what is not TOML; line, key and value of what is refused, a mistyped key with the nearest legal one.
+    /// Line of what is not TOML; line, key and value of what is refused, a mistyped key with the nearest legal one.
     pub(crate) fn get<T: DeserializeOwned>(&self) -> Result<T, Failure> {
         let table = DeTable::parse(&self.text).map_err(|e| self.syntax(&e))?;
         let value = DeValue::Table(table.into_inner());
-        T::deserialize(Node(&value)).map_err(|refusal| self.explained(refusal))
+        T::deserialize(Node::new(&value, "")).map_err(|refusal| self.explained(refusal))
     }
 
     fn syntax(&self, e: &toml::de::Error) -> Failure {
         let span = e.span().unwrap_or_default();
-        let line_start = self.text[..span.start].rfind('\n').map_or(0, |i| i + 1);
-        let column = self.text[line_start..span.start].chars().count() + 1;
-        let key = self.text.get(span.clone()).unwrap_or_default().trim();
-        let message = match e.message() {
-            "duplicate key" => format!("the key \"{key}\" is there already"),
-            other => other.to_owned(),
-        };
-        let place = Place::Character(self.line(span.start) as u64, column as u64);
-        self.at(place, message)
+        let line = self.line(span.start);
+        let written = self.text.get(span).unwrap_or_default().trim();
+        let written = shown(written, 40);
+        self.at(line, format!("{}: \"{written}\"", e.message()))
     }
 
     /// The line (from 1) a byte stands in.
@@ -144,39 +133,31 @@ impl Source {
         self.at(self.line_of(key), message)
     }
 
-    /// A refusal of the value of a key.
+    /// A refusal of the value of a key; an entry of a list of plain values goes by the name of the list.
     pub(crate) fn refused(&self, key: &str, reason: impl Display) -> Failure {
         let (span, is_set) = self.place(key);
-        let span = if is_set { span } else { span.start..span.start };
-        self.refused_at(span, key, reason)
-    }
-
-    fn refused_at(&self, span: Range<usize>, key: &str, reason: impl Display) -> Failure {
         let line = self.line(span.start);
-        let value = shown(self.text.get(span).unwrap_or_default());
+        let written = self.text.get(span).filter(|_| is_set).unwrap_or_default();
+        let value: String = written.split_whitespace().collect::<Vec<_>>().join(" ");
+        let value: String = value.chars().take(60).collect();
+        let entry = key.strip_suffix(']').and_then(|key| key.rsplit_once('['));
+        let key = entry.map_or(key, |(list, _)| list);
         self.at(line, format!("\"{key}\" = {value} {reason}"))
     }
 
     /// The refusal of a setting by its rule.
     pub(crate) fn setting(&self, error: &SettingError) -> Failure {
-        let SettingError {
-            key,
-            value,
-            requirement,
-            advice,
-            ..
-        } = error;
-        let advice = advice.map(str::to_owned);
-        if self.place(key).1 {
-            let refusal = self.refused(key, format!("is refused: {requirement}"));
-            return refusal.or_hint_if(advice);
-        }
-        self.error(
-            key,
-            format!("\"{key}\" = {value} is refused: {requirement}"),
-        )
-        .or_hint_if(advice)
-        .or_hint("the file does not set it: this is the default")
+        let SettingError { key, value, .. } = error;
+        let reason = format!("is refused: {}", error.requirement);
+        let is_set = self.place(key).1;
+        let refusal = match is_set {
+            true => self.refused(key, reason),
+            false => self.error(key, format!("\"{key}\" = {value} {reason}")),
+        };
+        let default = "the file does not set it: this is the default";
+        let advice = error.advice.into_iter();
+        let advice = advice.chain((!is_set).then_some(default));
+        advice.fold(refusal, Failure::or_hint)
     }
 
     /// A key that means nothing where it stands, with the nearest that does.
@@ -211,17 +192,13 @@ impl Source {
             .map(|key| format!("\"{}\"", dotted(table, key)))
             .collect();
         let keys = keys.join(" or ");
-        let advice = match keys.as_str() {
-            "\"rate_hz\"" => "add rate_hz = 100.0, the sample rate (Hz)".to_owned(),
-            _ => format!("add the key {keys}"),
-        };
         self.error(table, format!("{keys} is missing"))
-            .or_hint(advice)
+            .or_hint(format!("add the key {keys}"))
     }
 
     /// The refusal of a value or key by its type.
     fn explained(&self, refusal: Refusal) -> Failure {
-        let key = refusal.path;
+        let key = refusal.path.unwrap_or_default();
         match refusal.what {
             What::Unknown(field, legal) => {
                 self.unknown(&dotted(&key, &field), legal.iter().copied())
@@ -230,39 +207,17 @@ impl Source {
             What::Variant(word, legal) => {
                 let meant = nearest(&word, legal.iter().copied());
                 let words: Vec<String> = legal.iter().map(|w| format!("\"{w}\"")).collect();
-                self.of_value(&key, format!("is not one of {}", words.join(", ")))
+                self.refused(&key, format!("is not one of {}", words.join(", ")))
                     .or_hint_if(meant.map(|meant| format!("did you mean \"{meant}\"?")))
             }
             What::NoList => {
                 let name = key.rsplit('.').next().unwrap_or_default();
                 let advice = format!("there may be several: write [[{name}]], in double brackets");
-                self.of_value(&key, "is not a list").or_hint(advice)
+                self.refused(&key, "is not a list").or_hint(advice)
             }
-            What::Reason(reason) => self.of_value(&key, reason),
+            What::Reason(reason) => self.refused(&key, reason),
         }
     }
-
-    /// A refusal of a value; an entry of a list of plain values goes by the name of the list.
-    fn of_value(&self, key: &str, reason: impl Display) -> Failure {
-        let span = self.place(key).0;
-        self.refused_at(
-            span,
-            key.strip_suffix(']')
-                .map_or(key, |k| k.rsplit_once('[').map_or(key, |k| k.0)),
-            reason,
-        )
-    }
-}
-
-/// A value as it is shown: in one line, at most 60 characters of it.
-fn shown(written: &str) -> String {
-    written
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ")
-        .chars()
-        .take(60)
-        .collect()
 }
 
 #[cfg(test)]
@@ -274,18 +229,20 @@ mod tests;
 // all kinds have stand in a struct around it, whose field has the name of the word.
 
 /// Words that choose among the kinds of a table.
-const TAGS: [&str; 4] = ["type", "operation", "kind", "distribution"];
+static TAGS: [&str; 4] = ["type", "operation", "kind", "distribution"];
+/// Fields that are no keys: a struct of the keys that are none of the others.
+const REST: [&str; 1] = ["sigma"];
 
 /// What is wrong, and the path of the value or of its table.
 #[derive(Debug)]
 struct Refusal {
-    pub(super) path: String,
+    path: Option<String>,
     what: What,
 }
 
 #[derive(Debug)]
 enum What {
-    Unknown(String, &'static [&'static str]),
+    Unknown(String, Vec<&'static str>),
     Missing(&'static str),
     Variant(String, &'static [&'static str]),
     NoList,
@@ -295,22 +252,7 @@ enum What {
 
 impl From<What> for Refusal {
     fn from(what: What) -> Self {
-        Self {
-            path: String::new(),
-            what,
-        }
-    }
-}
-
-impl Refusal {
-    /// The same, within a key or an entry of a list.
-    fn within(self, part: &str) -> Self {
-        let path = match self.path.as_str() {
-            "" => part.to_owned(),
-            path if path.starts_with('[') => format!("{part}{path}"),
-            path => dotted(part, path),
-        };
-        Self { path, ..self }
+        Self { path: None, what }
     }
 }
 
@@ -363,7 +305,7 @@ impl DeserializeError for Refusal {
     }
 
     fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
-        What::Unknown(field.to_owned(), expected).into()
+        What::Unknown(field.to_owned(), expected.to_vec()).into()
     }
 
     fn missing_field(field: &'static str) -> Self {
@@ -371,28 +313,75 @@ impl DeserializeError for Refusal {
     }
 }
 
-/// A value.
-struct Node<'a>(pub(super) &'a DeValue<'a>);
+impl From<&str> for Refusal {
+    fn from(reason: &str) -> Self {
+        What::Reason(reason.to_owned()).into()
+    }
+}
+
+/// A value and its path; of a table, without the keys that are passed.
+#[derive(Clone)]
+struct Node<'a> {
+    value: &'a DeValue<'a>,
+    path: String,
+    passed: &'static [&'static str],
+}
+
+impl<'a> Node<'a> {
+    fn new(value: &'a DeValue<'a>, path: impl Into<String>) -> Self {
+        Self {
+            value,
+            path: path.into(),
+            passed: &[],
+        }
+    }
+
+    /// Keys of a table.
+    fn keys(&self, table: &'a DeTable<'a>) -> impl Iterator<Item = (&'a str, Self)> {
+        table.iter().filter_map(|(key, value)| {
+            let key = key.get_ref().as_ref();
+            let node = Self::new(value.get_ref(), dotted(&self.path, key));
+            (!self.passed.contains(&key)).then_some((key, node))
+        })
+    }
+
+    /// What is wrong with it, unless it is with a part of it.
+    fn blamed<T>(self, read: impl FnOnce(Self) -> Result<T, Refusal>) -> Result<T, Refusal> {
+        let (path, passed) = (self.path.clone(), self.passed);
+        read(self).map_err(|mut e| {
+            if let (What::Unknown(_, legal), None) = (&mut e.what, &e.path) {
+                legal.extend(passed);
+            }
+            e.path.get_or_insert(path);
+            e
+        })
+    }
+}
 
 impl<'de> Deserializer<'de> for Node<'_> {
     type Error = Refusal;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        let no_number = || Refusal::from(What::Reason("is too large a number".to_owned()));
-        match self.0 {
+        const TOO_LARGE: &str = "is too large a number";
+        match self.value {
             DeValue::String(text) => visitor.visit_str(text),
             DeValue::Integer(number) => {
-                let digits = number.as_str();
-                let parsed = i64::from_str_radix(digits, number.radix());
-                visitor.visit_i64(parsed.map_err(|_| no_number())?)
+                let parsed = i64::from_str_radix(number.as_str(), number.radix());
+                visitor.visit_i64(parsed.map_err(|_| TOO_LARGE)?)
             }
             DeValue::Float(number) => {
-                visitor.visit_f64(number.as_str().parse().map_err(|_| no_number())?)
+                visitor.visit_f64(number.as_str().parse().map_err(|_| TOO_LARGE)?)
             }
             DeValue::Boolean(is) => visitor.visit_bool(*is),
             DeValue::Datetime(time) => visitor.visit_string(time.to_string()),
-            DeValue::Array(items) => visitor.visit_seq(Entries { items, next: 0 }),
-            DeValue::Table(table) => visitor.visit_map(Keys::of(table, |_| true)),
+            DeValue::Array(items) => {
+                let entries = (1_usize..).zip(items.iter());
+                let node = |i, item| Node::new(item, format!("{}[{i}]", self.path));
+                visitor.visit_seq(Entries::new(
+                    entries.map(|(i, item)| ("", node(i, item.get_ref()))),
+                ))
+            }
+            DeValue::Table(table) => visitor.visit_map(Entries::new(self.keys(table))),
         }
     }
 
@@ -409,7 +398,7 @@ impl<'de> Deserializer<'de> for Node<'_> {
     }
 
     fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        match self.0 {
+        match self.value {
             DeValue::Table(_) => Err(What::NoList.into()),
             _ => self.deserialize_any(visitor),
         }
@@ -421,35 +410,49 @@ impl<'de> Deserializer<'de> for Node<'_> {
         fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Refusal> {
-        if let DeValue::Array(_) = self.0 {
-            return Err(What::Reason("is not a table".to_owned()).into());
+        let is_rest = |field: &str| REST.contains(&field);
+        let tag = fields
+            .iter()
+            .find(|field| TAGS.contains(field) || is_rest(field));
+        match (self.value, tag) {
+            (DeValue::Array(_), _) => Err("is not a table".into()),
+            // the kind that the word chooses has the keys that are none of these fields
+            (DeValue::Table(table), Some(tag)) if table.contains_key(*tag) || is_rest(tag) => {
+                let own = self.keys(table);
+                let own = own.filter(|(key, _)| key != tag && fields.contains(key));
+                let kind = Node {
+                    passed: fields,
+                    ..self.clone()
+                };
+                visitor.visit_map(Entries::new(own.chain([(*tag, kind)])))
+            }
+            _ => self.deserialize_any(visitor),
         }
-        let tag = fields.iter().find(|field| TAGS.contains(field));
-        let (DeValue::Table(table), Some(tag)) = (self.0, tag) else {
-            return self.deserialize_any(visitor);
-        };
-        if !table.contains_key(*tag) {
-            return Err(What::Missing(tag).into());
-        }
-        let mut keys = Keys::of(table, |key| fields.contains(&key) && key != *tag);
-        keys.rest = Some((tag, fields, table));
-        visitor.visit_map(keys)
     }
 
     fn deserialize_enum<V: Visitor<'de>>(
-        self,
+        mut self,
         _: &'static str,
         _: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Refusal> {
-        match self.0 {
-            DeValue::String(word) => visitor.visit_enum(word.as_ref().into_deserializer()),
-            DeValue::Table(table) => {
-                let kind = Kind { table, passed: &[] };
-                visitor.visit_enum(MapAccessDeserializer::new(kind))
+        let table = match self.value {
+            DeValue::Table(table) => table,
+            DeValue::String(word) => {
+                return visitor.visit_enum(word.as_ref().into_deserializer());
             }
-            _ => Err(What::Reason("is not a table".to_owned()).into()),
+            _ => return Err("is not a table".into()),
+        };
+        let tag = TAGS.iter().find(|tag| table.contains_key(**tag));
+        let tag = tag.ok_or(What::Missing(TAGS[0]))?;
+        if self.passed.is_empty() {
+            self.passed = slice::from_ref(tag);
         }
+        Node::new(table[*tag].get_ref(), dotted(&self.path, tag)).blamed(|word| {
+            let word = word.value.as_str().ok_or("is not a text in quotes")?;
+            let kind = Entries::new([(word, self)].into_iter());
+            visitor.visit_enum(MapAccessDeserializer::new(kind))
+        })
     }
 
     forward_to_deserialize_any! {
@@ -458,145 +461,60 @@ impl<'de> Deserializer<'de> for Node<'_> {
     }
 }
 
-/// Entries of a list, from a place on.
-struct Entries<'a> {
-    items: &'a [Spanned<DeValue<'a>>],
-    next: usize,
+/// Keys of a table with their values, or entries of a list.
+struct Entries<'a, I> {
+    rest: I,
+    value: Option<Node<'a>>,
 }
 
-impl<'de> SeqAccess<'de> for Entries<'_> {
+impl<'a, I: Iterator<Item = (&'a str, Node<'a>)>> Entries<'a, I> {
+    const fn new(rest: I) -> Self {
+        Self { rest, value: None }
+    }
+}
+
+impl<'de, 'a, I: Iterator<Item = (&'a str, Node<'a>)>> MapAccess<'de> for Entries<'a, I> {
+    type Error = Refusal;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(
+        &mut self,
+        seed: K,
+    ) -> Result<Option<K::Value>, Refusal> {
+        let next = self.rest.next().map(|(key, value)| {
+            self.value = Some(value);
+            seed.deserialize(StrDeserializer::new(key))
+        });
+        next.transpose()
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Refusal> {
+        let value = self.value.take().ok_or("has no value")?;
+        value.blamed(|value| seed.deserialize(value))
+    }
+}
+
+impl<'de, 'a, I: Iterator<Item = (&'a str, Node<'a>)>> SeqAccess<'de> for Entries<'a, I> {
     type Error = Refusal;
 
     fn next_element_seed<T: DeserializeSeed<'de>>(
         &mut self,
         seed: T,
     ) -> Result<Option<T::Value>, Refusal> {
-        let Some(item) = self.items.get(self.next) else {
-            return Ok(None);
-        };
-        self.next += 1;
-        let number = format!("[{}]", self.next);
-        let read = seed.deserialize(Node(item.get_ref()));
-        read.map(Some).map_err(|e| e.within(&number))
-    }
-}
-
-/// Keys of a table, the last one to be read first.
-struct Keys<'a> {
-    keys: Vec<(&'a str, &'a DeValue<'a>)>,
-    value: Option<(&'a str, &'a DeValue<'a>)>,
-    /// A word whose kind has the keys that are none of these fields.
-    rest: Option<(&'static str, &'static [&'static str], &'a DeTable<'a>)>,
-}
-
-impl<'a> Keys<'a> {
-    fn of(table: &'a DeTable<'a>, is_wanted: impl Fn(&str) -> bool) -> Self {
-        let all = table
-            .iter()
-            .map(|(key, value)| (key.get_ref().as_ref(), value.get_ref()));
-        let mut keys: Vec<_> = all.filter(|(key, _)| is_wanted(key)).collect();
-        keys.reverse();
-        Self {
-            keys,
-            value: None,
-            rest: None,
-        }
-    }
-}
-
-impl<'de> MapAccess<'de> for Keys<'_> {
-    type Error = Refusal;
-
-    fn next_key_seed<K: DeserializeSeed<'de>>(
-        &mut self,
-        seed: K,
-    ) -> Result<Option<K::Value>, Refusal> {
-        self.value = self.keys.pop();
-        let key = self
-            .value
-            .map(|(key, _)| key)
-            .or(self.rest.map(|(tag, ..)| tag));
-        let name = |key: &str| seed.deserialize(StrDeserializer::new(key));
-        key.map(name).transpose()
-    }
-
-    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Refusal> {
-        if let Some((key, value)) = self.value.take() {
-            return seed.deserialize(Node(value)).map_err(|e| e.within(key));
-        }
-        let Some((_, passed, table)) = self.rest.take() else {
-            return Err(What::Reason("has no value".to_owned()).into());
-        };
-        seed.deserialize(MapAccessDeserializer::new(Kind { table, passed }))
-    }
-}
-
-/// A table whose word chooses its kind, without the keys that are passed.
-struct Kind<'a> {
-    table: &'a DeTable<'a>,
-    passed: &'static [&'static str],
-}
-
-impl<'a> Kind<'a> {
-    fn tag(&self) -> Option<&'static str> {
-        TAGS.into_iter().find(|tag| self.table.contains_key(*tag))
-    }
-}
-
-/// A map of the word and the keys of its kind.
-impl<'de> MapAccess<'de> for Kind<'_> {
-    type Error = Refusal;
-
-    fn next_key_seed<K: DeserializeSeed<'de>>(
-        &mut self,
-        seed: K,
-    ) -> Result<Option<K::Value>, Refusal> {
-        let tag = self.tag().ok_or(What::Missing(TAGS[0]))?;
-        let word = self.table.get(tag).and_then(|word| word.get_ref().as_str());
-        let no_text = || What::Reason("is not a text in quotes".to_owned());
-        let variant = word.ok_or_else(|| no_text().into());
-        let variant = variant.and_then(|word| seed.deserialize(StrDeserializer::new(word)));
-        variant.map(Some).map_err(|e: Refusal| e.within(tag))
-    }
-
-    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Refusal> {
-        let tag = self.tag();
-        let is_own = |key: &str| Some(key) != tag && !self.passed.contains(&key);
-        seed.deserialize(MapAccessDeserializer::new(Keys::of(self.table, is_own)))
+        let next = self.rest.next();
+        let read = |(_, value): (_, Node<'a>)| value.blamed(|value| seed.deserialize(value));
+        next.map(read).transpose()
     }
 }
 
 // Numbers with bounds, and one value or a list of them.
 
-/// A number that is neither nan nor inf.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(try_from = "f64", into = "f64")]
-#[schemars(inline)]
-pub(crate) struct Finite(pub(crate) f64);
-
-impl TryFrom<f64> for Finite {
-    type Error = &'static str;
-
-    fn try_from(value: f64) -> Result<Self, Self::Error> {
-        if value.is_finite() {
-            Ok(Self(value))
-        } else {
-            Err("is not a finite number such as 1.5e-4")
-        }
-    }
-}
-
-impl From<Finite> for f64 {
-    fn from(value: Finite) -> Self {
-        value.0
-    }
-}
-
-/// A number between two whole ones, or one of them unless it is open; `i64::MAX` is no end.
-#[derive(Debug, Clone, Copy, Deserialize)]
+/// A number between two whole ones, or one of them unless it is open; `i64::MIN` and `i64::MAX` are no ends.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
 #[serde(try_from = "f64")]
 pub(crate) struct Between<const LOW: i64, const HIGH: i64, const OPEN: bool>(pub(crate) f64);
 
+/// A number that is neither nan nor inf.
+pub(crate) type Finite = Between<{ i64::MIN }, { i64::MAX }, false>;
 /// A part of a whole.
 pub(crate) type Share = Between<0, 1, false>;
 pub(crate) type NonNegative = Between<0, { i64::MAX }, false>;
@@ -608,27 +526,25 @@ impl<const LOW: i64, const HIGH: i64, const OPEN: bool> TryFrom<f64> for Between
     type Error = String;
 
     fn try_from(value: f64) -> Result<Self, Self::Error> {
-        let (low, high) = (
-            LOW as f64,
-            if HIGH == i64::MAX {
-                f64::MAX
-            } else {
-                HIGH as f64
-            },
-        );
-        let is_inside = if OPEN {
-            low < value && value < high
-        } else {
-            (low..=high).contains(&value)
+        let end = |end: i64| match end {
+            i64::MIN => f64::MIN,
+            i64::MAX => f64::MAX,
+            end => end as f64,
         };
-        match (HIGH, OPEN) {
+        let (low, high) = (end(LOW), end(HIGH));
+        let is_inside = match OPEN {
+            true => low < value && value < high,
+            false => (low..=high).contains(&value),
+        };
+        match (LOW, HIGH, OPEN) {
             _ if is_inside => Ok(Self(value)),
-            (i64::MAX, true) => Err(format!("is not a finite number > {LOW}")),
-            (i64::MAX, false) => Err(format!("is not a finite number ≥ {LOW}")),
-            (_, true) => {
-                Err(format!("is not between {LOW} and {HIGH} (exclusive)").replace('-', "−"))
+            (i64::MIN, ..) => Err("is not a finite number such as 1.5e-4".to_owned()),
+            (_, i64::MAX, true) => Err(format!("is not a finite number > {LOW}")),
+            (_, i64::MAX, false) => Err(format!("is not a finite number ≥ {LOW}")),
+            _ => {
+                let ends = if OPEN { " (exclusive)" } else { "" };
+                Err(format!("is not between {LOW} and {HIGH}{ends}").replace('-', "−"))
             }
-            (_, false) => Err(format!("is not between {LOW} and {HIGH}")),
         }
     }
 }
@@ -645,19 +561,19 @@ impl<const LOW: i64, const HIGH: i64, const OPEN: bool> JsonSchema for Between<L
     }
 
     fn schema_name() -> Cow<'static, str> {
-        format!("Between_{LOW}_{HIGH}_{OPEN}").into()
+        "Between".into()
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        let (least, most) = if OPEN {
-            ("exclusiveMinimum", "exclusiveMaximum")
-        } else {
-            ("minimum", "maximum")
+        let [least, most] = match OPEN {
+            true => ["exclusiveMinimum", "exclusiveMaximum"],
+            false => ["minimum", "maximum"],
         };
         let mut schema = json_schema!({ "type": "number" });
-        schema.insert(least.to_owned(), LOW.into());
-        if HIGH < i64::MAX {
-            schema.insert(most.to_owned(), HIGH.into());
+        for (name, end) in [(least, LOW), (most, HIGH)] {
+            if end > i64::MIN && end < i64::MAX {
+                schema.insert(name.to_owned(), end.into());
+            }
         }
         schema
     }
@@ -689,12 +605,15 @@ pub(crate) enum OneOrEach<One, Each = Vec<One>> {
     Each(Each),
 }
 
-impl<One: Copy + Into<f64>> OneOrEach<One> {
+impl<One: Copy + Into<f64>, Each: AsRef<[One]>> OneOrEach<One, Each> {
     /// The one, or the i-th of a list (NaN beyond it).
     pub(crate) fn of(&self, i: usize) -> f64 {
         match self {
             Self::One(value) => (*value).into(),
-            Self::Each(values) => values.get(i).map_or(f64::NAN, |value| (*value).into()),
+            Self::Each(values) => values
+                .as_ref()
+                .get(i)
+                .map_or(f64::NAN, |value| (*value).into()),
         }
     }
 }

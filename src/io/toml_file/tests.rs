@@ -238,14 +238,11 @@ fn keys_of_tagged_tables_are_found() {
 }
 
 #[test]
-fn syntax_errors_have_line_and_column() {
+fn syntax_errors_have_their_line() {
     let e = Source::new("f.toml", "a = 1\nb = = 2\n")
         .get::<toml::Table>()
         .unwrap_err();
-    assert!(
-        e.to_string().starts_with("f.toml, line 2, column 5: "),
-        "{e}"
-    );
+    assert!(e.to_string().starts_with("f.toml, line 2: "), "{e}");
 }
 
 #[test]

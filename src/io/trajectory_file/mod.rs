@@ -1,11 +1,11 @@
 //! Trajectory files: CSV, motion profiles (TOML), imports.
 
-use super::fusion_files::WEEK_S;
-use super::table::{
-    Asked, Column, Dictionary, Numbers, Quantity, Table, normalised, parse as parse_text,
-};
+use super::fusion_files::{WEEK_S, check_jump, doubt_degrees};
+use super::recordings::timing::median_step;
+use super::table::{self, Column, Dictionary, LATITUDE, LONGITUDE, Quantity, Table, normalised};
 use super::{Failure, Failure as Error, Place, source};
-use chrono::{DateTime, NaiveDateTime, Utc};
+use crate::parse;
+use chrono::{DateTime, Utc};
 use glam::{DQuat, DVec3};
 use nav_sim_navigation::earth::{e_to_n, ecef_to_geodetic, geodetic_to_ecef};
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, q_e_n, wrap_angle};
@@ -44,9 +44,9 @@ const KNOWN: &str =
 /// # Errors
 /// Whatever is wrong with the file, with its line.
 pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<String>), Failure> {
-    match parse(path, options, Numbers::Finite)? {
-        Parsed::Profile(trajectory) => Ok((trajectory, Vec::new())),
-        Parsed::Rows(rows) => rows.trajectory(),
+    match read(path, options, false)? {
+        None => Ok((profile::load(path)?, Vec::new())),
+        Some(rows) => rows.trajectory(),
     }
 }
 
@@ -60,45 +60,29 @@ pub(crate) fn load_reference(
     path: &Path,
     options: &Options,
 ) -> Result<(Reference, Vec<String>), Failure> {
-    match parse(path, options, Numbers::Any)? {
-        Parsed::Profile(trajectory) => Ok((trajectory.into(), Vec::new())),
-        Parsed::Rows(rows) => rows.reference(),
+    match read(path, options, true)? {
+        None => Ok((profile::load(path)?.into(), Vec::new())),
+        Some(rows) => rows.reference(),
     }
 }
 
-enum Parsed {
-    Profile(Trajectory),
-    Rows(Rows),
-}
-
-fn parse(path: &Path, options: &Options, numbers: Numbers) -> Result<Parsed, Failure> {
+/// The rows of a file; none of a motion profile.
+fn read(path: &Path, options: &Options, is_partial: bool) -> Result<Option<Rows>, Failure> {
     let name = path.display().to_string();
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
-    let text = || source::table_text(path);
-    let rows = match plain.rsplit_once('.').map_or("", |(_, ending)| ending) {
-        "toml" => return Ok(Parsed::Profile(profile::load(path)?)),
-        "nav" => kf_gins(&name, &text()?, options, numbers),
-        "tum" => tum(&name, &text()?, options, numbers),
-        "gpx" => gpx(&name, &text()?),
-        "csv" | "tsv" | "txt" => parse_table(&name, &text()?, options, numbers),
-        _ => Err(Failure::contents(
-            name,
-            Place::Within,
-            format!("a trajectory file ends in {KNOWN}"),
-        )),
-    };
-    rows.map(Parsed::Rows)
-}
-
-fn parse_table(
-    name: &str,
-    text: &str,
-    options: &Options,
-    numbers: Numbers,
-) -> Result<Rows, Failure> {
-    let table = parse_text(name, text, &dictionary(numbers), &Asked::default())?;
-    rows(table, options, numbers)
+    match plain.rsplit_once('.').map_or("", |(_, ending)| ending) {
+        "toml" => Ok(None),
+        "gpx" => gpx(&name, &source::table_text(path)?).map(Some),
+        ending @ ("nav" | "tum" | "csv" | "tsv" | "txt") => {
+            let text = source::table_text(path)?;
+            rows(&name, &text, ending, options, is_partial).map(Some)
+        }
+        _ => {
+            let message = format!("a trajectory file ends in {KNOWN}");
+            Err(Failure::contents(name, Place::Within, message))
+        }
+    }
 }
 
 #[cfg(test)]
@@ -108,8 +92,6 @@ mod tests;
 
 /// Longest step between rows that is not doubted (s).
 const LONG_STEP_S: f64 = 1.0 + 1e-6;
-/// Positions faster than this from one row to the next are no motion (m/s).
-const MAX_SPEED: f64 = 8000.0;
 /// Heights at which the gravity model means something (m).
 const HEIGHT: std::ops::RangeInclusive<f64> = -12_000.0..=1_000_000.0;
 /// Below this speed a path has no direction (m/s).
@@ -118,91 +100,91 @@ const MOVING: f64 = 0.5;
 /// than there is.
 const MAX_DURATION_S: f64 = 86_400.0;
 
-/// Quantities of a trajectory.
-static QUANTITIES: [Quantity; 16] = [
+/// Quantities of a trajectory; x, y, z and quaternions are in the axes of ROS ([REP 103](https://www.ros.org/reps/rep-0103.html)):
+/// position east, north, up of the origin; body forward, left, up.
+static QUANTITIES: [Quantity; 23] = [
     Quantity::time(&["t", "time", "timestamp"]),
     Quantity::number("week", &["week", "gps_week"]),
-    Quantity::angle("lat_deg", &["lat", "latitude"]),
-    Quantity::angle("lon_deg", &["lon", "lng", "longitude"]),
+    Quantity::angle("lat_deg", &["lat", "latitude"]).within(LATITUDE),
+    Quantity::angle("lon_deg", &["lon", "lng", "longitude"]).within(LONGITUDE),
     Quantity::length("h_m", &["h", "alt", "height", "altitude"]),
     N,
     E,
     D,
     D.reversed(&["u", "up"]),
-    Quantity::angle("roll_deg", &["roll"]),
-    Quantity::angle("pitch_deg", &["pitch"]),
-    Quantity::angle("yaw_deg", &["yaw", "heading", "azimuth"]),
+    Quantity::angle("roll_deg", &["roll"]).within((-180.0, 180.0, "is not a roll angle")),
+    Quantity::angle("pitch_deg", &["pitch"]).within((-90.0, 90.0, "is not a pitch angle")),
+    // one that was unwrapped goes on below −180 and above 180: the same angle
+    Quantity::angle("yaw_deg", &["yaw", "heading", "azimuth"]).within((
+        -360.0,
+        360.0,
+        "is not a heading",
+    )),
     Quantity::speed("v_n_m_s", &["v_n", "vn", "v_north"]).with_unit(),
     Quantity::speed("v_e_m_s", &["v_e", "ve", "v_east"]).with_unit(),
     V_D,
     V_D.reversed(&["v_u", "v_up"]),
+    Quantity::length("x", &["x"]),
+    Quantity::length("y", &["y"]),
+    Quantity::length("z", &["z"]),
+    Quantity::number("qx", &["qx", "q_x"]),
+    Quantity::number("qy", &["qy", "q_y"]),
+    Quantity::number("qz", &["qz", "q_z"]),
+    Quantity::number("qw", &["qw", "q_w"]),
 ];
 const N: Quantity = Quantity::length("n_m", &["n", "north"]).with_unit();
 const E: Quantity = Quantity::length("e_m", &["e", "east"]).with_unit();
 const D: Quantity = Quantity::length("d_m", &["d", "down"]).with_unit();
 const V_D: Quantity = Quantity::speed("v_d_m_s", &["v_d", "vd", "v_down"]).with_unit();
 
-/// Dictionary of trajectories with such numbers.
-const fn dictionary(numbers: Numbers) -> Dictionary {
-    Dictionary {
-        numbers,
-        ..Dictionary::new(
-            &QUANTITIES,
-            "a trajectory has the columns t_s, lat_deg, lon_deg, h_m (or n_m, e_m, d_m) and may have roll_deg, pitch_deg, yaw_deg",
-        )
-    }
-}
-const DEGREES: &str = "degrees: latitude within ±89.9, longitude and yaw in (−180, 180] or [0, 360), pitch within ±90";
+/// Dictionary of trajectories.
+const DICTIONARY: Dictionary<'_> = Dictionary {
+    bad_cell: "write numbers; angles are in degrees: latitude within ±89.9, longitude and yaw in (−180, 180] or [0, 360), pitch within ±90",
+    ..Dictionary::new(
+        &QUANTITIES,
+        "a trajectory has the columns t_s, lat_deg, lon_deg, h_m (or n_m, e_m, d_m) and may have roll_deg, pitch_deg, yaw_deg",
+    )
+};
+/// A KF-GINS navigation result or truth: week, seconds of week, position, velocity, attitude, between blanks. Time is counted on
+/// from the first week.
+const KF_GINS: &[&str] = &[
+    "week",
+    "t_s",
+    "lat_deg",
+    "lon_deg",
+    "h_m",
+    "v_n_m_s",
+    "v_e_m_s",
+    "v_d_m_s",
+    "roll_deg",
+    "pitch_deg",
+    "yaw_deg",
+];
+/// A TUM file: time, position (m), quaternion, between blanks.
+const TUM: &[&str] = &["t_s", "x", "y", "z", "qx", "qy", "qz", "qw"];
 
 const GEODETIC: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
 const LOCAL: [&str; 3] = ["n_m", "e_m", "d_m"];
 const ATTITUDE: [&str; 3] = ["roll_deg", "pitch_deg", "yaw_deg"];
 const VELOCITY: [&str; 3] = ["v_n_m_s", "v_e_m_s", "v_d_m_s"];
 
-/// Source of the attitude of rows.
-#[derive(Debug, PartialEq)]
-pub(super) enum Attitude {
-    /// The file.
-    Given,
-    /// Heading and pitch follow the path.
-    OfPath,
-}
-
 /// Samples of a file of any format, and the line that each comes from.
-#[derive(Debug)]
-pub(super) struct Rows {
-    pub(super) path: String,
+#[derive(Debug, Default)]
+struct Rows {
+    path: String,
     /// One for each sample.
     lines: Vec<u64>,
     samples: Vec<TrajectorySample>,
-    attitude: Attitude,
+    /// True where the file has no attitude: heading and pitch follow the path.
+    follows_path: bool,
     /// Velocities in n that the positions are compared with (m/s), one for each sample or none at all.
     velocities: Vec<DVec3>,
     /// Whether positions are latitude and longitude, which may have been given in the wrong unit.
     geodetic: bool,
-    pub(super) doubts: Vec<String>,
+    doubts: Vec<String>,
 }
 
 impl Rows {
-    /// Samples without velocities.
-    pub(super) fn new(
-        path: &str,
-        lines: Vec<u64>,
-        samples: Vec<TrajectorySample>,
-        attitude: Attitude,
-    ) -> Self {
-        let (velocities, doubts) = (Vec::new(), Vec::new());
-        Self {
-            path: path.to_owned(),
-            lines,
-            samples,
-            attitude,
-            velocities,
-            geodetic: false,
-            doubts,
-        }
-    }
-
     fn doubt(&mut self, line: Option<u64>, message: impl Into<String>) {
         let line = line.map_or(String::new(), |line| format!(", line {line}"));
         let text = format!("{}{line}: {}", self.path, message.into());
@@ -214,22 +196,13 @@ impl Rows {
     fn trajectory(mut self) -> Result<(Trajectory, Vec<String>), Error> {
         self.check_heights()?;
         self.check_steps()?;
-        self.check_jumps()?;
-        if self.attitude == Attitude::OfPath {
-            self.through(&self.samples)?; // times increase, positions are on the Earth
-            follow_path(&mut self.samples);
+        let place = |s: &TrajectorySample| (s.t_s, geodetic_to_ecef(s.lat, s.lon, s.h));
+        for (pair, line) in self.samples.windows(2).zip(&self.lines[1..]) {
+            check_jump(&self.path, *line, place(&pair[0]), place(&pair[1]))?;
         }
-        let trajectory = self.through(&self.samples)?;
-        of_trajectory(&mut self, &trajectory);
+        let trajectory = self.stretch(0..self.samples.len())?;
+        self.compare(&trajectory);
         Ok((trajectory, self.doubts))
-    }
-
-    fn through(&self, samples: &[TrajectorySample]) -> Result<Trajectory, Error> {
-        Trajectory::from_samples(samples).map_err(|source| {
-            let index = source.index().unwrap_or(self.lines.len().saturating_sub(1));
-            let line = self.lines.get(index).copied().unwrap_or(1);
-            no_trajectory(&self.path, line, &source)
-        })
     }
 
     /// Heights below the deepest trench and beyond a low orbit are no heights in metres; neither is what is
@@ -252,21 +225,23 @@ impl Rows {
     /// Rows a minute apart are no trajectory of a vehicle, their time is in milliseconds; and one time stamp
     /// that is far off makes no trajectory of years. In long steps the curve between rows is a guess.
     fn check_steps(&mut self) -> Result<(), Error> {
-        let time = |i: usize| self.samples[i].t_s;
-        let step = |i: &usize| time(*i) - time(*i - 1);
-        let mut order: Vec<usize> = (1..self.samples.len()).collect();
-        order.sort_by(|a, b| step(a).total_cmp(&step(b)));
-        let (Some(middle), Some(&longest)) = (order.get(order.len() / 2), order.last()) else {
+        let t_s: Vec<f64> = self.samples.iter().map(|s| s.t_s).collect();
+        let step = |i: &usize| t_s[*i] - t_s[*i - 1];
+        let by_step = |a: &usize, b: &usize| step(a).total_cmp(&step(b));
+        let Some(longest) = (1..t_s.len()).max_by(by_step) else {
             return Ok(());
         };
-        let (median_s, longest_s) = (step(middle), step(&longest));
-        let (previous_s, t_s) = (time(longest - 1), time(longest));
+        let (median_s, longest_s) = (median_step(&t_s), step(&longest));
+        let [first_s, .., last_s] = t_s[..] else {
+            return Ok(());
+        };
+        let (previous_s, t_s) = (t_s[longest - 1], t_s[longest]);
         if median_s >= 50.0 {
             let message = format!("the rows are {median_s} s apart");
             let advice = "one row a second at least; is the time in milliseconds (t_ms)?";
             return Err(self.refuse(1, message, advice));
         }
-        if time(self.samples.len() - 1) - time(0) > MAX_DURATION_S {
+        if last_s - first_s > MAX_DURATION_S {
             let message =
                 format!("time goes from {previous_s} s to {t_s} s, and may span a day at most");
             let advice = "is that time stamp damaged, on another clock, or in another unit?";
@@ -286,84 +261,68 @@ impl Rows {
     fn refuse(&self, index: usize, message: String, advice: &'static str) -> Error {
         Error::contents(&self.path, self.lines[index], message).or_hint(advice)
     }
-
-    fn check_jumps(&self) -> Result<(), Error> {
-        let place = |s: &TrajectorySample| geodetic_to_ecef(s.lat, s.lon, s.h);
-        for (i, pair) in self.samples.windows(2).enumerate() {
-            let (metres, seconds) = (
-                place(&pair[1]).distance(place(&pair[0])),
-                pair[1].t_s - pair[0].t_s,
-            );
-            if seconds > 0.0 && metres > MAX_SPEED * seconds {
-                let message = format!(
-                    "position jumps by {metres:.0} m in {} s",
-                    (seconds * 1e6).round() / 1e6
-                );
-                let advice =
-                    "is a latitude swapped with a longitude, a sign lost, or a row damaged?";
-                return Err(self.refuse(i + 1, message, advice));
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Rows that no trajectory goes through.
-fn no_trajectory(path: &str, line: u64, source: &trajectory::Error) -> Error {
-    use trajectory::Error as E;
-    let advice = match source {
-        E::Time { .. } => {
-            "remove repeated rows, sort by time, or split the file where the clock was set back"
-        }
-        E::Rotation { .. } => {
-            "is an angle in the wrong column or unit? A vehicle that turns so fast needs more rows"
-        }
-        E::TooFew { .. } => "give at least four rows, one a second or more",
-        E::Latitude { .. } => {
-            "latitude and longitude cannot navigate at the poles; is a column swapped?"
-        }
-        E::NotFinite { .. } => return Error::contents(path, line, source.to_string()),
-    };
-    Error::contents(path, line, source.to_string()).or_hint(advice)
 }
 
 /// The rows of a table. Cells out of range are refused, or their rows left out where not every row is needed.
-pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
-    let has_any = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
-    let is_local = has_any(LOCAL) && !table.has("lat_deg");
-    let optional = [ATTITUDE, VELOCITY]
-        .into_iter()
-        .filter(|names| has_any(*names));
-    let position = if is_local { LOCAL } else { GEODETIC };
+fn rows(
+    path: &str,
+    text: &str,
+    ending: &str,
+    options: &Options,
+    is_partial: bool,
+) -> Result<Rows, Error> {
+    let dictionary = Dictionary {
+        is_partial,
+        bare: match ending {
+            "nav" => &[KF_GINS],
+            "tum" => &[TUM],
+            _ => &[],
+        },
+        ..DICTIONARY
+    };
+    let mut table = table::parse(path, text, &dictionary)?;
+    let has = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
+    let is_enu = table.has("qw");
+    let is_local = is_enu || has(LOCAL) && !table.has("lat_deg");
+    let position = match is_local {
+        _ if is_enu => ["x", "y", "z"],
+        true => LOCAL,
+        false => GEODETIC,
+    };
+    let optional = [ATTITUDE, VELOCITY].into_iter().filter(|names| has(*names));
     let needed = ["t_s"]
         .into_iter()
         .chain(position)
         .chain(optional.flatten());
-    table.require(needed, &dictionary(numbers))?;
+    table.require(needed, &DICTIONARY)?;
     check_units(&table)?;
-    let all = table.rows();
-    match numbers {
-        Numbers::Finite => check_ranges(&table)?,
-        _ => table.retain(|table, row| {
-            table.columns.iter().all(|c| c.values[row].is_finite())
-                && out_of_range(table, row).is_none()
-        }),
-    }
+    let left_out = table.keep_whole();
+    let origin = is_local.then(|| origin(&table, options)).transpose()?;
+    let [time] = table.columns(["t_s"], &DICTIONARY)?;
+    let place = table.columns(position, &DICTIONARY)?;
     let (attitude, velocity) = (table.all(ATTITUDE), table.all(VELOCITY));
-    let [time] = table.columns(["t_s"], &dictionary(numbers))?;
-    let place = table.columns(position, &dictionary(numbers))?;
-    let (week, origin) = (
-        table.get("week"),
-        is_local.then(|| origin(&table, options)).transpose()?,
-    );
+    let (quaternion, week) = (table.all(["qx", "qy", "qz", "qw"]), table.get("week"));
     let triad = |columns: [&Column; 3], row| columns.map(|column| column.si(row));
     let sample = |row| {
         let weeks = week.map_or(0.0, |week| week.si(row) - week.si(0));
         let t_s = time.si(row) + weeks * WEEK_S;
         let [roll, pitch, yaw] = attitude.map_or([0.0; 3], |all| triad(all, row));
-        let q_b_n = RollPitchYaw { roll, pitch, yaw }.to_quat();
+        let mut q_b_n = RollPitchYaw { roll, pitch, yaw }.to_quat();
         let [lat, lon, h] = triad(place, row);
-        match origin {
+        let mut r_n = DVec3::new(lat, lon, h);
+        if let Some(quaternion) = quaternion {
+            // East-north-up to north-east-down, front-right-down to front-left-up: half turns.
+            let q_enu_ned = DQuat::from_xyzw(FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0, 0.0);
+            let q_flu_enu = DQuat::from_array(quaternion.map(|column| column.si(row)));
+            if (q_flu_enu.length() - 1.0).abs() > 0.01 {
+                let reason = "does not make a unit quaternion with the others";
+                let (line, w) = (table.line(row), q_flu_enu.w);
+                return Err(Error::cell(path, line, "qw", w, reason));
+            }
+            q_b_n = q_enu_ned * q_flu_enu * DQuat::from_rotation_x(PI);
+            r_n = q_enu_ned * r_n;
+        }
+        Ok(match origin {
             None => TrajectorySample {
                 t_s,
                 lat,
@@ -371,34 +330,29 @@ pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Res
                 h,
                 q_b_n,
             },
-            Some(origin) => local(t_s, origin, [lat, lon, h].into(), q_b_n),
-        }
+            Some(origin) => local(t_s, origin, r_n, q_b_n),
+        })
     };
-    let samples = (0..table.rows()).map(sample).collect();
-    let lines = (0..table.rows()).map(|row| table.line(row)).collect();
-    let attitude = attitude.map_or(Attitude::OfPath, |_| Attitude::Given);
-    let mut rows = Rows::new(&table.path, lines, samples, attitude);
-    rows.geodetic = !is_local;
-    let velocity = velocity.into_iter();
-    rows.velocities = velocity
-        .flat_map(|own| (0..table.rows()).map(move |row| triad(own, row).into()))
-        .collect();
-    if all > rows.lines.len() {
-        let left_out = all - rows.lines.len();
-        let text = format!("{left_out} rows left out: values not finite, or out of range");
-        rows.doubt(None, text);
+    let all = 0..table.rows();
+    let mut rows = Rows {
+        path: path.to_owned(),
+        lines: all.clone().map(|row| table.line(row)).collect(),
+        samples: all.clone().map(sample).collect::<Result<_, _>>()?,
+        follows_path: attitude.is_none() && quaternion.is_none(),
+        geodetic: !is_local,
+        ..Rows::default()
+    };
+    if let Some(own) = velocity {
+        rows.velocities = all.map(|row| triad(own, row).into()).collect();
     }
-    if !table.ignored.is_empty() {
-        rows.doubt(
-            None,
-            format!("columns not used: {}", table.ignored.join(", ")),
-        );
-    }
-    for text in &table.assumptions {
-        rows.doubt(None, text);
-    }
-    if rows.attitude == Attitude::OfPath {
-        let text = "no attitude columns: heading and pitch follow the path, roll is 0";
+    let unused = (!table.ignored.is_empty())
+        .then(|| format!("columns not used: {}", table.ignored.join(", ")));
+    let axes = "axes taken as ROS has them: position east, north, up; body forward, left, up";
+    let path = "no attitude columns: heading and pitch follow the path, roll is 0";
+    let doubts = left_out.into_iter().chain(unused);
+    let doubts = doubts.chain(table.assumptions.iter().cloned());
+    let doubts = doubts.chain(is_enu.then(|| axes.to_owned()));
+    for text in doubts.chain(rows.follows_path.then(|| path.to_owned())) {
         rows.doubt(None, text);
     }
     Ok(rows)
@@ -461,38 +415,8 @@ fn origin(table: &Table, options: &Options) -> Result<[f64; 3], Error> {
 
 /// An origin as it is written, `LAT_DEG,LON_DEG,H_M`: latitude, longitude (rad), height (m).
 pub(crate) fn parse_origin(text: &str) -> Option<[f64; 3]> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|x| x.trim().parse().ok()).collect();
-    match numbers?[..] {
-        [lat, lon, h] if lat.abs() <= 89.9 && lon.abs() <= 360.0 && h.is_finite() => {
-            Some([lat * DEG, lon * DEG, h])
-        }
-        _ => None,
-    }
-}
-
-/// The first value of a row that is out of its range: of which column, and why.
-fn out_of_range(table: &Table, row: usize) -> Option<(&Column, &'static str)> {
-    // a heading that was unwrapped goes on below −180 and above 180: the same angle
-    let ranges = [
-        ("lat_deg", 90.0, 90.0, "is not a latitude"),
-        ("lon_deg", 180.0, 360.0, "is not a longitude"),
-        ("roll_deg", 180.0, 180.0, "is not a roll angle"),
-        ("pitch_deg", 90.0, 90.0, "is not a pitch angle"),
-        ("yaw_deg", 360.0, 360.0, "is not a heading"),
-    ];
-    ranges.into_iter().find_map(|(name, below, above, reason)| {
-        let column = table.get(name)?;
-        let is_within = (-below - 1e-9..=above + 1e-9).contains(&(column.si(row) / DEG));
-        (!is_within).then_some((column, reason))
-    })
-}
-
-fn check_ranges(table: &Table) -> Result<(), Error> {
-    let mut found = (0..table.rows()).filter_map(|row| Some((row, out_of_range(table, row)?)));
-    found.next().map_or(Ok(()), |(row, (column, reason))| {
-        let (line, value) = (table.line(row), column.values[row].to_string());
-        Err(Error::cell(&table.path, line, &column.name, value, reason).or_hint(DEGREES))
-    })
+    let [lat, lon, h] = parse::numbers(text)?;
+    (lat.abs() <= 89.9 && lon.abs() <= 360.0).then_some([lat * DEG, lon * DEG, h])
 }
 
 /// Heading and pitch along the path; at rest between those before and after.
@@ -597,37 +521,25 @@ mod attitude_tests {
 /// Instants at which path and attitude are compared: more tell no more.
 const LOOKS: usize = 2000;
 
-/// The path against the other columns.
-fn of_trajectory(rows: &mut Rows, trajectory: &Trajectory) {
-    let small = |angle: f64| angle.abs() <= PI * DEG + 1e-8;
-    if rows.geodetic
-        && rows
-            .samples
-            .iter()
-            .all(|s| small(s.lat) && small(0.5 * s.lon))
-    {
-        rows.doubt(
-            None,
-            "lat_deg and lon_deg never exceed π: radians? Then name the columns lat_rad, lon_rad",
-        );
-    }
-    if rows.attitude == Attitude::Given {
-        heading(rows, trajectory)
-            .into_iter()
-            .for_each(|text| rows.doubt(None, text));
-    }
-    let times = rows.samples.iter().map(|s| s.t_s);
-    let given: Vec<_> = times.zip(rows.velocities.iter().copied()).collect();
-    let misfit = VelocityMisfit::new(trajectory, &given).filter(VelocityMisfit::contradicts);
-    if let Some(VelocityMisfit { rms, worst_s, .. }) = misfit {
-        let line = given
-            .iter()
-            .position(|(t_s, _)| *t_s == worst_s)
-            .map(|i| rows.lines[i]);
-        let text = format!(
-            "velocity columns differ from the positions, which are used, by {rms:.3} m/s rms"
-        );
-        rows.doubt(line, text);
+impl Rows {
+    /// Compares the path with the other columns.
+    fn compare(&mut self, trajectory: &Trajectory) {
+        let places = self.samples.iter().map(|s| [s.lat, s.lon]);
+        let degrees = doubt_degrees(places).filter(|_| self.geodetic);
+        let heading = heading(self, trajectory).filter(|_| !self.follows_path);
+        for text in degrees.map(str::to_owned).into_iter().chain(heading) {
+            self.doubt(None, text);
+        }
+        let times = self.samples.iter().map(|s| s.t_s);
+        let given: Vec<_> = times.zip(self.velocities.iter().copied()).collect();
+        let misfit = VelocityMisfit::new(trajectory, &given).filter(VelocityMisfit::contradicts);
+        if let Some(VelocityMisfit { rms, worst_s, .. }) = misfit {
+            let worst = given.iter().position(|(t_s, _)| *t_s == worst_s);
+            let text = format!(
+                "velocity columns differ from the positions, which are used, by {rms:.3} m/s rms"
+            );
+            self.doubt(worst.map(|i| self.lines[i]), text);
+        }
     }
 }
 
@@ -708,106 +620,32 @@ impl Rows {
         Ok((reference, self.doubts))
     }
 
+    /// The trajectory through some rows.
     fn stretch(&self, range: Range<usize>) -> Result<Trajectory, Error> {
-        let first = range.start;
-        let mut samples = self.samples[range].to_vec();
-        if self.attitude == Attitude::OfPath && samples.len() > 1 {
+        use trajectory::Error as E;
+        let through = |samples: &[TrajectorySample]| {
+            Trajectory::from_samples(samples).map_err(|source| {
+                let advice = match source {
+                    E::Time { .. } => Some("remove repeated rows, sort by time, or split the file where the clock was set back"),
+                    E::Rotation { .. } => Some("is an angle in the wrong column or unit? A vehicle that turns so fast needs more rows"),
+                    E::TooFew { .. } => Some("give at least four rows, one a second or more"),
+                    E::Latitude { .. } => Some("latitude and longitude cannot navigate at the poles; is a column swapped?"),
+                    E::NotFinite { .. } => None,
+                };
+                let last = samples.len().saturating_sub(1);
+                let index = range.start + source.index().unwrap_or(last);
+                let line = self.lines.get(index).copied().unwrap_or(1);
+                let refusal = Error::contents(&self.path, line, source.to_string());
+                refusal.or_hint_if(advice.map(str::to_owned))
+            })
+        };
+        let mut samples = self.samples[range.clone()].to_vec();
+        if self.follows_path {
+            through(&samples)?; // times increase, positions are on the Earth
             follow_path(&mut samples);
         }
-        Trajectory::from_samples(&samples).map_err(|source| {
-            let index = first + source.index().unwrap_or(0);
-            let line = self.lines.get(index).copied().unwrap_or(1);
-            no_trajectory(&self.path, line, &source)
-        })
+        through(&samples)
     }
-}
-
-// Trajectories of other tools: KF-GINS results, TUM.
-
-/// The table of a text without a header.
-fn bare(path: &str, text: &str, names: &[&str], dictionary: &Dictionary) -> Result<Table, Error> {
-    let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
-    let asked = Asked {
-        names: Some(&names),
-        ..Asked::default()
-    };
-    parse_text(path, text, dictionary, &asked)
-}
-
-/// A KF-GINS navigation result or truth: week, seconds of week, latitude, longitude (deg), height (m), velocity
-/// north, east, down (m/s), roll, pitch, yaw (deg), between blanks. Time is counted on from the first week.
-fn kf_gins(path: &str, text: &str, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
-    let names = [
-        "week",
-        "t_s",
-        "lat_deg",
-        "lon_deg",
-        "h_m",
-        "v_n_m_s",
-        "v_e_m_s",
-        "v_d_m_s",
-        "roll_deg",
-        "pitch_deg",
-        "yaw_deg",
-    ];
-    rows(
-        bare(path, text, &names, &dictionary(numbers))?,
-        options,
-        numbers,
-    )
-}
-
-/// Quantities of a TUM file.
-static TUM: [Quantity; 8] = [
-    Quantity::time(&["t"]),
-    Quantity::number("x", &["x"]),
-    Quantity::number("y", &["y"]),
-    Quantity::number("z", &["z"]),
-    Quantity::number("qx", &["qx"]),
-    Quantity::number("qy", &["qy"]),
-    Quantity::number("qz", &["qz"]),
-    Quantity::number("qw", &["qw"]),
-];
-
-/// A TUM file: time, x, y, z (m), quaternion x, y, z, w, between blanks. The axes are taken as ROS has them
-/// (REP 103): position east, north, up of the origin; body forward, left, up.
-fn tum(path: &str, text: &str, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
-    let dictionary = Dictionary {
-        quantities: &TUM,
-        ..dictionary(numbers)
-    };
-    let names = ["t_s", "x", "y", "z", "qx", "qy", "qz", "qw"];
-    let mut table = bare(path, text, &names, &dictionary)?;
-    table.retain(|table, row| table.columns.iter().all(|c| c.values[row].is_finite()));
-    let origin = origin(&table, options)?;
-    // East-north-up to north-east-down, front-right-down to front-left-up: half turns.
-    let q_enu_ned = DQuat::from_xyzw(FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0, 0.0);
-    let q_frd_flu = DQuat::from_rotation_x(PI);
-    let mut samples = Vec::with_capacity(table.rows());
-    for row in 0..table.rows() {
-        let value = |column: &Column| column.si(row);
-        let all: Vec<f64> = table.columns.iter().map(value).collect();
-        let q_flu_enu = DQuat::from_slice(&all[4..]);
-        if (q_flu_enu.length() - 1.0).abs() > 0.01 {
-            let reason = "does not make a unit quaternion with the others";
-            let line = table.line(row);
-            return Err(Error::cell(path, line, "qw", all[7].to_string(), reason));
-        }
-        let r_ned = q_enu_ned * DVec3::from_slice(&all[1..4]);
-        samples.push(local(
-            all[0],
-            origin,
-            r_ned,
-            q_enu_ned * q_flu_enu * q_frd_flu,
-        ));
-    }
-    let lines = (0..table.rows()).map(|row| table.line(row)).collect();
-    let mut rows = Rows::new(path, lines, samples, Attitude::Given);
-    rows.doubt(
-        None,
-        "axes taken as ROS has them: position east, north, up; body forward, left, up",
-    );
-    Ok(rows)
 }
 
 #[cfg(test)]
@@ -820,11 +658,11 @@ mod import_tests {
     type Loaded = Result<(Trajectory, Vec<String>), Error>;
 
     fn nav(text: &str) -> Loaded {
-        kf_gins("truth.nav", text, &Options::default(), Numbers::Finite)?.trajectory()
+        rows("truth.nav", text, "nav", &Options::default(), false)?.trajectory()
     }
 
     fn tum(path: &str, text: &str, options: &Options) -> Loaded {
-        super::tum(path, text, options, Numbers::Finite)?.trajectory()
+        rows(path, text, "tum", options, false)?.trajectory()
     }
 
     #[test]
@@ -849,7 +687,10 @@ mod import_tests {
             t.state(604_800.0).v_n
         );
         let e = nav("2016 1 2 3\n").unwrap_err();
-        assert_eq!(e.to_string(), "truth.nav, line 1: 4 values, but 11 columns");
+        assert_eq!(
+            e.to_string(),
+            "truth.nav, line 1: a header that names the columns is missing, found \"2016 1 2 3\""
+        );
     }
 
     /// East along x at 3 m/s, facing east (ROS: no rotation): heading 90°, level.
@@ -900,7 +741,11 @@ fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
         let line = u64::from(e.pos().row);
         Error::contents(path, line, format!("not well-formed XML: {e}"))
     })?;
-    let mut rows = Rows::new(path, Vec::new(), Vec::new(), Attitude::OfPath);
+    let mut rows = Rows {
+        path: path.to_owned(),
+        follows_path: true,
+        ..Rows::default()
+    };
     let (mut start, mut line, mut counted) = (None, 1, 0);
     let nodes = document.descendants();
     for point in nodes.filter(|node| node.tag_name().name() == "trkpt") {
@@ -946,12 +791,9 @@ fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
 
 /// A time as GPX has it: 2024-05-01T10:20:30.5Z, with another offset, or without one (UTC).
 fn instant(text: &str) -> Option<DateTime<Utc>> {
-    let local =
-        || NaiveDateTime::parse_from_str(text, "%Y-%m-%dT%H:%M:%S%.f").map(|time| time.and_utc());
-    DateTime::parse_from_rfc3339(text)
-        .map(|time| time.to_utc())
-        .or_else(|_| local())
-        .ok()
+    let parsed = DateTime::parse_from_rfc3339(text)
+        .or_else(|_| DateTime::parse_from_rfc3339(&format!("{text}Z")));
+    parsed.ok().map(|time| time.to_utc())
 }
 
 #[cfg(test)]
@@ -1096,11 +938,14 @@ impl Instants {
     }
 }
 
+/// The header of a trajectory as CSV.
+pub(crate) const HEADER: &str =
+    "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n";
+
 /// A trajectory as CSV. Positions are written with the digits that read back to them, since accelerations are their second
 /// differences; times to the nanosecond, velocities to 1e-9 m/s, angles to 1e-12 degrees.
 pub(crate) fn csv(trajectory: &Trajectory, rows: Instants) -> String {
-    let mut text =
-        "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n".to_owned();
+    let mut text = HEADER.to_owned();
     for t_s in rows.times(trajectory) {
         let state = trajectory.state(t_s);
         let (v, rpy) = (state.v_n, RollPitchYaw::from_quat(state.q_b_n));

@@ -207,26 +207,18 @@ fn read_segment(keys: &Keys<'_>, table: &SegmentTable) -> Result<Segment, Failur
 }
 
 fn waypoint(keys: &Keys<'_>, point: &Point) -> Result<Waypoint, Failure> {
-    let pair = |names: [&str; 2], values: [Option<Finite>; 2]| match values {
-        [Some(first), Some(second)] => Ok((first.0, second.0)),
-        [None, _] => Err(keys.source.missing(&keys.path, &names[..1])),
-        [_, None] => Err(keys.source.missing(&keys.path, &names[1..])),
-    };
-    let place = if point.n_m.or(point.e_m).is_some() {
-        let geodetic = [("lat_deg", point.lat_deg), ("lon_deg", point.lon_deg)];
-        if let Some((extra, _)) = geodetic.into_iter().find(|(_, value)| value.is_some()) {
-            let refusal = keys
-                .source
-                .refused(&keys.path(extra), "stands beside n_m, e_m");
-            return Err(refusal.or_hint("give one pair of them"));
-        }
-        let (north, east) = pair(["n_m", "e_m"], [point.n_m, point.e_m])?;
-        Place::Local { north, east }
-    } else {
-        let (lat, lon) = pair(["lat_deg", "lon_deg"], [point.lat_deg, point.lon_deg])?;
-        Place::Geodetic {
-            lat: lat * DEG,
-            lon: lon * DEG,
+    let place = match [point.n_m, point.e_m, point.lat_deg, point.lon_deg] {
+        [Some(north), Some(east), None, None] => Place::Local {
+            north: north.0,
+            east: east.0,
+        },
+        [None, None, Some(lat), Some(lon)] => Place::Geodetic {
+            lat: lat.0 * DEG,
+            lon: lon.0 * DEG,
+        },
+        _ => {
+            let refusal = keys.source.refused(&keys.path, "is not a point");
+            return Err(refusal.or_hint("give n_m and e_m, or lat_deg and lon_deg"));
         }
     };
     let h = point.h_m.map(|h| h.0);

@@ -13,7 +13,7 @@ fn read(text: &str) -> Result<(Trajectory, Vec<String>), Failure> {
 }
 
 fn read_with(text: &str, options: &Options) -> Result<(Trajectory, Vec<String>), Failure> {
-    parse_table("a.csv", text, options, Numbers::Finite)?.trajectory()
+    rows("a.csv", text, "csv", options, false)?.trajectory()
 }
 
 /// North-east along 46.5° N at 2 rows a second, 20 rows, heading 45°, with one row replaced.
@@ -111,7 +111,7 @@ fn bad_cells_rows_and_headers_are_refused_with_their_line() {
     );
     assert_eq!(
         message(5, "2.5,96.5,6.6,400,0,0,45"),
-        "a.csv, line 7: column \"lat_deg\": 96.5 is not a latitude"
+        "a.csv, line 7: column \"lat_deg\": 96.5 is not a latitude within ±89.9"
     );
     assert_eq!(
         message(5, "2.5,46.5,6.6,400,0,95,45"),
@@ -181,7 +181,7 @@ fn rows_without_a_trajectory_through_them_are_refused_with_their_line() {
     let rows: String = (0..5).map(|k| format!("{k},89.95,2,3,0,0,0\n")).collect();
     assert_eq!(
         refused(&(HEADER.to_owned() + &rows)).0,
-        "a.csv, line 2: latitude 89.95° at 0 s is beyond ±89.9°"
+        "a.csv, line 2: column \"lat_deg\": 89.95 is not a latitude within ±89.9"
     );
 }
 
@@ -207,7 +207,7 @@ fn doubtful_files_are_read_with_a_warning() {
     assert_eq!(
         doubted(&(HEADER.to_owned() + &rad)),
         [
-            "a.csv: lat_deg and lon_deg never exceed π: radians? Then name the columns lat_rad, lon_rad"
+            "a.csv: latitude and longitude never exceed π: radians? Then name the columns lat_rad, lon_rad"
         ]
     );
     let slow: String = (0..6)
@@ -391,11 +391,12 @@ fn a_far_time_stamp_is_refused_with_its_line_in_every_format() {
             )
         })
         .collect();
-    let tum = super::tum(
+    let tum = rows(
         "a.tum",
         &format!("# origin: 45, 7, 0\n{tum}"),
+        "tum",
         &Options::default(),
-        Numbers::Finite,
+        false,
     );
     let e = tum.unwrap().trajectory().unwrap_err().to_string();
     assert!(
@@ -438,8 +439,8 @@ fn jumps_and_heights_of_other_formats_are_refused_as_those_of_tables() {
             .map(|k| format!("{k} {} 0 0 0 0 0 1\n", place(k)))
             .collect();
         let text = format!("# origin: 45, 7, 0\n{text}");
-        let rows = tum("a.tum", &text, &Options::default(), Numbers::Finite).unwrap();
-        rows.trajectory().unwrap_err().to_string()
+        let rows = rows("a.tum", &text, "tum", &Options::default(), false);
+        rows.unwrap().trajectory().unwrap_err().to_string()
     };
     assert!(
         tum(-1e90).starts_with("a.tum, line 7: height "),
@@ -561,7 +562,7 @@ fn references_are_used_but_for_what_jumps() {
     };
     let text = HEADER.to_owned() + &(0..600).map(row).collect::<String>();
     assert!(read(&text.replace("nan", "0.5")).is_err());
-    let parsed = parse_table("a.csv", &text, &Options::default(), Numbers::Any).unwrap();
+    let parsed = rows("a.csv", &text, "csv", &Options::default(), true).unwrap();
     let (reference, warnings) = parsed.reference().unwrap();
     let known = |t: f64| reference.state(t).is_some();
     assert_eq!(
@@ -581,11 +582,12 @@ fn references_are_used_but_for_what_jumps() {
     let mad: String = (0..600)
         .map(|k| format!("{},{},6.6,400,0,0,0\n", 0.1 * f64::from(k), 46 + k % 2))
         .collect();
-    let parsed = parse_table(
+    let parsed = rows(
         "a.csv",
         &(HEADER.to_owned() + &mad),
+        "csv",
         &Options::default(),
-        Numbers::Any,
+        true,
     )
     .unwrap();
     assert!(parsed.reference().is_err());

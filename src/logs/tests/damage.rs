@@ -159,7 +159,7 @@ fn a_file_without_its_end_is_still_being_written() {
         let log = from_bytes(&all[..*end], Log::open).1.unwrap();
         let error = &log.damage().unwrap().error;
         assert!(
-            matches!(error, Error::At(place, Fault::StillWritten) if place.offset == *end as u64),
+            matches!(error.fault, Fault::Cut) && error.offset == Some(*end as u64),
             "{error}"
         );
     }
@@ -180,7 +180,7 @@ fn a_changed_chunk_fails_its_crc() {
         .filter(|k| &all[*k..k + 8] == frame)
         .collect();
     all[places[11] + 60] ^= 1;
-    assert!(matches!(refused(&all), Error::At(_, Fault::Crc { .. })));
+    assert!(refused(&all).to_string().ends_with("CRC failed"));
 }
 
 #[test]
@@ -196,9 +196,7 @@ fn time_that_goes_back_is_refused() {
     let error = refused(&all);
     let text = error.to_string();
     assert!(
-        text.ends_with(
-            "topic /imu: time goes back from 1764000000.310000000 s to 1763999999.320000000 s"
-        ),
+        text.ends_with("topic /imu: time goes back from 1764000000.31 s to 1763999999.32 s"),
         "{text}"
     );
     // the arrivals are in order
@@ -220,7 +218,9 @@ fn lengths_and_encodings_are_checked_before_anything_is_unpacked() {
     large[at - 12..at - 4].copy_from_slice(&(2_u64 << 30).to_le_bytes());
     let error = refused(&large);
     assert!(
-        matches!(error, Error::At(_, Fault::TooLarge { bytes, .. }) if bytes == 2 << 30),
+        error
+            .to_string()
+            .contains(": 2147483648 bytes where at most"),
         "{error}"
     );
     let mut unknown = all;
@@ -230,10 +230,7 @@ fn lengths_and_encodings_are_checked_before_anything_is_unpacked() {
             .to_string()
             .ends_with("topic /imu: unknown encoding \"zstx\"")
     );
-    assert!(matches!(
-        refused(b"#ROSBAG V1.2\n"),
-        Error::At(_, Fault::Encoding(_))
-    ));
+    assert!(matches!(refused(b"#ROSBAG V1.2\n").fault, Fault::Encoding));
     // a message of 2 GB in a file that is that long is refused, in a shorter one it is cut off
     let mut bag = bytes("ros1_none.bag");
     let at = bag
@@ -244,7 +241,7 @@ fn lengths_and_encodings_are_checked_before_anything_is_unpacked() {
     bag[size..size + 4].copy_from_slice(&(2_u32 << 30).to_le_bytes());
     let log = from_bytes(&bag, Log::open).1.unwrap();
     let error = &log.damage().unwrap().error;
-    assert!(matches!(error, Error::At(_, Fault::Truncated { needed, .. }) if *needed == 2 << 30));
+    assert!(error.to_string().contains("a record of 2147483648 bytes"));
 }
 
 #[test]

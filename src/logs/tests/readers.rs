@@ -9,9 +9,7 @@
     feature = "npz"
 ))]
 
-use nav_sim_logs::{
-    Clock, Content, Error, Fault, Fix, ImuSample, Kind, Log, Stamp, npz, recognise,
-};
+use nav_sim_logs::{Clock, Content, Fault, Fix, ImuSample, Kind, Log, Stamp, npz, recognise};
 use std::path::PathBuf;
 
 fn path(name: &str) -> PathBuf {
@@ -187,14 +185,9 @@ fn arrays_are_those_that_were_written() {
             (vec![2, 3, 4], (0..24).map(f64::from).collect())
         );
         assert_eq!(archive.read("flag").unwrap().values, [1.0, 0.0]);
-        assert!(matches!(
-            archive.read("name").unwrap_err(),
-            Error::At(_, Fault::Encoding(_))
-        ));
-        assert!(matches!(
-            archive.read("mag").unwrap_err(),
-            Error::NoTopic { .. }
-        ));
+        let fault = |name: &str, archive: &mut npz::Archive| archive.read(name).unwrap_err().fault;
+        assert!(matches!(fault("name", &mut archive), Fault::Encoding));
+        assert!(matches!(fault("mag", &mut archive), Fault::Topic));
     }
 }
 
@@ -232,7 +225,7 @@ fn formats_are_told_by_their_first_bytes() {
         let place = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(place.path(), head).unwrap();
         let error = Log::open(place.path()).unwrap_err();
-        assert!(matches!(error, Error::NotRead(k) if k == kind));
+        assert!(matches!(error.fault, Fault::NotRead(k) if k == kind));
         assert_eq!(error.hint(), kind.conversion());
         assert!(error.hint().is_some());
     }

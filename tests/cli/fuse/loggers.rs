@@ -51,7 +51,7 @@ fn inputs_as_loggers_and_receivers_have_them() {
         );
         assert_eq!(ran.code, 2);
         for text in [
-            &format!("{name}, line 1: {columns} columns without a header"),
+            &format!("{name}, line 1: a header that names the columns is missing"),
             "7 of them (t_s, latitude",
         ] {
             assert!(ran.stderr.contains(text), "{}", ran.stderr);

@@ -60,7 +60,7 @@ fn a_wheel_without_a_speed_is_refused() {
         (
             "t_s,wheel_ticks",
             1.0,
-            "wheel.csv, line 1: column \"wheel_ticks\" has no unit",
+            "wheel.csv, line 1: column speed is missing",
         ),
         (
             "t_s,speed",

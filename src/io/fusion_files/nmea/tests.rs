@@ -2,6 +2,7 @@
 
 use super::*;
 use nav_sim_document::{Importance, Note};
+use nav_sim_navigation::gnss::{GnssFix, GnssVelocity};
 use nav_sim_signal::units::DEG;
 
 const SIGMA: FixSigma = FixSigma {
@@ -15,6 +16,17 @@ fn sentence(body: &str) -> String {
         "${body}*{:02X}\n",
         body.bytes().fold(0, |all, byte| all ^ byte)
     )
+}
+
+fn fixes(
+    path: &str,
+    text: &str,
+    unsaid: Option<&FixSigma>,
+    imu_s: Option<(f64, f64)>,
+) -> Result<(Vec<(u64, GnssFix)>, Vec<Note>), Error> {
+    let (stated, remarks) = super::fixes(path, text, unsaid, imu_s)?;
+    let fix = |stated| crate::io::fusion_files::fix(path, stated, unsaid).map(|fix| (0, fix));
+    Ok((stated.iter().map(fix).collect::<Result<_, _>>()?, remarks))
 }
 
 fn read(text: &str) -> Vec<GnssFix> {

@@ -216,7 +216,7 @@ fn coarse_and_bursting_stamps_keep_the_rate_of_the_whole() {
 }
 
 #[test]
-fn a_unit_that_is_not_said_is_told_by_the_rate_or_doubted() {
+fn a_unit_that_is_not_said_is_told_by_the_step() {
     let outcome = |name: &str, step: f64, first: f64, rate_hz: Option<f64>| {
         let text = stamped(name, 100, |k| format!("{}", first + step * k as f64));
         let (_files, path) = Files::with("a.csv", text);
@@ -227,20 +227,13 @@ fn a_unit_that_is_not_said_is_told_by_the_rate_or_doubted() {
         let (recordings, report) = read(&[path], &options).unwrap();
         (recordings[0].rate_hz, report.files[0].warnings.join("\n"))
     };
-    // step, guess and what it may be as well, the rates
-    for (step, guessed, other) in [
-        (1.0, 1000.0, 1.0),
-        (50.0, 20.0, 20_000.0),
-        (200.0, 5000.0, 5.0),
-    ] {
+    for (step, guessed) in [(1.0, 1000.0), (50.0, 20.0), (200.0, 5000.0)] {
         let (rate_hz, warning) = outcome("time", step, 0.0, None);
         assert_close(&[rate_hz], &[guessed]);
         assert_eq!(warning, "");
-        for given in [guessed, other] {
-            let (rate_hz, warning) = outcome("time", step, 0.0, Some(given));
-            assert_close(&[rate_hz], &[given]);
-            assert_eq!(warning, "");
-        }
+        let (rate_hz, warning) = outcome("time", step, 0.0, Some(guessed));
+        assert_close(&[rate_hz], &[guessed]);
+        assert_eq!(warning, "");
     }
     let (rate_hz, warning) = outcome("time", 99.0, 0.0, None);
     assert_close(&[rate_hz], &[1e3 / 99.0]);

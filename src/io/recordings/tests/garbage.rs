@@ -7,7 +7,7 @@ use proptest::prelude::*;
 fn parse(bytes: &[u8]) {
     let options = ReadOptions::default();
     let text = String::from_utf8_lossy(bytes);
-    if let Ok(raw) = table::parse("a.csv", &text, &DICTIONARY, &Asked::default()) {
+    if let Ok(raw) = table::parse("a.csv", &text, &DICTIONARY) {
         let _ = recordings(raw, &options);
     }
 }
