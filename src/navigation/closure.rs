@@ -96,7 +96,7 @@ impl Closure {
     }
 
     fn widen(&mut self, truth: &NavState, found: &NavState) {
-        let apart = ned_difference(truth, found.lat, found.lon, found.h);
+        let apart = ned_difference(truth.place(), found.place());
         // 2 sin(θ/2) for θ: the bound is 1 µrad, and the vector part keeps digits there that 2 acos(w) would
         // lose.
         let turned = 2.0 * (truth.q_b_n.conjugate() * found.q_b_n).xyz().length();

@@ -30,6 +30,13 @@ pub struct NavState {
     pub q_b_n: DQuat,
 }
 
+impl NavState {
+    /// Latitude, longitude (rad) and height (m).
+    pub const fn place(&self) -> [f64; 3] {
+        [self.lat, self.lon, self.h]
+    }
+}
+
 /// Roll, pitch and yaw.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RollPitchYaw {

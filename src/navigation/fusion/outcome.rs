@@ -475,7 +475,7 @@ fn correlated(weighed: &Weighed) -> Option<(VerdictKind, Finding)> {
     ))
 }
 
-fn used(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
+pub(super) fn used(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
     solution.fixes.iter().filter(|f| f.used)
 }
 

@@ -1,4 +1,5 @@
 use super::*;
+use crate::simulation::OutageRecord;
 use crate::rng::StreamKey;
 use rand_distr::{Distribution, StandardNormal};
 

@@ -379,7 +379,7 @@ pub(crate) struct ReportedError {
 }
 
 pub(crate) fn reported_error(estimate: &NavState, truth: &NavState) -> ReportedError {
-    let r = ned_difference(truth, estimate.lat, estimate.lon, estimate.h);
+    let r = ned_difference(truth.place(), estimate.place());
     let v = estimate.v_n - truth.v_n;
     // C_est = (I + [psi×]) C_true, hence the estimate on the left: the same error vector as the filter's PSI
     // block.

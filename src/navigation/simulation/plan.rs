@@ -80,7 +80,7 @@ pub(super) struct Event {
     /// Reference state.
     pub reference: NavState,
     /// Reference position and velocity of the antenna: lat, lon (rad), h (m), v_n (m/s).
-    pub antenna: (DVec3, DVec3),
+    pub antenna: ([f64; 3], DVec3),
     /// Whether the receiver has an epoch here.
     pub gnss_epoch: bool,
     /// Whether its fix is used.
@@ -312,11 +312,10 @@ pub(crate) fn samples_per(imu_hz: f64, fix_hz: f64) -> Option<usize> {
 }
 
 /// Position (lat, lon, h) and velocity in n of the antenna.
-fn antenna(experiment: &Experiment<'_>, t_s: f64, reference: &NavState) -> (DVec3, DVec3) {
+fn antenna(experiment: &Experiment<'_>, t_s: f64, reference: &NavState) -> ([f64; 3], DVec3) {
     let arm_b = DVec3::from(experiment.gnss.lever_arm_m);
-    let imu = DVec3::new(reference.lat, reference.lon, reference.h);
     if arm_b == DVec3::ZERO {
-        return (imu, reference.v_n);
+        return (reference.place(), reference.v_n);
     }
     let k = experiment.trajectory.kinematics(t_s);
     let arm_e = k.q_b_e * arm_b;
@@ -324,7 +323,7 @@ fn antenna(experiment: &Experiment<'_>, t_s: f64, reference: &NavState) -> (DVec
     // the truth.
     let (lat, lon, h) = crate::earth::ecef_to_geodetic(k.r_e + arm_e);
     let swing_n = reference.q_b_n * k.omega_eb_b.cross(arm_b);
-    (DVec3::new(lat, lon, h), reference.v_n + swing_n)
+    ([lat, lon, h], reference.v_n + swing_n)
 }
 
 // What a vehicle measures of itself along its reference, before any error.

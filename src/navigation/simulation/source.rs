@@ -1,7 +1,7 @@
 //! What is random of eight runs: starts, inertial errors, fixes, heights, what a vehicle measures of itself.
 
 use super::plan::{Aided, Event, Plan};
-use crate::earth::radii;
+use crate::earth::moved;
 use crate::ekf::Fix;
 use crate::ekf::belief::psi_of_angles;
 use crate::frames::{NavState, RollPitchYaw};
@@ -143,11 +143,10 @@ impl<'a> Source<'a> {
     /// The fixes of this epoch.
     pub(super) fn fix(&mut self, plan: &Plan<'_>, event: &Event) -> Fix {
         let (gnss, (antenna, velocity)) = (plan.experiment.gnss, event.antenna);
-        let r = radii(antenna.x.sin());
         let mut fix = Fix {
-            lat: Lanes::splat(antenna.x),
-            lon: Lanes::splat(antenna.y),
-            h: Lanes::splat(antenna.z),
+            lat: Lanes::splat(antenna[0]),
+            lon: Lanes::splat(antenna[1]),
+            h: Lanes::splat(antenna[2]),
             v_n: gnss.vel_sigma_m_s.map(|_| Vec3::splat(velocity)),
             pos_sigma_m: gnss.pos_sigma_m.into(),
             vel_sigma_m_s: gnss.vel_sigma_m_s.unwrap_or_default().into(),
@@ -155,11 +154,7 @@ impl<'a> Source<'a> {
         };
         for (lane, noise) in self.gnss.iter_mut().enumerate() {
             let (position, speed) = noise.draw();
-            // Metres to angles at the antenna: the white error is small enough for one set of radii.
-            fix.lat[lane] += position.x / (r.meridian + antenna.z);
-            fix.lon[lane] += position.y / ((r.transverse + antenna.z) * antenna.x.cos());
-            // The error is down, the height up.
-            fix.h[lane] -= position.z;
+            [fix.lat[lane], fix.lon[lane], fix.h[lane]] = moved(antenna, position);
             if let Some(v_n) = &mut fix.v_n {
                 v_n.set_lane(lane, velocity + speed);
             }
@@ -193,11 +188,11 @@ fn nominal_start(plan: &Plan<'_>, key: StreamKey<'_>) -> NavState {
     // Drawn as roll, pitch, yaw and brought to psi_n by the map that makes the filter's covariance: the NEES
     // at the start is a χ² of nine degrees of freedom, to first order.
     let psi = linalg::to_glam(&(psi_of_angles(truth.q_b_n) * linalg::to_nalgebra(angles)));
-    let r = radii(truth.lat.sin());
+    let [lat, lon, h] = moved(truth.place(), dr);
     NavState {
-        lat: truth.lat + dr.x / (r.meridian + truth.h),
-        lon: truth.lon + dr.y / ((r.transverse + truth.h) * truth.lat.cos()),
-        h: truth.h - dr.z,
+        lat,
+        lon,
+        h,
         v_n: truth.v_n + dv,
         q_b_n: DQuat::from_scaled_axis(psi) * truth.q_b_n,
     }

@@ -18,9 +18,10 @@
 //! ```
 
 use super::{Trajectory, TrajectorySample};
-use crate::earth::radii;
+use crate::earth::{moved, radii};
 use crate::frames::{RollPitchYaw, wrap_angle};
 use crate::units::{DEG, STANDARD_GRAVITY};
+use glam::DVec3;
 
 /// A motion profile.
 #[derive(Debug, Clone, PartialEq)]
@@ -675,13 +676,12 @@ impl Path<'_> {
     /// Latitude and longitude of a waypoint (rad).
     fn target(&self, point: &Waypoint) -> Result<[f64; 2], Problem> {
         let start = &self.profile.start;
-        let r = radii(start.lat.sin());
-        let [lat, lon] = match point.place {
-            Place::Geodetic { lat, lon } => [lat, lon],
-            Place::Local { north, east } => [
-                start.lat + north / (r.meridian + start.h),
-                start.lon + east / ((r.transverse + start.h) * start.lat.cos()),
-            ],
+        let [lat, lon, _] = match point.place {
+            Place::Geodetic { lat, lon } => [lat, lon, start.h],
+            Place::Local { north, east } => {
+                let by_n = DVec3::new(north, east, 0.0);
+                moved([start.lat, start.lon, start.h], by_n)
+            }
         };
         let finite = lon.is_finite() && point.h.is_none_or(f64::is_finite);
         domain(
@@ -792,17 +792,13 @@ impl Path<'_> {
     /// What is left to turn (rad) to the target after a turn by an angle.
     fn miss(&self, angle: f64, target: [f64; 2], by: Turning, ramp_s: f64) -> Result<f64, Problem> {
         let corner = self.corner(angle, by, ramp_s)?;
-        let r = radii(self.lat.sin());
         let (sin_psi, cos_psi) = (self.heading + 0.5 * angle).sin_cos();
         // Flat over the chord of a turn: hundreds of metres over the radius of the Earth, second order 1e-8
         // of it.
-        let after = [
-            self.lat + corner.chord * cos_psi / (r.meridian + self.h),
-            self.lon + corner.chord * sin_psi / ((r.transverse + self.h) * self.lat.cos()),
-        ];
-        Ok(wrap_angle(
-            self.course(after, target).0 - self.heading - angle,
-        ))
+        let by_n = DVec3::new(corner.chord * cos_psi, corner.chord * sin_psi, 0.0);
+        let [lat, lon, _] = moved([self.lat, self.lon, self.h], by_n);
+        let course = self.course([lat, lon], target).0;
+        Ok(wrap_angle(course - self.heading - angle))
     }
 }
 

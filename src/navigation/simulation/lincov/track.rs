@@ -324,7 +324,7 @@ impl Linearisation {
     /// Error of the strapdown since the reference was met last (m, m/s, rad), estimate less truth; it goes on from the reference.
     fn close(&mut self, reference: &NavState) -> Nav {
         let ins = &mut self.ins;
-        let r = ned_difference(reference, ins.lat, ins.lon, ins.h);
+        let r = ned_difference(reference.place(), [ins.lat, ins.lon, ins.h]);
         let v: [f64; 3] = std::array::from_fn(|i| ins.v_n[i] - reference.v_n[i]);
         let q = &ins.q_b_n;
         let found = DQuat::from_xyzw(q.v[0], q.v[1], q.v[2], q.w).normalize();
