@@ -11,7 +11,7 @@ use crate::trajectory::Trajectory;
 use crate::units::Refused;
 
 /// How far the mechanised samples come away from the trajectory.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, serde::Serialize)]
 pub struct Closure {
     /// IMU rate (Hz).
     pub rate_hz: f64,
@@ -28,7 +28,7 @@ pub struct Closure {
 }
 
 /// What a closure must not exceed.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, serde::Serialize)]
 pub struct Bounds {
     /// Distance (m).
     pub position_m: f64,

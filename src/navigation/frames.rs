@@ -38,7 +38,7 @@ impl NavState {
 }
 
 /// Roll, pitch and yaw.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct RollPitchYaw {
     /// Roll, in (−π, π] (rad).
     pub roll: f64,

@@ -59,7 +59,7 @@ impl GnssVelocity {
 }
 
 /// Standard deviations of fixes that state none: north, east, down.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct FixSigma {
     /// Of the position (m).
     pub pos_m: [f64; 3],

@@ -31,7 +31,7 @@ use serde::Serialize;
 use std::str::FromStr;
 
 /// What is limited at the end of an outage.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Quantity {
     /// 95 % quantile of the horizontal error (m).
     P95,
@@ -75,7 +75,7 @@ impl Quantity {
 }
 
 /// A quantity and the most it may be.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize)]
 pub struct Limit {
     /// The quantity.
     pub quantity: Quantity,
@@ -105,7 +105,7 @@ impl FromStr for Limit {
 }
 
 /// The limit that is the hardest to keep, and where.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize)]
 pub struct Worst {
     /// The limit.
     #[serde(flatten)]
@@ -484,7 +484,7 @@ pub fn evenly(first_s: f64, end_s: f64, length_s: f64, places: u32) -> Vec<Outag
 pub const IMU_PARAMETERS: usize = 4;
 
 /// Intensities of an IMU, all axes alike.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct ImuParameters {
     /// Velocity random walk (m/s/√s), bias instability of the accelerometer (m/s²), angle random walk (rad/√s), bias
     /// instability of the gyroscope (rad/s).
@@ -609,7 +609,7 @@ impl ImuParameters {
 }
 
 /// An intensity that keeps the limits, or none that matters.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Answer {
     /// At most this.
     AtMost(f64),
@@ -778,7 +778,7 @@ impl Need<'_> {
 // How far a given IMU is from its limits, and what one without errors would leave.
 
 /// How an IMU stands to its limits.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Margins {
     /// Whether the limits are kept.
     pub met: bool,

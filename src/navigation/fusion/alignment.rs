@@ -25,7 +25,7 @@ const LATER_S: [f64; 5] = [15.0, 30.0, 60.0, 120.0, 240.0];
 const UPRIGHT: f64 = 45.0 * DEG;
 
 /// A start found in the recording.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Alignment {
     /// Where the filter starts.
     pub start: Start,

@@ -255,7 +255,7 @@ const LARGEST: f64 = 0.998;
 const APART: f64 = 1.5;
 
 /// How long the errors of a receiver's positions last.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Correlation {
     /// As the innovations show.
@@ -268,7 +268,7 @@ pub enum Correlation {
 }
 
 /// Autocorrelation of normalised innovations (of a fix, those of position) from one to the next.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize)]
 pub struct Whiteness {
     /// Autocorrelation at lag 1: 0 if right.
     pub lag_1: f64,
@@ -313,7 +313,7 @@ impl Whiteness {
 }
 
 /// A solution and the fixes that it believes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Weighed {
     /// What came out.
     pub solution: Solution,

@@ -128,7 +128,7 @@ impl Settings {
 }
 
 /// How it is fused.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Settings {
     /// The IMU in the vehicle: takes the IMU's axes, returns front, right, down.
     #[serde(rename = "imu_to_vehicle_xyzw")]
@@ -150,7 +150,7 @@ pub struct Settings {
 }
 
 /// Where the filter starts.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Start {
     /// When (s).
     pub t_s: f64,
@@ -174,7 +174,7 @@ pub struct Heading {
 }
 
 /// How [`alignment::coarse`] found a start.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Found {
     /// Where roll and pitch come from.
     pub level: Levelling,
@@ -190,7 +190,7 @@ pub struct Found {
 }
 
 /// Source of roll and pitch.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Levelling {
     /// Gravity at rest until a time (s), carried on by the gyroscopes.
     AtRest(f64),

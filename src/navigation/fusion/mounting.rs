@@ -21,7 +21,7 @@ use std::fmt::Display;
 const DETERMINED: f64 = 5.0 * DEG;
 
 /// A mounting that was found.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Mounting {
     /// Takes the IMU's axes, returns front, right, down.
     pub q_s_b: DQuat,

@@ -47,7 +47,7 @@ pub struct Ends {
 }
 
 /// Fixes by what became of them.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FixCounts {
     /// Used.
     pub used: usize,
@@ -56,7 +56,7 @@ pub struct FixCounts {
 }
 
 /// Figures of a solution.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
     /// Fixes.
     pub fixes: FixCounts,
@@ -92,7 +92,7 @@ pub struct FromReference {
 }
 
 /// Figures of a smoothed solution beside the filter's.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SmoothedOutcome {
     /// Root mean square of the smoothed horizontal standard deviation (m).
     pub horizontal_sigma_rms_m: f64,
@@ -353,7 +353,7 @@ pub enum Finding {
 }
 
 /// VerdictKind and evidence.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Assessment {
     /// The gravest of the findings.
     pub verdict: VerdictKind,
@@ -575,7 +575,7 @@ fn ends_finding(outcome: &Outcome) -> Option<(VerdictKind, Finding)> {
 // Recorded data that cannot be fused.
 
 /// Recorded data that cannot be fused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 pub enum FusionError {
     /// The clocks have nothing in common.
     #[error("the clocks do not overlap: IMU {} to {} s, GNSS {} to {} s", .imu.0, .imu.1, .gnss.0, .gnss.1)]

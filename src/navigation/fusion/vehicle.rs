@@ -31,7 +31,7 @@ pub struct WheelSpeed {
 }
 
 /// Velocity of a point of the vehicle along some of its axes, as the vehicle knows it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct VehicleVelocity {
     /// Time (s).
     pub t_s: f64,
@@ -63,7 +63,7 @@ impl AidRecord {
 }
 
 /// Innovations of an aid.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize)]
 pub struct AidInnovations {
     /// `nhc`, `odometer` or `zupt`.
     pub aid: &'static str,

@@ -61,7 +61,7 @@ impl Real for f64 {
 }
 
 /// Eight independent values, one for each run of a batch.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C, align(64))]
 pub struct Lanes(pub [f64; LANES]);
 
@@ -262,7 +262,7 @@ fn horner<L: Real, const N: usize>(coefficients: &[f64; N], x: L) -> L {
 // Three-vectors, matrices and quaternions of lanes. Without a parameter they are in memory.
 
 /// Three-vector of lanes.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct Vec3<L = Lanes>(pub [L; 3]);
 
 impl Vec3 {
@@ -386,7 +386,7 @@ impl<L> IndexMut<usize> for Vec3<L> {
 }
 
 /// 3×3 matrix of lanes, `m[row][column]`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Mat3<L = Lanes>(pub [[L; 3]; 3]);
 
 impl Mat3 {
@@ -452,7 +452,7 @@ impl<L: Real> Sub for Mat3<L> {
 }
 
 /// Unit quaternion of lanes, `[w, x, y, z]`, Hamilton product.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Quat<L = Lanes> {
     /// Scalar part.
     pub w: L,

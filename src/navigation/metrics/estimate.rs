@@ -74,7 +74,7 @@ impl Estimate {
 }
 
 /// How many values a statistic is made of, and how many independent ones they are worth.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct SampleSize {
     /// Values.
     pub values: u64,
@@ -259,7 +259,7 @@ const MEAN_STEPS: i32 = 144;
 const MEAN_STEP: f64 = 0.25;
 
 /// Q = c + Σ w (z + d)², z independent standard normal variables.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct QuadraticForm {
     /// The part without scatter, c ≥ 0.
     certain: f64,

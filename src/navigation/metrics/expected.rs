@@ -24,7 +24,7 @@ const VELOCITY_DOWN: usize = 5;
 const NEARLY_ALL: f64 = 0.999;
 
 /// The law of a filter's errors as the figures of a run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Expected {
     /// Statistics of every reporting epoch, all without a Monte-Carlo error.
     pub epochs: Vec<EpochMetrics>,

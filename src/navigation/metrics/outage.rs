@@ -106,7 +106,7 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
 // Statistics at one reporting epoch.
 
 /// What the runs say at one epoch (m, m/s, degrees).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct EpochMetrics {
     /// Time on the trajectory (s).
     pub t_s: f64,
@@ -185,7 +185,7 @@ impl AccuracySummary {
 
 /// Shares of independent sources in the mean square of each reported state; of a state they sum to 1. In files an
 /// object with the names of the sources as keys.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Budget {
     /// Every source with its shares.
     pub shares: Vec<(String, PerState<f64>)>,

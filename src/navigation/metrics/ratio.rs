@@ -8,7 +8,7 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// The statistics of one epoch that ratios are made of.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct EpochRow {
     /// Time on the trajectory (s).
     pub t_s: f64,
@@ -21,7 +21,7 @@ pub struct EpochRow {
 }
 
 /// The results of an experiment, as far as ratios need them.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Measured {
     /// Epochs in time order.
     pub epochs: Vec<EpochRow>,

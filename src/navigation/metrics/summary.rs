@@ -11,7 +11,7 @@ use std::fmt;
 use std::str::FromStr;
 
 /// What the user reads first.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct Summary {
     /// Layout version.
     pub schema_version: u32,
@@ -64,7 +64,7 @@ fn is_zero(value: &f64) -> bool {
 }
 
 /// ASEE and RMSE as means over epochs.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct AccuracySummary {
     /// Mean over the epochs of the ASEE.
     pub asee_mean: PerState<f64>,
@@ -75,7 +75,7 @@ pub struct AccuracySummary {
 }
 
 /// One outage.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct OutageSummary {
     /// First instant without a fix (s).
     pub start_s: f64,
@@ -128,7 +128,7 @@ pub struct OutageSummary {
 
 /// Quantiles of a distribution over runs, with distribution-free 95 % intervals (null: too few runs); of a covariance
 /// analysis with the intervals that the calibration of what makes the errors leaves (null: its draws are not there).
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Spread {
     /// Median.
     pub p50: f64,
@@ -145,7 +145,7 @@ pub struct Spread {
 }
 
 /// Quantiles over the runs that recover, and how many do not.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Recovery {
     /// Median.
     pub p50: f64,
@@ -156,7 +156,7 @@ pub struct Recovery {
 }
 
 /// Whether a chi-square statistic is where a correct filter puts it.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Consistency {
     /// Degrees of freedom: what a correct filter's mean is.
     pub dof: usize,
@@ -171,7 +171,7 @@ pub struct Consistency {
 }
 
 /// Normalised innovation squared, all fixes of all runs together (independent for a correct filter).
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Nis {
     /// Degrees of freedom of one fix.
     pub dof: usize,
@@ -186,7 +186,7 @@ pub struct Nis {
 }
 
 /// Empirical coverage.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Coverage {
     /// Nominal level.
     pub level: f64,
@@ -391,7 +391,7 @@ impl Summary {
 pub const TOLERANCE: f64 = 0.1;
 
 /// What the covariance analysis says of the reduced filter where the model is true.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct ReductionQuality {
     /// True RMSE over the filter's own standard deviation at the end of each outage: above 1 it is
     /// overconfident, below 1 overcautious.
@@ -472,7 +472,7 @@ enum Figure {
 
 /// A figure and the most it may be, at the end of every outage: `p95_m<=5`, `rmse_pos_e_m<=2`, `yaw_deg<=1`; or
 /// `consistent`, a verdict.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Requirement {
     figure: Figure,
     limit: f64,
@@ -482,7 +482,7 @@ pub struct Requirement {
 const DOWN: [usize; 2] = [2, 5];
 
 /// Whether a requirement is met, and by how much.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Met {
     /// The figure.
     pub name: String,

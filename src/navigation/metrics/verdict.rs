@@ -59,7 +59,7 @@ pub type StateName = &'static str;
 pub const ALL_STATES: StateName = "all";
 
 /// The verdict on the filter of an experiment.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Verdict {
     /// In one word.
     pub kind: VerdictKind,
@@ -98,7 +98,7 @@ pub struct Verdict {
 }
 
 /// The verdict on the filter at the end of one outage.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct OutageVerdict {
     /// In one word.
     pub kind: VerdictKind,

@@ -22,7 +22,7 @@ pub enum Truth<'a> {
 }
 
 /// The truth cannot make the errors of a run.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 pub enum TruthError {
     /// No model or recording, a channel too few, a model of another rate.
     #[error(transparent)]

@@ -95,7 +95,7 @@ impl FromStr for Outage {
 // The data that outages are placed on, and what becomes of them there.
 
 /// When fixes come.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Fixes<'a> {
     /// At whole intervals after the start of the data.
     Every {
@@ -107,7 +107,7 @@ pub enum Fixes<'a> {
 }
 
 /// The data that outages are placed on: the one rule of runs, studies and fusions.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct FixedData<'a> {
     /// From when to when they last (s).
     pub span_s: (f64, f64),
@@ -211,7 +211,7 @@ impl OutageError {
 }
 
 /// Outages as they are on data.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct PlacedOutages {
     /// In time order, apart from one another.
     pub windows: Vec<Outage>,
@@ -328,7 +328,7 @@ impl RandomOutages {
 // What outages are asked for, and the one rule of runs, studies and fusions that places them on data.
 
 /// What is asked for: the union of all kinds.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub struct OutagePlan {
     /// Windows asked for by their times: they must lie on the data.
     pub fixed: Vec<Outage>,

@@ -25,7 +25,7 @@ const QUANTITIES: [(&str, &str); 4] = [
 pub const LIMITS: [f64; 4] = [350.0, 30.0, 35.0, 200.0];
 
 /// A stretch beyond a limit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Excess {
     /// The quantity and its unit.
     pub quantity: (&'static str, &'static str),
@@ -120,7 +120,7 @@ fn magnitudes(trajectory: &Trajectory, t_s: f64) -> [f64; 4] {
 }
 
 /// Difference of given velocities from those of the positions.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct VelocityMisfit {
     /// Root mean square of the difference vector (m/s).
     pub rms: f64,

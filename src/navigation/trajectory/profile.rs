@@ -24,7 +24,7 @@ use crate::units::{DEG, STANDARD_GRAVITY};
 use glam::DVec3;
 
 /// A motion profile.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Profile {
     /// Where and how it starts.
     pub start: Start,
@@ -38,7 +38,7 @@ pub struct Profile {
 }
 
 /// The start of a profile.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Start {
     /// Time (s).
     pub t_s: f64,
@@ -55,7 +55,7 @@ pub struct Start {
 }
 
 /// Roll in turns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 pub enum Bank {
     /// Stays level across, as a land vehicle.
     #[default]
@@ -66,7 +66,7 @@ pub enum Bank {
 }
 
 /// One segment.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Segment {
     /// What happens.
     pub kind: Kind,
@@ -77,7 +77,7 @@ pub struct Segment {
 }
 
 /// What happens in a segment.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub enum Kind {
     /// Constant speed and heading; at speed zero, standing.
     Straight(Length),
@@ -112,7 +112,7 @@ pub enum Kind {
 }
 
 /// How long a straight is.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Length {
     /// In time (s).
     Duration(f64),
@@ -121,7 +121,7 @@ pub enum Length {
 }
 
 /// How fast speed changes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Acceleration {
     /// Within a time (s).
     Duration(f64),
@@ -130,7 +130,7 @@ pub enum Acceleration {
 }
 
 /// How fast heading changes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Turning {
     /// Within a time (s).
     Duration(f64),
@@ -598,7 +598,7 @@ impl Piece {
 const MAX_CORNER: f64 = 150.0 * DEG;
 
 /// A point to pass.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Waypoint {
     /// Where.
     pub place: Place,
@@ -607,7 +607,7 @@ pub struct Waypoint {
 }
 
 /// A horizontal position.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Place {
     /// Latitude and longitude (rad).
     Geodetic {

@@ -63,7 +63,7 @@ impl From<Trajectory> for Stretch {
 }
 
 /// Why samples are left out.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub enum Fault {
     /// No samples for so long (s).
     Gap(f64),
@@ -87,7 +87,7 @@ impl fmt::Display for Fault {
 }
 
 /// The fault that ends a stretch: between sample `index − 1` and `index`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Break {
     /// The sample after it.
     pub index: usize,

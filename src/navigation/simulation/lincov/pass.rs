@@ -18,7 +18,7 @@ use std::ops::Range;
 const STEEP: f64 = 5.76;
 
 /// How a filter's covariance stands to that of its true errors, at one instant.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Consistency {
     /// Time from the start (s).
     pub after_s: f64,
@@ -45,7 +45,7 @@ impl Consistency {
 }
 
 /// What a pass finds.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Assessment {
     /// At every report (1 Hz), after the measurements.
     pub reports: Vec<Consistency>,
@@ -90,7 +90,7 @@ pub fn strapdown_over_sigma(track: &Track, belief: &Belief) -> f64 {
 
 /// The law of a filter's true errors at one instant: normal, with this mean and covariance, in the filter's navigation states
 /// (position m, velocity m/s, attitude rad, in n).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Instant {
     /// Time from the start (s).
     pub after_s: f64,
@@ -108,7 +108,7 @@ pub struct Instant {
 }
 
 /// A filter's errors at one instant, and what it states of them.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Judged {
     /// The law of the true errors.
     pub errors: Instant,
@@ -117,7 +117,7 @@ pub struct Judged {
 }
 
 /// The law of a filter's errors along a track.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub struct ErrorLaw {
     /// At every report (1 Hz), after the measurements.
     pub reports: Vec<Judged>,

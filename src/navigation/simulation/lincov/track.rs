@@ -733,7 +733,7 @@ const UNKNOWNS: [UnknownKind; 2] = [UnknownKind::Drift, UnknownKind::ScaleFactor
 /// A state behind one signal, in the form that every process of the catalogue has at the sample rate:
 /// the error of a sample is `before`·s + `after`·s⁺ + `fresh`·w, and s⁺ = `decay`·s + `drive`·w with w white
 /// of variance 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Source {
     /// Which signal it is part of.
     pub signal: usize,
@@ -930,7 +930,7 @@ impl Source {
 }
 
 /// The errors of an IMU: sources, and white noise of a sample on each signal.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(super) struct Sources {
     pub states: Vec<Source>,
     pub white: [f64; BIASES],

@@ -14,7 +14,7 @@ use std::ops::Range;
 const NOISES: usize = Measured::KINDS + 1;
 
 /// What makes the true errors along a track, whatever the filter believes.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub struct TruthSide {
     pub(super) inertial: Sources,
     /// Whether the start is off, as the filter believes it to be.
@@ -27,7 +27,7 @@ pub struct TruthSide {
 
 /// What may be true of an IMU and its receiver: a noise model at the IMU's rate, and what is wrong beside it. Where
 /// these settings are silent, errors are as the filter expects them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct TrueErrors {
     /// What makes the inertial errors.
     pub model: Model,
@@ -56,7 +56,7 @@ impl From<Model> for TrueErrors {
 }
 
 /// One source of errors.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct NamedSource {
     /// `accel.AR1_1`, `gyro.turn_on_bias`, `gnss.position`, `initial` …
     pub name: String,

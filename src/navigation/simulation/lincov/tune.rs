@@ -407,7 +407,7 @@ fn counted(ratios: &[f64], drawn: Option<&UpperEnd<'_>>) -> f64 {
 }
 
 /// Consistency of a filter with several truths.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct FilterConsistency {
     /// Expected NEES, mean over time and truths; 9 is right.
     pub nees: f64,
@@ -423,7 +423,7 @@ pub struct FilterConsistency {
 }
 
 /// An error over what the filter states of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Departure {
     /// What counts of true RMSE over stated standard deviation in the truths.
     pub ratio: f64,
@@ -626,7 +626,7 @@ fn states(
 // Factors on the variances of a noise model.
 
 /// What is multiplied, and by what.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Factor {
     /// The sensor.
     pub sensor: Sensor,
