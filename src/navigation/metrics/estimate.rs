@@ -271,20 +271,6 @@ pub struct QuadraticForm {
 const ROUNDING: f64 = 1e-14;
 
 impl QuadraticForm {
-    /// From weights and shifts; weights that are not above zero (beside the largest: rounding) are left out.
-    pub fn new(terms: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        let terms: Vec<(f64, f64)> = terms.into_iter().collect();
-        let largest = terms.iter().map(|t| t.0).fold(0.0, f64::max);
-        let terms = terms
-            .into_iter()
-            .filter(|(w, _)| *w > ROUNDING * largest)
-            .collect();
-        Self {
-            certain: 0.0,
-            terms,
-        }
-    }
-
     /// eᵀ e for an error e of this covariance and mean.
     pub(crate) fn of_square(covariance: &DMatrix<f64>, mean: &[f64]) -> Self {
         let eigen = covariance.clone().symmetric_eigen();
@@ -638,10 +624,18 @@ mod quadratic_form_tests {
     use rand_distr::{Distribution, StandardNormal};
     use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
+    fn form_of(terms: impl IntoIterator<Item = (f64, f64)>) -> QuadraticForm {
+        let terms = terms.into_iter().collect();
+        QuadraticForm {
+            certain: 0.0,
+            terms,
+        }
+    }
+
     #[test]
     fn equal_weights_are_chi_square() {
         for dof in [1, 2, 6, 9] {
-            let form = QuadraticForm::new((0..dof).map(|_| (2.5, 0.0)));
+            let form = form_of((0..dof).map(|_| (2.5, 0.0)));
             let law = ChiSquared::new(f64::from(dof)).unwrap();
             for p in [1e-4, 0.05, 0.5, 0.95, 0.999] {
                 let x = law.inverse_cdf(p);
@@ -663,7 +657,7 @@ mod quadratic_form_tests {
     #[test]
     fn two_pairs_have_their_closed_form() {
         let (a, b) = (3.0, 0.2);
-        let form = QuadraticForm::new([(a, 0.0), (b, 0.0), (a, 0.0), (b, 0.0)]);
+        let form = form_of([(a, 0.0), (b, 0.0), (a, 0.0), (b, 0.0)]);
         for x in [1e-3, 0.1, 1.0, 10.0, 60.0] {
             let beyond = |w: f64| w * (-0.5 * x / w).exp();
             let expected = 1.0 - (beyond(a) - beyond(b)) / (a - b);
@@ -691,7 +685,7 @@ mod quadratic_form_tests {
                 let root = f64::sqrt(x);
                 let expected = normal.cdf(root - d) - normal.cdf(-root - d);
                 for w in [1.0, 1e-3] {
-                    let found = QuadraticForm::new([(w, d)]).cdf(w * x);
+                    let found = form_of([(w, d)]).cdf(w * x);
                     assert!(
                         (found - expected).abs() < 1e-10,
                         "{w} {d} {x}: {found} {expected}"
@@ -713,7 +707,7 @@ mod quadratic_form_tests {
             (2.0, 0.0),
             (0.004, 0.0),
         ];
-        let form = QuadraticForm::new(terms);
+        let form = form_of(terms);
         let mut rng = StreamKey {
             seed: 3,
             scenario: "",
@@ -755,7 +749,7 @@ mod quadratic_form_tests {
 
     #[test]
     fn what_is_certain_has_no_spread() {
-        let none = QuadraticForm::new([]);
+        let none = form_of([]);
         assert_eq!(
             (none.cdf(1.0), none.quantile(0.5), none.mean_root()),
             (1.0, 0.0, 0.0)

@@ -201,11 +201,6 @@ pub struct Coverage {
 }
 
 impl Summary {
-    /// Whether its figures are those of a covariance analysis, or stand beside them.
-    pub const fn is_analysed(&self) -> bool {
-        self.runs == 0 || self.lincov.is_some()
-    }
-
     /// The summary of a Monte-Carlo experiment.
     pub fn of(result: &RunResult, epochs: &[EpochMetrics], seed: u64) -> Self {
         let windows = result.independent_windows;

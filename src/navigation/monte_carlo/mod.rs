@@ -45,12 +45,8 @@ pub fn run(
     runs: u64,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Vec<RunResult>, ExperimentError> {
-    Ok(run_plan(&Plan::new(experiment)?, runs, progress))
-}
-
-/// The same of a planned experiment.
-pub fn run_plan(plan: &Plan<'_>, runs: u64, progress: &(dyn Fn(u64) + Sync)) -> Vec<RunResult> {
-    run_range(plan, 0, runs, &|| true, progress).expect("nothing stops it")
+    let results = run_range(&Plan::new(experiment)?, 0, runs, &|| true, progress);
+    Ok(results.expect("nothing stops it"))
 }
 
 /// Runs `first..first + runs` of a planned experiment; `None` if `go_on`, asked before each batch of eight,
@@ -62,7 +58,7 @@ pub fn run_range(
     go_on: &(dyn Fn() -> bool + Sync),
     progress: &(dyn Fn(u64) + Sync),
 ) -> Option<Vec<RunResult>> {
-    let beliefs = plan.experiment().beliefs.iter();
+    let beliefs = plan.experiment.beliefs.iter();
     let mut results: Vec<RunResult> = beliefs.map(|b| empty(plan, b.states)).collect();
     let all: Vec<u64> = (0..runs).step_by(LANES).collect();
     for together in all.chunks(TOGETHER) {
@@ -87,7 +83,7 @@ pub fn run_range(
 const TOGETHER: usize = 64;
 
 fn empty(plan: &Plan<'_>, filter_states: usize) -> RunResult {
-    let experiment = plan.experiment();
+    let experiment = plan.experiment;
     RunResult {
         outages: experiment
             .outages

@@ -1,7 +1,7 @@
 //! The GNSS receiver: what it measures, how often and how well.
 
 use crate::rng::{Generator, StreamKey};
-use crate::units::{NonNegative, Positive, SettingError, exactly};
+use crate::units::{NonNegative, Positive, exactly};
 use glam::DVec3;
 use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
@@ -58,14 +58,6 @@ impl Default for GnssSettings {
 }
 
 impl GnssSettings {
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key whose value is refused.
-    pub fn validate(&self) -> Result<(), SettingError> {
-        super::check_bounds(self)
-    }
-
     /// Components of one fix: 3 (position) or 6 (and velocity).
     pub(crate) const fn components(&self) -> usize {
         if self.vel_sigma_m_s.is_some() { 6 } else { 3 }
@@ -243,6 +235,7 @@ impl BaroNoise {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sensors::check_bounds;
 
     #[test]
     fn velocity_may_be_none_and_survives_a_round_trip() {
@@ -318,8 +311,8 @@ mod tests {
         ];
         let keys = ["rate_hz", "pos_sigma_m", "vel_sigma_m_s", "lever_arm_m"];
         for (settings, key) in cases.iter().zip(keys) {
-            assert_eq!(settings.validate().unwrap_err().key, key);
+            assert_eq!(check_bounds(&settings).unwrap_err().key, key);
         }
-        assert_eq!(GnssSettings::default().validate(), Ok(()));
+        assert_eq!(check_bounds(&GnssSettings::default()), Ok(()));
     }
 }

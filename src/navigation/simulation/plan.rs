@@ -9,7 +9,7 @@ use crate::sensors::aiding::{Aid, AidingSettings};
 use crate::sensors::defects::{ImuSettings, Surroundings};
 use crate::sensors::gnss::{BaroSettings, GnssSettings};
 use crate::sensors::ideal_imu::ideal_imu;
-use crate::sensors::imu::{ErrorSource, Truth, TruthError};
+use crate::sensors::imu::{Truth, TruthError, best_spans};
 use crate::sensors::outage::Outage;
 use crate::strapdown::MAX_ROTATION;
 use crate::trajectory::Trajectory;
@@ -96,10 +96,10 @@ pub(super) struct Event {
 /// The shared part of all runs.
 #[derive(Debug)]
 pub struct Plan<'a> {
-    pub(super) experiment: &'a Experiment<'a>,
+    pub(crate) experiment: &'a Experiment<'a>,
     pub(super) ideal: Vec<ImuSample>,
-    /// What makes the inertial errors.
-    pub(super) errors: ErrorSource<'a>,
+    /// Averaging times of recordings that make the inertial errors.
+    pub(super) spans: Vec<[usize; 6]>,
     pub(super) start: NavState,
     pub(super) events: Vec<Event>,
     /// For each outage: how many reports fall into it, and the event of the first fix after it (or the
@@ -124,29 +124,19 @@ impl<'a> Plan<'a> {
                 ));
             }
         }
-        Self::with_source(experiment, |samples| {
-            experiment.truth.source(rate_hz, samples)
+        let plan = Self::reference(experiment)?;
+        experiment.truth.check(rate_hz, plan.samples())?;
+        Ok(Self {
+            spans: best_spans(&experiment.truth),
+            ..plan
         })
     }
 
-    /// The same for a covariance analysis, which draws no error: a model that is the truth may belong to another
-    /// rate.
+    /// The same for a covariance analysis, which draws no error: models may belong to another rate.
     ///
     /// # Errors
     /// What does not fit, with values.
     pub(super) fn reference(experiment: &'a Experiment<'a>) -> Result<Self, ExperimentError> {
-        Self::with_source(experiment, |samples| match experiment.truth {
-            Truth::Model(model) => Ok(ErrorSource::Model(model)),
-            Truth::Drawn(_) | Truth::Static(_) => {
-                experiment.truth.source(experiment.rate_hz, samples)
-            }
-        })
-    }
-
-    fn with_source(
-        experiment: &'a Experiment<'a>,
-        source: impl FnOnce(usize) -> Result<ErrorSource<'a>, TruthError>,
-    ) -> Result<Self, ExperimentError> {
         let Experiment {
             trajectory,
             rate_hz,
@@ -154,7 +144,6 @@ impl<'a> Plan<'a> {
             ..
         } = *experiment;
         let ideal = ideal_imu(trajectory, rate_hz, gravity)?;
-        let errors = source(ideal.len())?;
         check_rotation(&ideal, trajectory.start_s(), rate_hz)?;
         let events = schedule(experiment, ideal.len())?;
         let chi2 =
@@ -169,17 +158,12 @@ impl<'a> Plan<'a> {
         Ok(Self {
             experiment,
             ideal,
-            errors,
+            spans: Vec::new(),
             start,
             events,
             outages,
             coverage_quantile,
         })
-    }
-
-    /// What was planned.
-    pub(crate) const fn experiment(&self) -> &'a Experiment<'a> {
-        self.experiment
     }
 
     /// What the IMU feels over a sample, as it is in its middle.

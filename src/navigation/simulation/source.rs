@@ -53,7 +53,7 @@ impl<'a> Source<'a> {
         let keys: Vec<_> = (first..first + live as u64).map(key).collect();
         let imu = keys
             .iter()
-            .map(|k| ImuErrors::new(&plan.errors, *k, plan.samples()));
+            .map(|k| ImuErrors::new(&experiment.truth, &plan.spans, *k, plan.samples()));
         let gnss = keys
             .iter()
             .map(|k| GnssNoise::new(experiment.gnss, *k))
