@@ -132,18 +132,9 @@ impl Search<'_> {
             .into_iter()
             .chain(self.lost(&assessment))
             .collect();
-        let ridge = RIDGE * ln.iter().map(|x| x * x).sum::<f64>();
-        let cost =
-            divergence(&assessment, |_| 0.0) + steep.iter().map(Steep::cost).sum::<f64>() + ridge;
-        let bent = |x: &f64| Part {
-            value: *x,
-            curvature: 2.0 * RIDGE,
-        };
-        let parts = shape(&law)
-            .chain(steep.iter().map(Steep::part))
-            .chain(ln.iter().map(bent))
-            .collect();
-        Value { cost, parts }
+        let cost = divergence(&assessment, |_| 0.0) + steep.iter().map(Steep::cost).sum::<f64>();
+        let parts = shape(&law).chain(steep.iter().map(Steep::part)).collect();
+        Value { cost, parts }.with_ridge(RIDGE, ln)
     }
 
     /// What the horizontal position at the outage ends loses to the filter with all states counts where it is a fiftieth, steeply.
@@ -448,6 +439,17 @@ const TRIALS: usize = 8;
 pub(super) struct Value {
     pub cost: f64,
     pub parts: Vec<Part>,
+}
+
+impl Value {
+    /// With a cost of the squares of the variables.
+    pub(super) fn with_ridge(mut self, ridge: f64, x: &[f64]) -> Self {
+        self.cost += ridge * x.iter().map(|x| x * x).sum::<f64>();
+        let curvature = 2.0 * ridge;
+        let part = |&value: &f64| Part { value, curvature };
+        self.parts.extend(x.iter().map(part));
+        self
+    }
 }
 
 /// A number that the variables change, and the second derivative of the cost with respect to it.

@@ -56,16 +56,21 @@ pub(super) enum Measured {
 }
 
 impl Measured {
-    /// Kinds: fixes, heights, each aid.
-    pub(super) const KINDS: usize = 2 + Aid::ALL.len();
+    /// Kinds: positions and velocities of fixes, heights, each aid.
+    pub(super) const KINDS: usize = 3 + Aid::ALL.len();
 
     /// Which of them.
     pub(super) const fn kind(self) -> usize {
         match self {
-            Self::Position(_) | Self::Velocity => 0,
-            Self::Height => 1,
-            Self::Aid(aid, _) => 2 + aid as usize,
+            Self::Position(_) => 0,
+            Self::Velocity => 1,
+            Self::Height => 2,
+            Self::Aid(aid, _) => 3 + aid as usize,
         }
+    }
+
+    pub(super) const fn is_of_fix(self) -> bool {
+        self.kind() < 2
     }
 }
 
@@ -89,7 +94,6 @@ pub(super) struct Row {
 impl Row {
     /// A measurement whose true noise is as the filter believes.
     fn new(h: [f64; NAV + 3], felt: Surroundings, r: f64, what: Measured) -> Self {
-        let of_gnss = matches!(what, Measured::Position(_) | Measured::Velocity);
         Self {
             h,
             felt,
@@ -97,7 +101,7 @@ impl Row {
             noise: r,
             what,
             motion: [DVec3::ZERO; 2],
-            of_gnss,
+            of_gnss: what.is_of_fix(),
         }
     }
 
@@ -288,7 +292,7 @@ impl Linearisation {
             b: vec![[0.0; NAV]; self.signals],
             white: Vec::new(),
         };
-        let mut age = 0.0;
+        let (mut age, last) = (0.0, samples.end - 1);
         for index in samples {
             let sample = &plan.ideal[index];
             self.felt = plan.felt(index);
@@ -296,27 +300,16 @@ impl Linearisation {
             let trace = self.ins.step(Vec3::splat(dtheta), Vec3::splat(dv), self.dt);
             step.apply(&Sample::new(&trace, self.dt), &self.felt);
             age += self.dt;
-            if age + 0.5 * self.dt > EARTH_STEP_S {
-                step.apply(
-                    &EarthStep {
-                        terms: EarthTerms::at(&self.ins),
-                        dt: age,
-                    },
-                    &self.felt,
-                );
-                age = 0.0;
-            }
-        }
-        // A measurement meets a covariance that has all of the Earth's terms, as `settle` gives it in the
-        // filter.
-        if age > 0.0 {
-            step.apply(
-                &EarthStep {
+            // A measurement meets a covariance that has all of the Earth's terms, as `settle` gives it in the
+            // filter.
+            if index == last || age + 0.5 * self.dt > EARTH_STEP_S {
+                let earth = EarthStep {
                     terms: EarthTerms::at(&self.ins),
                     dt: age,
-                },
-                &self.felt,
-            );
+                };
+                step.apply(&earth, &self.felt);
+                age = 0.0;
+            }
         }
         step
     }
@@ -367,9 +360,7 @@ impl Linearisation {
         }
         rows
     }
-}
 
-impl Linearisation {
     /// The rows of what the vehicle measures of itself.
     fn aid(&self, experiment: &Experiment<'_>, aided: &Aided, rows: &mut Vec<Row>) {
         let Aided { aid, v_b, a_b, .. } = *aided;
@@ -727,9 +718,6 @@ const fn place(signal: usize) -> (usize, usize, Felt) {
     }
 }
 
-/// All kinds of unknowns.
-const UNKNOWNS: [UnknownKind; 2] = [UnknownKind::Drift, UnknownKind::ScaleFactor];
-
 /// A state behind one signal, in the form that every process of the catalogue has at the sample rate:
 /// the error of a sample is `before`·s + `after`·s⁺ + `fresh`·w, and s⁺ = `decay`·s + `drive`·w with w white
 /// of variance 1.
@@ -965,21 +953,16 @@ impl Sources {
 
     /// Those a filter believes in: one for each bias state.
     pub(super) fn of_belief(belief: &Belief) -> Self {
-        let mut states = Vec::new();
-        for sensor in Sensor::ALL {
-            states.extend(
-                belief.groups[sensor as usize]
-                    .iter()
-                    .flat_map(|g| Self::of_group(sensor, g)),
-            );
+        let of_sensor = |sensor: Sensor| {
+            let groups = belief.groups[sensor as usize].iter();
+            groups.flat_map(move |group| Self::of_group(sensor, group))
+        };
+        let states = Sensor::ALL.into_iter().flat_map(of_sensor);
+        let states = states.chain(Self::multiplied(belief));
+        Self {
+            states: states.chain(Self::of_vehicle(belief)).collect(),
+            white: std::array::from_fn(|i| belief.white[i / 3][i % 3]),
         }
-        let [accel, gyro] = belief.white.map(|w| w.to_array());
-        let mut white = [0.0; BIASES];
-        white[..3].copy_from_slice(&accel);
-        white[3..].copy_from_slice(&gyro);
-        states.extend(Self::multiplied(belief, &UNKNOWNS));
-        states.extend(Self::of_vehicle(belief));
-        Self { states, white }
     }
 
     /// The bias states of a group.
@@ -993,18 +976,14 @@ impl Sources {
     }
 
     /// Unknown constants of a belief that are multiplied.
-    fn multiplied(belief: &Belief, kinds: &[UnknownKind]) -> Vec<Source> {
+    fn multiplied(belief: &Belief) -> Vec<Source> {
         let mut states = Vec::new();
         for (sensor, axis) in Sensor::ALL
             .into_iter()
             .flat_map(|s| (0..3).map(move |i| (s, i)))
         {
             let signal = 3 * sensor as usize + axis;
-            for unknown in belief
-                .unknowns(sensor)
-                .iter()
-                .filter(|u| kinds.contains(&u.kind))
-            {
+            for unknown in belief.unknowns(sensor) {
                 let sigma = unknown.sigma[axis];
                 states.extend((sigma > 0.0).then(|| match unknown.kind {
                     UnknownKind::Drift => Source::ramp(signal, sigma),
@@ -1033,7 +1012,9 @@ impl Sources {
 
     /// What a belief expects beside its noise model, as it expects it: turn-on biases and scale factors.
     pub(super) fn beside_model(belief: &Belief) -> Vec<Source> {
-        let mut states = Self::multiplied(belief, &[UnknownKind::ScaleFactor]);
+        // drifts are of the noise model
+        let mut states = Self::multiplied(belief);
+        states.retain(|source| source.ramp == 0.0);
         states.extend(Self::of_vehicle(belief));
         for sensor in Sensor::ALL {
             for group in belief.groups[sensor as usize]

@@ -10,9 +10,6 @@ use crate::sensors::gnss::GnssSettings;
 use crate::simulation::plan::Experiment;
 use std::ops::Range;
 
-/// Kinds of white noise of measurements: positions and velocities of fixes apart.
-const NOISES: usize = Measured::KINDS + 1;
-
 /// What makes the true errors along a track, whatever the filter believes.
 #[derive(Debug, Clone, Default)]
 pub struct TruthSide {
@@ -20,7 +17,7 @@ pub struct TruthSide {
     /// Whether the start is off, as the filter believes it to be.
     pub(super) starts_off: bool,
     /// Whether the white noise of positions, velocities, heights and each aid is there.
-    noise: [bool; NOISES],
+    noise: [bool; Measured::KINDS],
     /// Whether the strapdown integrates the samples with the error that it has at the IMU's rate.
     pub(super) integrates: bool,
 }
@@ -131,7 +128,7 @@ impl TruthSide {
         Self {
             inertial,
             starts_off,
-            noise: [true; NOISES],
+            noise: [true; Measured::KINDS],
             integrates: false,
         }
     }
@@ -178,12 +175,7 @@ impl TruthSide {
 
     /// Whether a measurement has its white noise.
     pub(super) const fn has_noise(&self, measured: Measured) -> bool {
-        match measured {
-            Measured::Position(_) => self.noise[0],
-            Measured::Velocity => self.noise[1],
-            Measured::Height => self.noise[2],
-            Measured::Aid(aid, _) => self.noise[3 + aid as usize],
-        }
+        self.noise[measured.kind()]
     }
 }
 

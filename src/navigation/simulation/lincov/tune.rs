@@ -120,14 +120,8 @@ impl Task<'_> {
     ) -> Result<Vec<Factor>, BeliefError> {
         let track = self.track.coarse();
         let value = |ln: &[f64]| {
-            let bent = |x: &f64| Part {
-                value: *x,
-                curvature: 2.0 * RIDGE,
-            };
-            let mut value = self.value(&set(factors, ln), &track, draw_factors);
-            value.cost += RIDGE * ln.iter().map(|x| x * x).sum::<f64>();
-            value.parts.extend(ln.iter().map(bent));
-            value
+            let value = self.value(&set(factors, ln), &track, draw_factors);
+            value.with_ridge(RIDGE, ln)
         };
         let low = if self.allow_smaller { -MAX_LN } else { 0.0 };
         let descent = Damped {
