@@ -121,17 +121,11 @@ fn correlation(turns: &[Turn], turned: &Turned, lag_s: f64) -> Option<f64> {
     let count = pairs.len() as f64;
     let mean_x = pairs.iter().map(|p| p.0).sum::<f64>() / count;
     let mean_y = pairs.iter().map(|p| p.1).sum::<f64>() / count;
-    let product = |f: &dyn Fn(f64, f64) -> f64| {
-        pairs
-            .iter()
-            .map(|(x, y)| f(x - mean_x, y - mean_y))
-            .sum::<f64>()
+    let products = |[xx, yy, xy]: [f64; 3], (x, y): &(f64, f64)| {
+        let (x, y) = (x - mean_x, y - mean_y);
+        [xx + x * x, yy + y * y, xy + x * y]
     };
-    let (xx, yy, xy) = (
-        product(&|x, _| x * x),
-        product(&|_, y| y * y),
-        product(&|x, y| x * y),
-    );
+    let [xx, yy, xy] = pairs.iter().fold([0.0; 3], products);
     Some(xy / (xx * yy).sqrt()).filter(|r| r.is_finite())
 }
 

@@ -461,18 +461,15 @@ fn correlated(weighed: &Weighed) -> Option<(VerdictKind, Finding)> {
         .filter(super::Whiteness::is_correlated)?
         .lag_1;
     let pos_sigma_factor = weighed.pos_sigma_factor;
-    let verdict = if pos_sigma_factor > 1.0 {
-        VerdictKind::Undecided
-    } else {
-        VerdictKind::Doubtful
+    let verdict = match pos_sigma_factor > 1.0 {
+        true => VerdictKind::Undecided,
+        false => VerdictKind::Doubtful,
     };
-    Some((
-        verdict,
-        Finding::Correlated {
-            lag_1,
-            pos_sigma_factor,
-        },
-    ))
+    let found = Finding::Correlated {
+        lag_1,
+        pos_sigma_factor,
+    };
+    Some((verdict, found))
 }
 
 pub(super) fn used(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
@@ -498,21 +495,14 @@ fn aids(solution: &Solution) -> impl Iterator<Item = (VerdictKind, Finding)> {
     aid_innovations(&solution.aids)
         .into_iter()
         .filter(is_far)
-        .map(
-            |AidInnovations {
-                 aid,
-                 nis_per_component,
-                 ..
-             }| {
-                (
-                    VerdictKind::Doubtful,
-                    Finding::Aid {
-                        aid,
-                        nis_per_component,
-                    },
-                )
-            },
-        )
+        .map(|w| {
+            let (aid, nis_per_component) = (w.aid, w.nis_per_component);
+            let found = Finding::Aid {
+                aid,
+                nis_per_component,
+            };
+            (VerdictKind::Doubtful, found)
+        })
 }
 
 /// Minutes in which most fixes are far from what is stated. The farthest tenth of them is left out: single
@@ -532,22 +522,14 @@ fn stretches(solution: &Solution) -> Option<(VerdictKind, Finding)> {
         .filter_map(|(k, fixes)| Some((k, far(fixes)?)))
         .collect();
     let (worst, nis_per_component) = *bad.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let is_much = bad.len() as f64 > BAD_STRETCHES * of as f64;
-    let verdict = if is_much {
-        VerdictKind::Overconfident
-    } else {
-        VerdictKind::Doubtful
+    let minutes = Finding::Minutes {
+        bad: bad.len(),
+        of,
+        worst_s: begin_s + STRETCH_S * worst as f64,
+        nis_per_component,
     };
-    let worst_s = begin_s + STRETCH_S * worst as f64;
-    Some((
-        verdict,
-        Finding::Minutes {
-            bad: bad.len(),
-            of,
-            worst_s,
-            nis_per_component,
-        },
-    ))
+    let is_much = bad.len() as f64 > BAD_STRETCHES * of as f64;
+    Some((too_large(is_much), minutes))
 }
 
 /// Mean NIS per component of the nearest nine tenths of these fixes, where it is too large.
@@ -564,12 +546,15 @@ fn far(fixes: &[&FixRecord]) -> Option<f64> {
 fn ends_finding(outcome: &Outcome) -> Option<(VerdictKind, Finding)> {
     let ends = outcome.ends.filter(|ends| ends.p_value < ENDS.0)?;
     let is_much = ends.error_over_sigma > ENDS.1;
-    let verdict = if is_much {
-        VerdictKind::Overconfident
-    } else {
-        VerdictKind::Doubtful
-    };
-    Some((verdict, Finding::Ends(ends)))
+    Some((too_large(is_much), Finding::Ends(ends)))
+}
+
+/// Verdict on errors that are larger than stated.
+const fn too_large(is_much: bool) -> VerdictKind {
+    match is_much {
+        true => VerdictKind::Overconfident,
+        false => VerdictKind::Doubtful,
+    }
 }
 
 // Recorded data that cannot be fused.
