@@ -156,14 +156,12 @@ pub enum RequireError {
         value: f64,
     },
     /// The poorest IMU that is sought keeps every limit.
-    #[error("no IMU is too poor for {} ≤ {}: any that is sought keeps it; with the poorest of the search the error is {} ({})", limit.quantity.name(), limit.quantity.shown(limit.most), limit.quantity.shown(*value), poorest.in_words())]
+    #[error("no IMU is too poor for {} ≤ {}: any that is sought keeps it; with the poorest of the search the error is {}", limit.quantity.name(), limit.quantity.shown(limit.most), limit.quantity.shown(*value))]
     Loose {
         /// The hardest limit.
         limit: Limit,
         /// The error with the poorest IMU.
         value: f64,
-        /// That IMU.
-        poorest: ImuParameters,
     },
     /// The model has no filter.
     #[error(transparent)]
@@ -576,20 +574,6 @@ impl ImuParameters {
         "gyroscope bias instability (deg/h)",
     ];
 
-    /// `velocity random walk (m/s/√h) 18.0, …`
-    fn in_words(&self) -> String {
-        let figure = |i: usize| {
-            let value = Self::in_datasheets(i, self.values[i]);
-            // Three digits: the figures are bounds of a search, not measurements.
-            let decimals = (2.0 - value.log10().floor()).max(0.0) as usize;
-            format!("{} {value:.decimals$}", Self::NAMES[i])
-        };
-        (0..IMU_PARAMETERS)
-            .map(figure)
-            .collect::<Vec<_>>()
-            .join(", ")
-    }
-
     /// As good as without noise.
     fn perfect(t_corr_s: f64) -> Self {
         // 1e-5 of a consumer IMU, not zero: intensities are sought as logarithms.
@@ -649,13 +633,11 @@ impl Need<'_> {
                 value: perfect.value,
             });
         }
-        let poorest = start.times([POOREST; IMU_PARAMETERS]);
-        let worst = self.worst(&poorest)?;
+        let worst = self.worst(&start.times([POOREST; IMU_PARAMETERS]))?;
         if worst.margin() >= RESERVE {
             return Err(RequireError::Loose {
                 limit: worst.limit,
                 value: worst.value,
-                poorest,
             });
         }
         let mut imu = self.at_limit(&start, [1.0; IMU_PARAMETERS])?.1;

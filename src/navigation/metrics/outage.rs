@@ -196,43 +196,24 @@ pub struct Budget {
 impl Budget {
     /// Just before the first fix after each outage: every source goes alone through the gains of one filter.
     pub fn at_outage_ends(filter: &FilterPass<'_>, sources: &[NamedSource]) -> Vec<Self> {
-        let squares = |source: &NamedSource| -> Vec<[f64; REPORTED]> {
+        let squares = |source: &NamedSource| -> (String, Vec<[f64; REPORTED]>) {
             // Mean squares, not variances: a deterministic source (drift) has a mean and no variance.
             let squares = |end: &Judged| end.errors.variances(&end.errors.moments());
-            filter
-                .errors_at_ends(&source.side)
-                .iter()
-                .map(squares)
-                .collect()
+            let ends = filter.errors_at_ends(&source.side);
+            (source.name.clone(), ends.iter().map(squares).collect())
         };
-        let of_source: Vec<Vec<[f64; REPORTED]>> = sources.par_iter().map(squares).collect();
-        let is_there =
-            |ends: &[[f64; REPORTED]]| ends.iter().flatten().any(|square| *square != 0.0);
-        let (sources, of_source): (Vec<&NamedSource>, Vec<_>) = sources
-            .iter()
-            .zip(of_source)
-            .filter(|(_, ends)| is_there(ends))
-            .unzip();
-        let outages = of_source.first().map_or(0, Vec::len);
+        let mut all: Vec<(String, Vec<[f64; REPORTED]>)> =
+            sources.par_iter().map(squares).collect();
+        all.retain(|(_, ends)| ends.iter().flatten().any(|square| *square != 0.0));
+        let outages = all.first().map_or(0, |(_, ends)| ends.len());
         let budget = |k: usize| {
-            let mut total = [0.0; REPORTED];
-            for ends in &of_source {
-                total
-                    .iter_mut()
-                    .zip(&ends[k])
-                    .for_each(|(sum, square)| *sum += square);
-            }
-            let share = |ends: &Vec<[f64; REPORTED]>| {
-                PerState(std::array::from_fn(|i| ends[k][i] / total[i]))
+            let total = std::array::from_fn(|i| all.iter().map(|(_, ends)| ends[k][i]).sum());
+            let share = |(name, ends): &(String, Vec<[f64; REPORTED]>)| {
+                let shares = std::array::from_fn(|i| ends[k][i] / total[i]);
+                (name.clone(), PerState(shares))
             };
-            let shares = sources
-                .iter()
-                .zip(&of_source)
-                .map(|(source, ends)| (source.name.clone(), share(ends)));
-            Self {
-                shares: shares.collect(),
-                total,
-            }
+            let shares = all.iter().map(share).collect();
+            Self { shares, total }
         };
         (0..outages).map(budget).collect()
     }

@@ -1,9 +1,9 @@
 //! The GNSS receiver: what it measures, how often and how well.
 
+use super::normal;
 use crate::rng::{Generator, StreamKey};
 use crate::units::{NonNegative, Positive, exactly};
 use glam::DVec3;
-use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -153,10 +153,6 @@ impl GnssNoise {
     }
 }
 
-fn normal(generator: &mut Generator) -> f64 {
-    StandardNormal.sample(generator)
-}
-
 fn sigmas_or_none<S: Serializer>(
     sigmas: &Option<[f64; 3]>,
     serializer: S,
@@ -202,34 +198,6 @@ pub struct BaroSettings {
     /// Standard deviation of a height (m).
     #[schemars(with = "Positive")]
     pub sigma_m: f64,
-}
-
-/// The noise of the altimeter in one run.
-pub(crate) struct BaroNoise {
-    stream: Generator,
-    sigma_m: f64,
-}
-
-impl BaroNoise {
-    /// The noise of run `key.run`.
-    pub(crate) fn new(settings: &BaroSettings, key: StreamKey<'_>) -> Self {
-        let stream = StreamKey {
-            source: "baro",
-            process: "height",
-            ..key
-        }
-        .generator();
-        Self {
-            stream,
-            sigma_m: settings.sigma_m,
-        }
-    }
-
-    /// The error of the next height (m).
-    pub(crate) fn draw(&mut self) -> f64 {
-        let normal: f64 = StandardNormal.sample(&mut self.stream);
-        self.sigma_m * normal
-    }
 }
 
 #[cfg(test)]

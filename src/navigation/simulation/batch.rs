@@ -43,7 +43,7 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
         let fix = event.gnss_epoch.then(|| source.fix(plan, event));
         let measured = Measured {
             fix: fix.filter(|_| event.fix),
-            height: source.height(event),
+            height: source.height(plan, event),
             aids: source.aids(event),
         };
         // Drawn once for all candidates: their errors are paired, and ratios between them scatter far less

@@ -9,14 +9,14 @@ use crate::gnss::{GnssFix, GnssVelocity};
 use crate::imu::{ImuIncrement, Sensor};
 use crate::lanes::{Lanes, Vec3};
 use crate::linalg;
-use crate::rng::StreamKey;
+use crate::rng::{Generator, StreamKey};
 use crate::sensors::aiding::{Aid, AidNoise};
 use crate::sensors::defects::Defects;
-use crate::sensors::gnss::{BaroNoise, GnssNoise};
+use crate::sensors::gnss::GnssNoise;
 use crate::sensors::imu::{ImuErrors, LaneErrors};
+use crate::sensors::normal;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
-use rand_distr::{Distribution, StandardNormal};
 use std::ops::Range;
 
 /// What eight runs measure at an instant.
@@ -33,7 +33,8 @@ pub(super) struct Source<'a> {
     rate_hz: f64,
     imu: LaneErrors<'a>,
     gnss: Vec<GnssNoise>,
-    baro: Vec<BaroNoise>,
+    /// Those of the heights; empty without a barometer.
+    baro: Vec<Generator>,
     aiding: Vec<AidNoise>,
     /// Empty for an IMU without defects.
     defects: Vec<Defects>,
@@ -58,11 +59,16 @@ impl<'a> Source<'a> {
             .iter()
             .map(|k| GnssNoise::new(experiment.gnss, *k))
             .collect();
-        let baro = experiment
-            .baro
-            .iter()
-            .flat_map(|b| keys.iter().map(|k| BaroNoise::new(b, *k)))
-            .collect();
+        let height = |key: &StreamKey<'a>| {
+            StreamKey {
+                source: "baro",
+                process: "height",
+                ..*key
+            }
+            .generator()
+        };
+        let baro = experiment.baro.iter();
+        let baro = baro.flat_map(|_| keys.iter().map(height)).collect();
         let aiding = keys
             .iter()
             .map(|k| AidNoise::new(experiment.aiding, *k))
@@ -108,12 +114,13 @@ impl<'a> Source<'a> {
     }
 
     /// The heights of this epoch, if the barometer has one.
-    pub(super) fn height(&mut self, event: &Event) -> Option<Lanes> {
+    pub(super) fn height(&mut self, plan: &Plan<'_>, event: &Event) -> Option<Lanes> {
+        let baro = plan.experiment.baro.filter(|_| event.baro)?;
         let mut h = Lanes::splat(event.reference.h);
-        for (lane, noise) in self.baro.iter_mut().enumerate().filter(|_| event.baro) {
-            h[lane] += noise.draw();
+        for (lane, stream) in self.baro.iter_mut().enumerate() {
+            h[lane] += baro.sigma_m * normal(stream);
         }
-        event.baro.then_some(h)
+        Some(h)
     }
 
     /// What the vehicle measures of itself at this epoch.
@@ -175,12 +182,7 @@ fn nominal_start(plan: &Plan<'_>, key: StreamKey<'_>) -> NavState {
             ..key
         }
         .generator();
-        let mut normal = || -> f64 { StandardNormal.sample(&mut generator) };
-        DVec3::new(
-            sigma[0] * normal(),
-            sigma[1] * normal(),
-            sigma[2] * normal(),
-        )
+        DVec3::from(sigma.map(|sigma| sigma * normal(&mut generator)))
     };
     let dr = draw("position", initial.pos_sigma_m);
     let dv = draw("velocity", initial.vel_sigma_m_s);

@@ -260,14 +260,10 @@ fn processes(model: &Model, sensor: Sensor, drifts: &mut Vec<Source>) -> Vec<Nam
 /// What is wrong with a sensor of the true IMU beside its noise.
 pub(super) fn defects(imu: &ImuSettings, sensor: Sensor) -> Vec<NamedSource> {
     let (bias, ppm) = imu.deviations(sensor);
-    let of_temperature = imu.temperature.as_ref().map_or(0.0, |t| t.sigma(sensor));
     let first = 3 * sensor as usize;
     let crossed = CROSSED + 2 * first;
     let of_force = match sensor {
-        Sensor::Accel => {
-            let sigma = imu.vibration.as_ref().map_or(0.0, |v| v.rectification_s2_m);
-            ("rectification", sigma, RECTIFIED..WARMED)
-        }
+        Sensor::Accel => ("rectification", imu.rectification_s2_m(), RECTIFIED..WARMED),
         Sensor::Gyro => (
             "g_sensitivity",
             imu.g_sensitivity_rad_s_per_m_s2,
@@ -281,7 +277,7 @@ pub(super) fn defects(imu: &ImuSettings, sensor: Sensor) -> Vec<NamedSource> {
         of_force,
         (
             "temperature",
-            of_temperature,
+            imu.per_kelvin(sensor),
             WARMED + first..WARMED + first + 3,
         ),
     ];
