@@ -11,7 +11,7 @@ use crate::trajectory::Trajectory;
 use crate::units::Refused;
 
 /// How far the mechanised samples come away from the trajectory.
-#[derive(Debug, Clone, Copy, serde::Serialize)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize)]
 pub struct Closure {
     /// IMU rate (Hz).
     pub rate_hz: f64,
@@ -67,10 +67,7 @@ impl Closure {
         let mut closure = Self {
             rate_hz,
             duration_s,
-            position_m: 0.0,
-            horizontal_m: 0.0,
-            velocity_m_s: 0.0,
-            attitude_rad: 0.0,
+            ..Self::default()
         };
         // The mean over an interval leads to its end: sample k is compared at t_{k+1}.
         for (k, sample) in samples.iter().enumerate() {

@@ -344,32 +344,6 @@ impl<'a> Course<'a> {
         Ok(laws.into_iter().zip(&self.outages).map(curve).collect())
     }
 
-    /// The errors of each group of sources alone, under the gains of the filter that knows them all.
-    fn parts(
-        &self,
-        place: usize,
-        scenario: &Scenario,
-        model: &Model,
-        group: &(dyn Fn(&NamedSource) -> usize + Sync),
-        groups: usize,
-    ) -> Result<Vec<Drift>, BeliefError> {
-        let belief = self.belief(scenario, model)?;
-        let sources = self.sources(scenario, model);
-        let part = |g: usize| {
-            let own: Vec<NamedSource> = sources
-                .iter()
-                .filter(|source| group(source) == g)
-                .cloned()
-                .collect();
-            self.ends(
-                &self.outages[place..=place],
-                &belief,
-                &TruthSide::together(&own),
-            )[0]
-        };
-        Ok((0..groups).into_par_iter().map(part).collect())
-    }
-
     /// The hardest limit of a filter that knows the model.
     fn worst(
         &self,
@@ -377,45 +351,7 @@ impl<'a> Course<'a> {
         model: &Model,
         limits: &[Limit],
     ) -> Result<Worst, BeliefError> {
-        let worst = Worst::of(limits, &self.drifts(scenario, model)?);
-        Ok(worst.expect("at least one limit and one place"))
-    }
-
-    /// Where the margin of the hardest limit falls to `reserve` along IMUs of a rising logarithm, each with the scenario
-    /// of a filter that knows it, as [`Crossing::from`] 0; the logarithm and what is left beyond the reserve.
-    ///
-    /// The search is at the places that were the worst so far; what it finds is held against all, and it goes on where
-    /// another is worse. The answer is that of all places, at the cost of a few.
-    fn crossing(
-        &self,
-        limits: &[Limit],
-        (crossing, reserve): (&Crossing, f64),
-        imu_at: impl Fn(f64) -> (Scenario, Model),
-    ) -> Result<(f64, f64), BeliefError> {
-        let worst_at = |ln: f64| {
-            let (scenario, model) = imu_at(ln);
-            self.worst(&scenario, &model, limits)
-        };
-        let mut places = vec![worst_at(0.0)?.place];
-        let mut start = 0.0;
-        loop {
-            let outages: Vec<Outage> = places.iter().map(|place| self.outages[*place]).collect();
-            let margin_there = |ln: f64| {
-                let (scenario, model) = imu_at(ln);
-                let worst = Worst::of(limits, &self.drifts_in(&outages, &scenario, &model)?);
-                Ok::<_, BeliefError>(
-                    worst.expect("at least one limit and one place").margin() - reserve,
-                )
-            };
-            let (ln, there) = crossing.from(start, margin_there)?;
-            let worst = worst_at(ln)?;
-            let everywhere = worst.margin() - reserve;
-            if everywhere >= there - crossing.exact || places.contains(&worst.place) {
-                return Ok((ln, everywhere));
-            }
-            places.push(worst.place);
-            start = ln;
-        }
+        Ok(hardest(limits, &self.drifts(scenario, model)?))
     }
 
     fn drifts_in(
@@ -453,6 +389,10 @@ impl<'a> Course<'a> {
             model,
         )
     }
+}
+
+fn hardest(limits: &[Limit], drifts: &[Drift]) -> Worst {
+    Worst::of(limits, drifts).expect("at least one limit and one place")
 }
 
 /// Outages of one length at `places` times, the first at `first_s`, evenly to the end of the trajectory.
@@ -712,22 +652,33 @@ impl Need<'_> {
         imu: &ImuParameters,
         weights: [f64; IMU_PARAMETERS],
     ) -> Result<(f64, ImuParameters), BeliefError> {
-        let scaled = |ln: f64| imu.times(weights.map(|w| (w * ln).exp()));
         let crossing = Crossing {
             bounds: (-RANGE, RANGE),
             step: 0.7,
             exact: EXACT,
         };
-        let imu_at = |ln: f64| {
-            (
-                self.scenario.clone(),
-                scaled(ln).model(self.scenario.imu.rate_hz),
-            )
-        };
-        let (ln, margin) = self
-            .course
-            .crossing(self.limits, (&crossing, RESERVE), imu_at)?;
-        Ok((margin, scaled(ln)))
+        let scaled = |ln: f64| imu.times(weights.map(|w| (w * ln).exp()));
+        let (course, scenario) = (self.course, self.scenario);
+        // The search is at the places that were the worst so far; what it finds is held against all, and it goes on
+        // where another is worse. The answer is that of all places, at the cost of a few.
+        let mut places = vec![self.worst(imu)?.place];
+        let mut start = 0.0;
+        loop {
+            let outages: Vec<Outage> = places.iter().map(|at| course.outages[*at]).collect();
+            let margin_there = |ln: f64| {
+                let model = scaled(ln).model(scenario.imu.rate_hz);
+                let drifts = course.drifts_in(&outages, scenario, &model)?;
+                Ok::<_, BeliefError>(hardest(self.limits, &drifts).margin() - RESERVE)
+            };
+            let (ln, there) = crossing.from(start, margin_there)?;
+            let worst = self.worst(&scaled(ln))?;
+            let everywhere = worst.margin() - RESERVE;
+            if everywhere >= there - EXACT || places.contains(&worst.place) {
+                return Ok((everywhere, scaled(ln)));
+            }
+            places.push(worst.place);
+            start = ln;
+        }
     }
 
     /// Mean squares of the four sources and of everything else in what is limited the hardest.
@@ -736,24 +687,24 @@ impl Need<'_> {
         imu: &ImuParameters,
     ) -> Result<(Worst, [f64; IMU_PARAMETERS + 1]), BeliefError> {
         let worst = self.worst(imu)?;
-        let model = imu.model(self.scenario.imu.rate_hz);
-        let group = |source: &NamedSource| {
-            let own = ImuParameters::PROCESSES
-                .iter()
-                .position(|process| source.process == Some(*process));
-            own.unwrap_or(IMU_PARAMETERS)
+        let (course, model) = (self.course, imu.model(self.scenario.imu.rate_hz));
+        let belief = course.belief(self.scenario, &model)?;
+        let sources = course.sources(self.scenario, &model);
+        let outage = &course.outages[worst.place..=worst.place];
+        // each group of sources alone, under the gains of the filter that knows them all
+        let square = |group: usize| {
+            let is_own = |source: &&NamedSource| {
+                let mut processes = ImuParameters::PROCESSES.iter();
+                let own = processes.position(|process| source.process == Some(*process));
+                own.unwrap_or(IMU_PARAMETERS) == group
+            };
+            let own: Vec<NamedSource> = sources.iter().filter(is_own).cloned().collect();
+            let drift = course.ends(outage, &belief, &TruthSide::together(&own))[0];
+            drift.square(worst.limit.quantity)
         };
-        let parts = self.course.parts(
-            worst.place,
-            self.scenario,
-            &model,
-            &group,
-            IMU_PARAMETERS + 1,
-        )?;
-        Ok((
-            worst,
-            std::array::from_fn(|i| parts[i].square(worst.limit.quantity)),
-        ))
+        let groups = (0..=IMU_PARAMETERS).into_par_iter();
+        let squares: Vec<f64> = groups.map(square).collect();
+        Ok((worst, std::array::from_fn(|i| squares[i])))
     }
 }
 

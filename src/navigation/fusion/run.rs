@@ -14,7 +14,7 @@ use crate::gnss::GnssFix;
 use crate::imu::{ImuIncrement, ImuSample, Sensor};
 use crate::lanes::{Lanes, Vec3};
 use crate::linalg::{Link, median, to_nalgebra};
-use crate::simulation::{ReportedError, reported_error};
+use crate::simulation::reported_error;
 use crate::strapdown::Strapdown;
 use crate::trajectory::reference::Reference;
 use crate::units::DEG;
@@ -409,7 +409,7 @@ impl Filter {
     /// Difference from a state whose velocity is known as well as `velocity_sigma` (m/s).
     fn error(&mut self, truth: &NavState, velocity_sigma: f64) -> RowError {
         settle(&mut self.ekf);
-        let ReportedError { values, psi_n } = reported_error(&self.state(), truth);
+        let (values, psi_n) = reported_error(&self.state(), truth);
         let mut x = SVector::from(values);
         x.fixed_rows_mut::<3>(3 * PSI)
             .copy_from(&to_nalgebra(psi_n));

@@ -110,20 +110,15 @@ impl<T: Serialize> Serialize for PerState<T> {
     }
 }
 
-impl<'de, T: Deserialize<'de> + Copy> Deserialize<'de> for PerState<T> {
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for PerState<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let by_name = HashMap::<String, T>::deserialize(deserializer)?;
-        let value = |name: &&'static str| {
-            by_name
-                .get(*name)
-                .copied()
-                .ok_or_else(|| D::Error::missing_field(name))
-        };
-        let values = REPORTED_NAMES
+        let mut by_name = HashMap::<String, T>::deserialize(deserializer)?;
+        let values: Vec<T> = REPORTED_NAMES
             .iter()
-            .map(value)
-            .collect::<Result<Vec<T>, _>>()?;
-        Ok(Self(std::array::from_fn(|i| values[i])))
+            .filter_map(|name| by_name.remove(*name))
+            .collect();
+        let values = values.try_into().map(Self);
+        values.map_err(|_| D::Error::custom("a value of each reported state is needed"))
     }
 }
 

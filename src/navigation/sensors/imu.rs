@@ -124,7 +124,7 @@ fn check_recording(recording: &Recording, imu_hz: f64, needs: usize) -> Result<(
 /// The errors of the six channels of one run, as streams of samples.
 #[derive(Debug, Clone)]
 pub struct ImuErrors<'a> {
-    channels: Vec<ChannelErrors<'a>>,
+    channels: [ChannelErrors<'a>; 6],
 }
 
 #[derive(Debug, Clone)]
@@ -170,9 +170,7 @@ impl<'a> ImuErrors<'a> {
                 })
             }
         };
-        Self {
-            channels: channels.into(),
-        }
+        Self { channels }
     }
 
     /// Overwrites `out` with the next samples of a channel (m/s² or rad/s).

@@ -274,17 +274,12 @@ impl Assessment {
             nees: Lanes::ZERO,
         };
         for lane in 0..live {
-            let error = reported_error(&ekf.nominal.lane(lane), reference);
+            let (values, psi_n) = reported_error(&ekf.nominal.lane(lane), reference);
             for i in 0..REPORTED {
-                found.error[i][lane] = error.values[i];
+                found.error[i][lane] = values[i];
+                found.navigation[i][lane] = if i < 6 { values[i] } else { psi_n[i - 6] };
             }
-            for i in 0..6 {
-                found.navigation[i][lane] = error.values[i];
-            }
-            for i in 0..3 {
-                found.navigation[6 + i][lane] = error.psi_n[i];
-            }
-            found.att_error_deg[lane] = error.psi_n.length() / DEG;
+            found.att_error_deg[lane] = psi_n.length() / DEG;
         }
         // With psi_n (rad), not with roll, pitch, yaw: NEES is invariant under the Jacobian, which is
         // singular at pitch ±90°.
@@ -373,12 +368,7 @@ impl EpochLanes {
 }
 
 /// Errors of a run in the reported states (m, m/s, degrees) and the attitude error vector (rad).
-pub(crate) struct ReportedError {
-    pub values: [f64; REPORTED],
-    pub psi_n: DVec3,
-}
-
-pub(crate) fn reported_error(estimate: &NavState, truth: &NavState) -> ReportedError {
+pub(crate) fn reported_error(estimate: &NavState, truth: &NavState) -> ([f64; REPORTED], DVec3) {
     let r = ned_difference(truth.place(), estimate.place());
     let v = estimate.v_n - truth.v_n;
     // C_est = (I + [psi×]) C_true, hence the estimate on the left: the same error vector as the filter's PSI
@@ -388,12 +378,8 @@ pub(crate) fn reported_error(estimate: &NavState, truth: &NavState) -> ReportedE
     // Through the Jacobian, not as a difference of Euler angles: linear as the filter's own deviation is, and
     // no angle wraps at ±180°.
     let angles = jacobian.map(|row| row.dot(psi_n) / DEG);
-    ReportedError {
-        values: [
-            r.x, r.y, r.z, v.x, v.y, v.z, angles[0], angles[1], angles[2],
-        ],
-        psi_n,
-    }
+    let of = [r.to_array(), v.to_array(), angles];
+    (std::array::from_fn(|i| of[i / 3][i % 3]), psi_n)
 }
 
 /// The rotation vector of a rotation (rad), the logarithm, exact for small ones too.

@@ -5,8 +5,8 @@ pub mod lincov;
 mod plan;
 mod source;
 
+pub(crate) use batch::reported_error;
 pub use batch::{Batch, run_batch};
-pub(crate) use batch::{ReportedError, reported_error};
 pub(crate) use plan::samples_per;
 pub use plan::{Experiment, ExperimentError, Plan};
 pub use source::{Recording, record};

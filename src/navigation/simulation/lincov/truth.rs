@@ -4,7 +4,7 @@ use super::track::{CROSSED, Measured, Outer, PUSHED, RECTIFIED, SCALED, Source, 
 use crate::ekf::Belief;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Kind, Model, Process};
-use crate::sensors::aiding::{AidError, AidingSettings};
+use crate::sensors::aiding::{Aid, AidError, AidingSettings};
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::simulation::plan::Experiment;
@@ -190,29 +190,17 @@ fn beside_the_imu(experiment: &Experiment<'_>) -> Vec<NamedSource> {
         starts_off: true,
         ..TruthSide::default()
     };
+    let has_velocity = experiment.gnss.vel_sigma_m_s.is_some();
     let all = [
-        ("initial".to_owned(), start, !experiment.initial.perfect),
-        ("gnss.position".to_owned(), noise(0), true),
-        (
-            "gnss.velocity".to_owned(),
-            noise(1),
-            experiment.gnss.vel_sigma_m_s.is_some(),
-        ),
-        ("baro".to_owned(), noise(2), experiment.baro.is_some()),
+        (!experiment.initial.perfect).then(|| NamedSource::new("initial", start)),
+        Some(NamedSource::new("gnss.position", noise(0))),
+        has_velocity.then(|| NamedSource::new("gnss.velocity", noise(1))),
+        experiment.baro.map(|_| NamedSource::new("baro", noise(2))),
     ];
+    let of_aid = |aid: Aid| format!("aiding.{}", aid.name());
     let aids = experiment.aiding.rates();
-    let aids = aids.map(|(aid, _)| {
-        (
-            format!("aiding.{}", aid.name()),
-            noise(3 + aid as usize),
-            true,
-        )
-    });
-    all.into_iter()
-        .chain(aids)
-        .filter(|(_, _, is_there)| *is_there)
-        .map(|(name, side, _)| NamedSource::new(name, side))
-        .collect()
+    let aids = aids.map(|(aid, _)| NamedSource::new(of_aid(aid), noise(3 + aid as usize)));
+    all.into_iter().flatten().chain(aids).collect()
 }
 
 /// A source of states alone; none where there are none.
@@ -238,20 +226,10 @@ fn processes(model: &Model, sensor: Sensor, drifts: &mut Vec<Source>) -> Vec<Nam
                 drifts.push(Source::drift(channel.index(), p.slope()));
                 continue;
             }
-            let name = format!("{}.{label}", sensor.name());
-            let at = found
-                .iter()
-                .position(|known| known.name == name)
-                .unwrap_or_else(|| {
-                    let process = Some((sensor, process.kind()));
-                    found.push(NamedSource {
-                        process,
-                        ..NamedSource::new(name, TruthSide::default())
-                    });
-                    found.len() - 1
-                });
+            let source = named(&mut found, &format!("{}.{label}", sensor.name()));
+            source.process = Some((sensor, process.kind()));
             // The axes are independent: one source with three states has the sum of their covariances.
-            found[at].side.inertial.add(channel.index(), process);
+            source.side.inertial.add(channel.index(), process);
         }
     }
     found
@@ -306,19 +284,23 @@ fn correlated(gnss: &GnssSettings, imu_hz: f64) -> Option<NamedSource> {
 
 /// What is wrong with the vehicle's own measurements beside white noise: parts of one name are one source.
 fn lasting(aiding: &AidingSettings, imu_hz: f64) -> Vec<NamedSource> {
-    let mut found: Vec<(&str, Vec<Source>)> = Vec::new();
+    let mut found = Vec::new();
     for AidError { part, law, .. } in aiding.errors() {
-        let (name, _) = part.names();
-        let source = Source::of_vehicle(part, law, imu_hz);
-        match found.last_mut() {
-            Some((known, states)) if *known == name => states.push(source),
-            _ => found.push((name, vec![source])),
-        }
+        let source = named(&mut found, part.names().0);
+        let states = &mut source.side.inertial.states;
+        states.push(Source::of_vehicle(part, law, imu_hz));
     }
-    let sources = found.into_iter();
-    sources
-        .filter_map(|(name, states)| inertial(name.to_owned(), states))
-        .collect()
+    found
+}
+
+/// The source of a name, which is added where there is none.
+fn named<'a>(all: &'a mut Vec<NamedSource>, name: &str) -> &'a mut NamedSource {
+    let known = all.iter().position(|source| source.name == name);
+    let at = known.unwrap_or_else(|| {
+        all.push(NamedSource::new(name, TruthSide::default()));
+        all.len() - 1
+    });
+    &mut all[at]
 }
 
 // Whether the motion shows the heading.
