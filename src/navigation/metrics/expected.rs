@@ -8,6 +8,7 @@ use super::summary::{
 use super::verdict;
 use crate::ekf::Belief;
 use crate::noise::Model;
+use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{ErrorLaw, FilterPass, Instant, Judged, Track, TruthSide};
 use crate::simulation::{
     BIASES, COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord,
@@ -54,11 +55,9 @@ impl Expected {
             .map(|(instant, bias)| epoch(instant, *bias, limit))
             .collect::<Option<_>>()?;
         let ends = experiment.outages.iter().zip(&law.outage_ends);
-        let mut outages: Vec<OutageSummary> = ends
-            .map(|(window, end)| outage((window.start_s, window.end_s), end, &epochs))
-            .collect();
-        for outage in &mut outages {
-            let window = (outage.start_s, outage.end_s);
+        let of_outage = |(window, end): (&Outage, &Judged)| {
+            let window = (window.start_s, window.end_s);
+            let mut outage = outage(window, end, &epochs);
             // A barometer or a vehicle that measures in the outage corrects what grows upwards.
             let lasts = |rate_hz: f64| (window.1 - window.0) * rate_hz >= 1.0;
             let sees_height = experiment.baro.is_some_and(|b| lasts(b.rate_hz))
@@ -69,7 +68,9 @@ impl Expected {
                     .is_some_and(|nhc| lasts(nhc.rate_hz));
             let sigma_m_s = outage.asee_end.0[VELOCITY_DOWN];
             outage.beyond_linear = !sees_height && is_beyond_linear(window, &epochs, sigma_m_s);
-        }
+            outage
+        };
+        let outages: Vec<OutageSummary> = ends.map(of_outage).collect();
         let record = record(&epochs, &law, &outages);
         let beyond_linear = outages.iter().position(|outage| outage.beyond_linear);
         let (verdict, verdicts) = verdict::expected(&record, beyond_linear);

@@ -97,9 +97,9 @@ pub fn compare(
     }
     // To the last bit: epochs of the same schedule are equal, and ratios of unequal epochs would mean
     // nothing.
-    let times =
-        |e: &Measured| -> Vec<u64> { e.epochs.iter().map(|row| row.t_s.to_bits()).collect() };
-    if times(candidate) != times(reference) {
+    let time = |row: &EpochRow| row.t_s.to_bits();
+    let times = candidate.epochs.iter().map(time);
+    if times.ne(reference.epochs.iter().map(time)) {
         return Err(differ("reporting epochs", &|e| {
             let ends = [e.epochs.first(), e.epochs.last()];
             let [first, last] = ends.map(|row| row.map_or(f64::NAN, |row| row.t_s));
@@ -124,7 +124,7 @@ fn outage(
         let within = e.epochs.iter().filter(|row| outage.withholds(row.t_s));
         within.collect::<Vec<_>>()
     });
-    let (of_candidate, of_reference) = records(candidate, reference, index, paired);
+    let sides = records(candidate, reference, index, paired);
     let windows = [candidate.independent_windows, reference.independent_windows]
         .into_iter()
         .flatten();
@@ -134,8 +134,8 @@ fn outage(
         is_expected: [candidate.is_expected, reference.is_expected],
     };
     let mean_ratio = |value: &dyn Fn(&OutageRecord) -> f64| {
-        let [a, b] = [&of_candidate, &of_reference]
-            .map(|side| side.iter().map(|o| value(o)).collect::<Vec<_>>());
+        let [a, b] = [&sides.0, &sides.1].map(|side| side.iter().map(|o| value(o)).collect());
+        let [a, b]: [Vec<f64>; 2] = [a, b];
         pairing.mean_ratio(&a, &b)
     };
     let state = |i: usize| {

@@ -354,20 +354,19 @@ impl Summary {
             distance(v.nees, v.nees_std_error, expected.nees.mean),
             distance(v.coverage, v.coverage_std_error, expected.coverage.mean),
         ];
+        type States = PerState<f64>;
+        let distances = |value: &States, error: &States, expected: &States| -> [f64; REPORTED] {
+            std::array::from_fn(|i| distance(value.0[i], error.0[i], expected.0[i]))
+        };
         let (a, e) = (&self.accuracy, &expected.accuracy);
-        let means = a.rmse_mean.0.iter().zip(&a.rmse_mean_std_error.0);
-        all.extend(
-            means
-                .zip(&e.rmse_mean.0)
-                .map(|((value, error), e)| distance(*value, *error, *e)),
-        );
+        all.extend(distances(
+            &a.rmse_mean,
+            &a.rmse_mean_std_error,
+            &e.rmse_mean,
+        ));
         for (o, e) in self.outages.iter().zip(&expected.outages) {
             all.push(distance(o.nees_end, o.nees_end_std_error, e.nees_end));
-            let ends = o.rmse_end.0.iter().zip(&o.rmse_end_std_error.0);
-            all.extend(
-                ends.zip(&e.rmse_end.0)
-                    .map(|((value, error), e)| distance(*value, *error, *e)),
-            );
+            all.extend(distances(&o.rmse_end, &o.rmse_end_std_error, &e.rmse_end));
         }
         // coverage that is 1 in every run has no error of its own, and tells nothing
         all.retain(|z| z.is_finite());

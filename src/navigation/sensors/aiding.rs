@@ -408,12 +408,7 @@ impl AidNoise {
         let walk = |error: AidError| {
             let (aid, _, process, _) = error.part.row();
             let source = aid.name();
-            let mut stream = StreamKey {
-                source,
-                process,
-                ..key
-            }
-            .generator();
+            let mut stream = key.stream(source, process);
             let value = match error.law {
                 Law::Known(value) => value,
                 // a Gauss-Markov process is stationary from the start
@@ -431,14 +426,7 @@ impl AidNoise {
             )
         };
         let white = Aid::ALL.map(|aid| {
-            let stream = |process| {
-                StreamKey {
-                    source: aid.name(),
-                    process,
-                    ..key
-                }
-                .generator()
-            };
+            let stream = |process| key.stream(aid.name(), process);
             (
                 settings.sigmas(aid)[1],
                 ["white_x", "white_y", "white_z"].map(stream),

@@ -167,12 +167,7 @@ impl Defects {
         // A stream for each defect, drawn whether its deviation is zero or not: one setting changes no other number.
         let normals = |sensor: Sensor, process: &'static str, n: usize| -> Vec<f64> {
             let source = format!("{}.defects", sensor.name());
-            let mut generator = StreamKey {
-                source: &source,
-                process,
-                ..key
-            }
-            .generator();
+            let mut generator = key.stream(&source, process);
             (0..n).map(|_| normal(&mut generator)).collect()
         };
         let triad = |sensor: Sensor, process| DVec3::from_slice(&normals(sensor, process, 3));

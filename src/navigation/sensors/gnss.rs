@@ -101,14 +101,7 @@ impl GnssNoise {
     /// The noise of run `key.run`.
     pub(crate) fn new(settings: &GnssSettings, key: StreamKey<'_>) -> Self {
         const COMPONENTS: [&str; 6] = ["pos_n", "pos_e", "pos_d", "vel_n", "vel_e", "vel_d"];
-        let streams = COMPONENTS.map(|process| {
-            StreamKey {
-                source: "gnss",
-                process,
-                ..key
-            }
-            .generator()
-        });
+        let streams = COMPONENTS.map(|process| key.stream("gnss", process));
         let velocity = settings.vel_sigma_m_s.unwrap_or([0.0; 3]);
         let sigma = std::array::from_fn(|i| {
             if i < 3 {
@@ -121,12 +114,7 @@ impl GnssNoise {
         let phi = (-1.0 / (settings.rate_hz * settings.correlation_time_s)).exp();
         let correlated = std::array::from_fn(|i| {
             let process = ["correlated_n", "correlated_e", "correlated_d"][i];
-            let stream = StreamKey {
-                source: "gnss",
-                process,
-                ..key
-            }
-            .generator();
+            let stream = key.stream("gnss", process);
             Correlated {
                 stream,
                 phi,

@@ -194,12 +194,14 @@ fn effects(outage: &Outage, events: &[Event]) -> (f64, usize) {
 }
 
 fn check_rotation(ideal: &[ImuSample], start_s: f64, rate_hz: f64) -> Result<(), ExperimentError> {
-    let too_fast = ideal
+    let mut angles = ideal
         .iter()
-        .position(|s| s.omega_ib_b.length() / rate_hz > MAX_ROTATION);
-    too_fast.map_or(Ok(()), |k| {
+        .map(|s| s.omega_ib_b.length() / rate_hz)
+        .enumerate();
+    let too_fast = angles.find(|(_, angle)| *angle > MAX_ROTATION);
+    too_fast.map_or(Ok(()), |(k, angle)| {
         let (t_s, most) = (start_s + k as f64 / rate_hz, MAX_ROTATION / DEG);
-        let angle = ideal[k].omega_ib_b.length() / rate_hz / DEG;
+        let angle = angle / DEG;
         refused(format!(
             "the vehicle turns {angle:.1}° within one IMU sample at {t_s} s; at most {most:.1}° can be followed at {rate_hz} Hz"
         ))
@@ -237,15 +239,9 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
     let reports = (0_u32..).map(|s| (f64::from(s) * rate_hz).round() as usize);
     let reports: Vec<usize> = reports.take_while(|k| *k <= samples).collect();
     let mut all = reports.clone();
-    all.extend((per_fix..=samples).step_by(per_fix));
-    all.extend(
-        baro.iter()
-            .flat_map(|step| (*step..=samples).step_by(*step)),
-    );
-    all.extend(
-        aids.iter()
-            .flat_map(|(_, step)| (*step..=samples).step_by(*step)),
-    );
+    let steps = [Some(per_fix), baro].into_iter().flatten();
+    let steps = steps.chain(aids.iter().map(|(_, step)| *step));
+    all.extend(steps.flat_map(|step| (step..=samples).step_by(step)));
     // The last sample is an event, so that an outage that lasts to the end has an end.
     all.push(samples);
     all.sort_unstable();
@@ -261,7 +257,8 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
         }
         // None at the very start: the initial deviations are those of a vehicle that GNSS has helped to align
         // already.
-        let gnss_epoch = sample > 0 && sample.is_multiple_of(per_fix);
+        let is_due = |step: usize| sample > 0 && sample.is_multiple_of(step);
+        let gnss_epoch = is_due(per_fix);
         let withheld = experiment.outages.iter().any(|o| o.withholds(t_s));
         Ok(Event {
             sample,
@@ -270,12 +267,11 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
             antenna: antenna(experiment, t_s, &reference),
             gnss_epoch,
             fix: gnss_epoch && !withheld,
-            baro: baro.is_some_and(|step| sample > 0 && sample.is_multiple_of(step)),
+            baro: baro.is_some_and(is_due),
             aids: aided(
                 experiment,
                 t_s,
-                aids.iter()
-                    .filter(|(_, step)| sample > 0 && sample.is_multiple_of(*step)),
+                aids.iter().filter(|(_, step)| is_due(*step)),
             ),
             report: reports.binary_search(&sample).is_ok(),
         })

@@ -59,14 +59,7 @@ impl<'a> Source<'a> {
             .iter()
             .map(|k| GnssNoise::new(experiment.gnss, *k))
             .collect();
-        let height = |key: &StreamKey<'a>| {
-            StreamKey {
-                source: "baro",
-                process: "height",
-                ..*key
-            }
-            .generator()
-        };
+        let height = |key: &StreamKey<'a>| key.stream("baro", "height");
         let baro = experiment.baro.iter();
         let baro = baro.flat_map(|_| keys.iter().map(height)).collect();
         let aiding = keys
@@ -176,12 +169,7 @@ fn nominal_start(plan: &Plan<'_>, key: StreamKey<'_>) -> NavState {
         return truth;
     }
     let draw = |process: &'static str, sigma: [f64; 3]| {
-        let mut generator = StreamKey {
-            source: "initial",
-            process,
-            ..key
-        }
-        .generator();
+        let mut generator = key.stream("initial", process);
         DVec3::from(sigma.map(|sigma| sigma * normal(&mut generator)))
     };
     let dr = draw("position", initial.pos_sigma_m);

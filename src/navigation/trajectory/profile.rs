@@ -625,14 +625,6 @@ pub enum Place {
     },
 }
 
-/// The geometry of a turn that cuts a corner.
-struct Corner {
-    /// Length of the straight line from its begin to its end (m), in the direction of half the turn.
-    chord: f64,
-    /// From its begin to the corner it cuts, and from there to its end (m).
-    lead: f64,
-}
-
 impl Path<'_> {
     fn waypoints(
         &mut self,
@@ -722,7 +714,9 @@ impl Path<'_> {
         length
     }
 
-    fn corner(&self, angle: f64, by: Turning, ramp_s: f64) -> Result<Corner, Problem> {
+    /// A turn that cuts a corner: length of the straight line from its begin to its end, which goes in the direction of half
+    /// the turn, and length from its begin to the corner and from there to its end (m).
+    fn corner(&self, angle: f64, by: Turning, ramp_s: f64) -> Result<[f64; 2], Problem> {
         let duration = self.turn_duration(angle, by, ramp_s)?;
         let piece = self.piece([duration, ramp_s], 0.0, angle, 0.0);
         let half = self.heading + 0.5 * angle;
@@ -730,10 +724,7 @@ impl Path<'_> {
         // velocity along it counts.
         let chord = self.speed * duration * mean(|x| (piece.at(x).heading - half).cos());
         // Chord and both leads are an isosceles triangle with the angle of the turn outside at the corner.
-        Ok(Corner {
-            chord,
-            lead: 0.5 * chord / (0.5 * angle).cos(),
-        })
+        Ok([chord, 0.5 * chord / (0.5 * angle).cos()])
     }
 
     /// Distance before the corner at `target` at which the turn to `next` begins (m).
@@ -755,7 +746,7 @@ impl Path<'_> {
         if angle.abs() < 1e-9 {
             Ok(0.0)
         } else {
-            Ok(self.corner(angle, by, ramp_s)?.lead)
+            Ok(self.corner(angle, by, ramp_s)?[1])
         }
     }
 
@@ -791,11 +782,11 @@ impl Path<'_> {
 
     /// What is left to turn (rad) to the target after a turn by an angle.
     fn miss(&self, angle: f64, target: [f64; 2], by: Turning, ramp_s: f64) -> Result<f64, Problem> {
-        let corner = self.corner(angle, by, ramp_s)?;
+        let [chord, _] = self.corner(angle, by, ramp_s)?;
         let (sin_psi, cos_psi) = (self.heading + 0.5 * angle).sin_cos();
         // Flat over the chord of a turn: hundreds of metres over the radius of the Earth, second order 1e-8
         // of it.
-        let by_n = DVec3::new(corner.chord * cos_psi, corner.chord * sin_psi, 0.0);
+        let by_n = DVec3::new(chord * cos_psi, chord * sin_psi, 0.0);
         let [lat, lon, _] = moved([self.lat, self.lon, self.h], by_n);
         let course = self.course([lat, lon], target).0;
         Ok(wrap_angle(course - self.heading - angle))

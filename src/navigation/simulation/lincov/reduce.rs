@@ -480,10 +480,7 @@ impl Damped<'_> {
             return None;
         }
         for _ in 0..self.iterations {
-            let Some(model) = self.quadratic(&x, &value) else {
-                break;
-            };
-            let Some((next, next_value)) = self.descend(&x, &value, &model, &mut damping) else {
+            let Some((next, next_value)) = self.descend(&x, &value, &mut damping) else {
                 break;
             };
             let gain = value.cost - next_value.cost;
@@ -495,7 +492,8 @@ impl Damped<'_> {
         Some(x.as_slice().to_vec())
     }
 
-    fn quadratic(&self, x: &DVector<f64>, here: &Value) -> Option<Quadratic> {
+    /// What the cost is near a point: its gradient and Gauss and Newton's Hessian Σ c ∂f ∂fᵀ of its parts f.
+    fn quadratic(&self, x: &DVector<f64>, here: &Value) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let beside = |i: usize| {
             let mut beside = x.clone();
             beside[i] += DIFFERENCE;
@@ -517,19 +515,28 @@ impl Damped<'_> {
         let gradient = DVector::from_fn(x.len(), |i, _| {
             (beside[i].cost - here.cost) / DIFFERENCE - 0.5 * DIFFERENCE * hessian[(i, i)]
         });
-        Some(Quadratic { gradient, hessian })
+        Some((gradient, hessian))
     }
 
-    /// The step that gains, damped until it does; none where it has nothing to gain.
+    /// The step that gains, damped until it does and is short; none where it has nothing to gain.
     fn descend(
         &self,
         x: &DVector<f64>,
         value: &Value,
-        model: &Quadratic,
         damping: &mut f64,
     ) -> Option<(DVector<f64>, Value)> {
+        let (gradient, hessian) = self.quadratic(x, value)?;
         for _ in 0..TRIALS {
-            let (step, expected) = model.step(damping)?;
+            let step = loop {
+                let damped = &hessian + DMatrix::identity(x.len(), x.len()) * *damping;
+                let step = -damped.cholesky()?.solve(&gradient);
+                if step.amax() <= MAX_STEP {
+                    break step;
+                }
+                *damping *= MORE;
+            };
+            // by how much the cost should fall
+            let expected = -(gradient.dot(&step) + 0.5 * step.dot(&(&hessian * &step)));
             if expected < self.enough {
                 return None;
             }
@@ -545,29 +552,6 @@ impl Damped<'_> {
             *damping *= MORE;
         }
         None
-    }
-}
-
-/// What the cost is near a point: its gradient and Gauss and Newton's Hessian Σ c ∂f ∂fᵀ of its parts f.
-struct Quadratic {
-    gradient: DVector<f64>,
-    hessian: DMatrix<f64>,
-}
-
-impl Quadratic {
-    /// The step of this damping, or of the least above it that keeps the step short, and by how much the cost should fall.
-    fn step(&self, damping: &mut f64) -> Option<(DVector<f64>, f64)> {
-        loop {
-            let n = self.gradient.len();
-            let damped = &self.hessian + DMatrix::identity(n, n) * *damping;
-            let step = -damped.cholesky()?.solve(&self.gradient);
-            if step.amax() <= MAX_STEP {
-                let expected =
-                    -(self.gradient.dot(&step) + 0.5 * step.dot(&(&self.hessian * &step)));
-                return Some((step, expected));
-            }
-            *damping *= MORE;
-        }
     }
 }
 

@@ -133,7 +133,7 @@ impl Task<'_> {
         // From the model as it is, which keeps factors small; and from one factor on all that makes it consistent, since between
         // the two the valley may be flat. The second counts where it is better by what can be seen.
         let unchanged = vec![0.0; factors.len()];
-        let at = |ln: &[f64]| self.consistency_with(self.filter, &set(factors, ln), draw_factors);
+        let at = |ln: &[f64]| self.consistency_with(&set(factors, ln), draw_factors);
         let exact = |ln: &[f64]| self.exact(ln, low, &at);
         let alike = exact(&unchanged)?;
         let near = descent.minimum(unchanged.clone()).unwrap_or(unchanged);
@@ -201,14 +201,13 @@ impl Task<'_> {
     /// When the model has no such filter.
     fn consistency_with(
         &self,
-        filter: &Filter<'_>,
         factors: &[Factor],
         draw_factors: Option<&DrawFactors>,
     ) -> Result<FilterConsistency, BeliefError> {
         let Some(draw_factors) = draw_factors else {
-            return self.consistency(filter, factors);
+            return self.consistency(self.filter, factors);
         };
-        let belief = filter(&scaled(self.model, factors))?;
+        let belief = (self.filter)(&scaled(self.model, factors))?;
         Ok(draw_factors.consistency(&self.assessments(&belief, self.track, Some(draw_factors))))
     }
 
