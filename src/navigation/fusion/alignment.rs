@@ -7,7 +7,7 @@
 //! change of the GNSS velocity, whichever is known better. A start that the fixes of the following minute
 //! contradict is given up for the next, and a heading that they move is not believed as well as it says.
 
-use super::outcome::{Finding, nis_bound, used};
+use super::outcome::{Finding, nis_bound, total_nis, used};
 use super::{Found, Heading, Levelling, Recorded, Settings, Solution, Start, fuse};
 use crate::earth::{gravity_down, moved, ned_difference};
 use crate::ekf::{Belief, InitialSettings};
@@ -265,13 +265,13 @@ impl<'a> Scene<'a> {
                 components: 0,
             };
         };
-        let components: usize = used(&solution).map(|f| f.innovation.len()).sum();
+        let (nis, components) = total_nis(used(&solution));
         Agreement {
             // the sum of the logarithms stands for the determinant: the correlations of both starts are alike
             cost: used(&solution)
                 .map(|f| f.nis + 2.0 * f.sigma.iter().map(|s| s.ln()).sum::<f64>())
                 .sum(),
-            nis: used(&solution).map(|f| f.nis).sum::<f64>() / components.max(1) as f64,
+            nis: nis / components.max(1) as f64,
             components,
         }
     }

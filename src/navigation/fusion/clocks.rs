@@ -9,6 +9,7 @@ use crate::ekf::Belief;
 use crate::frames::wrap_angle;
 use crate::gnss::GnssFix;
 use crate::imu::ImuIncrement;
+use crate::linalg::mean;
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -118,9 +119,8 @@ fn correlation(turns: &[Turn], turned: &Turned, lag_s: f64) -> Option<f64> {
     if pairs.len() < FEWEST.max(turns.len() / 2) {
         return None;
     }
-    let count = pairs.len() as f64;
-    let mean_x = pairs.iter().map(|p| p.0).sum::<f64>() / count;
-    let mean_y = pairs.iter().map(|p| p.1).sum::<f64>() / count;
+    let mean_x = mean(pairs.iter().map(|p| p.0));
+    let mean_y = mean(pairs.iter().map(|p| p.1));
     let products = |[xx, yy, xy]: [f64; 3], (x, y): &(f64, f64)| {
         let (x, y) = (x - mean_x, y - mean_y);
         [xx + x * x, yy + y * y, xy + x * y]

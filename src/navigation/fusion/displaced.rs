@@ -6,6 +6,7 @@
 //! here). What was found is a cause only if the NIS of the filter, run with it, is smaller: an explanation is tested by
 //! taking the cause away.
 
+use super::outcome::total_nis;
 use super::{FixRecord, FusionError, Recorded, Settings, Solution, Start, earlier, fuse};
 use crate::ekf::Belief;
 use crate::gnss::GnssFix;
@@ -152,9 +153,8 @@ impl Scene<'_> {
 
 /// Mean NIS per component.
 fn nis(innovations: &[Option<FixRecord>]) -> f64 {
-    let used = || innovations.iter().flatten();
-    used().map(|f| f.nis).sum::<f64>()
-        / used().map(|f| f.innovation.len()).sum::<usize>().max(1) as f64
+    let (nis, components) = total_nis(innovations.iter().flatten());
+    nis / components.max(1) as f64
 }
 
 /// How many times a gain of independent innovations of NIS 1: errors that are larger, and errors that last, make any

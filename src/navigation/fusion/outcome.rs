@@ -1,7 +1,7 @@
 //! Figures of a fusion: fixes used, consistency, errors at the ends of outages. They serialize as `summary.json` has them.
 
 use super::{AidInnovations, FixRecord, Nine, Row, RowError, Solution, Weighed, aid_innovations};
-use crate::linalg::median;
+use crate::linalg::{mean, median};
 use crate::metrics::{PerState, VerdictKind};
 use crate::sensors::outage::Outage;
 use crate::simulation::REPORTED_NAMES;
@@ -167,16 +167,20 @@ fn ends(solution: &Solution) -> Option<Ends> {
 
 /// Mean NIS of the fixes used, divided by their number of components.
 pub(super) fn nis_per_component(solution: &Solution) -> f64 {
-    let components: usize = used(solution).map(|f| f.innovation.len()).sum();
-    used(solution).map(|f| f.nis).sum::<f64>() / components as f64
+    let (nis, components) = total_nis(used(solution));
+    nis / components as f64
+}
+
+/// Sum of the NIS of fixes, and of how many components.
+pub(super) fn total_nis<'a>(fixes: impl Iterator<Item = &'a FixRecord>) -> (f64, usize) {
+    fixes.fold((0.0, 0), |(nis, components), fix| {
+        (nis + fix.nis, components + fix.innovation.len())
+    })
 }
 
 fn from_reference(rows: &[Row]) -> Option<FromReference> {
     let errors: Vec<RowError> = rows.iter().filter_map(|row| row.error).collect();
-    let n = errors.len() as f64;
-    let rms = |of: &dyn Fn(&RowError) -> f64| {
-        (errors.iter().map(|e| of(e).powi(2)).sum::<f64>() / n).sqrt()
-    };
+    let rms = |of: &dyn Fn(&RowError) -> f64| mean(errors.iter().map(|e| of(e).powi(2))).sqrt();
     let per_state =
         |of: &dyn Fn(&RowError, usize) -> f64| std::array::from_fn(|i| rms(&|e| of(e, i)));
     let rmse: Nine = per_state(&|e, i| e.values[i]);
@@ -190,7 +194,7 @@ fn from_reference(rows: &[Row]) -> Option<FromReference> {
         error_over_sigma: PerState(per_state(&|e, i| {
             e.values[i] / e.sigma[i].max(f64::MIN_POSITIVE)
         })),
-        nees_mean: errors.iter().map(|e| e.nees).sum::<f64>() / n,
+        nees_mean: mean(errors.iter().map(|e| e.nees)),
         nees_dof: rmse.len(),
         velocity_sigma_m_s: rms(&|e| e.velocity_sigma),
     })
@@ -202,12 +206,8 @@ fn horizontal(values: &Nine) -> f64 {
 
 fn smoothed(filtered: &[Row], smoothed: &[Row], outages: &[Outage]) -> SmoothedOutcome {
     let sigma_rms = |rows: &[Row]| {
-        (rows
-            .iter()
-            .map(|row| horizontal(&row.sigma).powi(2))
-            .sum::<f64>()
-            / rows.len() as f64)
-            .sqrt()
+        let squares = rows.iter().map(|row| horizontal(&row.sigma).powi(2));
+        mean(squares).sqrt()
     };
     let of_outage = |outage: &Outage| {
         let [
@@ -477,8 +477,8 @@ pub(super) fn used(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
 }
 
 fn nis(solution: &Solution) -> (VerdictKind, Finding) {
-    let components: usize = used(solution).map(|f| f.innovation.len()).sum();
-    let per_component = nis_per_component(solution);
+    let (nis, components) = total_nis(used(solution));
+    let per_component = nis / components as f64;
     let verdict = match per_component {
         _ if components == 0 => return (VerdictKind::Doubtful, Finding::NoFix),
         nis if nis > nis_bound(components) => VerdictKind::Overconfident,
@@ -534,11 +534,11 @@ fn stretches(solution: &Solution) -> Option<(VerdictKind, Finding)> {
 
 /// Mean NIS per component of the nearest nine tenths of these fixes, where it is too large.
 fn far(fixes: &[&FixRecord]) -> Option<f64> {
-    let mut sorted: Vec<(f64, usize)> = fixes.iter().map(|f| (f.nis, f.innovation.len())).collect();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let kept = &sorted[..sorted.len() * 9 / 10];
-    let components: usize = kept.iter().map(|(_, n)| n).sum();
-    let nis = kept.iter().map(|(nis, _)| nis).sum::<f64>() / components.max(1) as f64;
+    let mut sorted = fixes.to_vec();
+    sorted.sort_by(|a, b| a.nis.total_cmp(&b.nis));
+    let kept = sorted[..sorted.len() * 9 / 10].iter().copied();
+    let (nis, components) = total_nis(kept);
+    let nis = nis / components.max(1) as f64;
     (components > 0 && nis > nis_bound(components)).then_some(nis)
 }
 

@@ -82,7 +82,6 @@ pub fn aid_innovations(records: &[AidRecord]) -> Vec<AidInnovations> {
     let worth = |aid: Aid| {
         let own: Vec<&AidRecord> = records.iter().filter(|r| r.aid == aid).collect();
         let (count, axes) = (own.len(), aid.axes().len());
-        let components = (count * axes) as f64;
         let band = chi_square_band(axes, count as f64);
         let series: Vec<(f64, &[f64])> = own
             .iter()
@@ -91,7 +90,7 @@ pub fn aid_innovations(records: &[AidRecord]) -> Vec<AidInnovations> {
         (count > 0).then(|| AidInnovations {
             aid: aid.name(),
             count,
-            nis_per_component: own.iter().map(|r| r.nis()).sum::<f64>() / components,
+            nis_per_component: own.iter().map(|r| r.nis()).sum::<f64>() / (count * axes) as f64,
             nis_band: Band {
                 lower: band.lower / axes as f64,
                 upper: band.upper / axes as f64,

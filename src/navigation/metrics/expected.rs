@@ -7,6 +7,7 @@ use super::summary::{
 };
 use super::verdict;
 use crate::ekf::Belief;
+use crate::linalg::mean;
 use crate::noise::Model;
 use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{ErrorLaw, FilterPass, Instant, Judged, Track, TruthSide};
@@ -188,9 +189,7 @@ fn outage((start_s, end_s): (f64, f64), end: &Judged, epochs: &[EpochMetrics]) -
 
 /// The run whose squares are the expected ones.
 fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageSummary]) -> RunRecord {
-    let mean = |value: &dyn Fn(&EpochMetrics) -> f64| {
-        epochs.iter().map(value).sum::<f64>() / epochs.len() as f64
-    };
+    let mean = |value: &dyn Fn(&EpochMetrics) -> f64| mean(epochs.iter().map(value));
     let of_outage = |o: &OutageSummary| OutageRecord {
         see_mean: o.asee_mean.0,
         see_end: o.asee_end.0,

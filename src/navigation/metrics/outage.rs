@@ -2,6 +2,7 @@
 
 use super::estimate::{Estimate, PerState, SampleSize, quantile_interval, sample_quantile};
 use super::summary::{AccuracySummary, OutageSummary, Recovery, Spread};
+use crate::linalg::mean;
 use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{FilterPass, Judged, NamedSource};
 use crate::simulation::{BIASES, EpochSums, OutageRecord, REPORTED, RunResult};
@@ -167,11 +168,9 @@ impl AccuracySummary {
     /// Over some epochs. The standard errors are upper bounds, the mean of those of the epochs: epochs of a run are strongly
     /// correlated.
     pub(super) fn over<'a>(epochs: impl Iterator<Item = &'a EpochMetrics> + Clone) -> Self {
-        let n = epochs.clone().count() as f64;
         let mean = |of: &dyn Fn(&EpochMetrics, usize) -> f64| {
-            PerState(std::array::from_fn(|i| {
-                epochs.clone().map(|e| of(e, i)).sum::<f64>() / n
-            }))
+            let of_state = |i| mean(epochs.clone().map(|e| of(e, i)));
+            PerState(std::array::from_fn(of_state))
         };
         Self {
             asee_mean: mean(&|e, i| e.asee.0[i].value),

@@ -2,6 +2,7 @@
 //! believes, relative to the other ([Minaretzis et al.](crate::bibliography::Minaretzis24), Table I).
 
 use super::estimate::{Estimate, PerState, SampleSize};
+use crate::linalg::mean;
 use crate::sensors::outage::Outage;
 use crate::simulation::{OutageRecord, REPORTED, RunRecord};
 use serde::Serialize;
@@ -280,11 +281,6 @@ impl Pairing {
             .std_error
             .powi(2)
     }
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (n, sum) = values.fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + v));
-    sum / n
 }
 
 #[cfg(test)]

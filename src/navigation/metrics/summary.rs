@@ -3,6 +3,7 @@
 use super::estimate::{Band, PerState, SampleSize, chi_square_band, coverage_band};
 use super::outage::{Budget, EpochMetrics, outages};
 use super::verdict::{OutageVerdict, Verdict, VerdictKind, judged};
+use crate::linalg::mean;
 use crate::simulation::lincov::{self, Assessment};
 use crate::simulation::{NEES_DOF, REPORTED, REPORTED_NAMES, RunResult};
 use serde::Serialize;
@@ -287,7 +288,7 @@ fn over_epochs(
 ) -> [f64; 4] {
     let n = epochs.len() as f64;
     let inside = epochs.iter().filter(|e| band.contains(value(e))).count();
-    let mean = epochs.iter().map(&value).sum::<f64>() / n;
+    let mean = mean(epochs.iter().map(&value));
     let share = if band.lower.is_finite() {
         inside as f64 / n
     } else {
@@ -404,9 +405,7 @@ impl ReductionQuality {
         // At the start the errors are those that the filter believes in, or none: that says nothing of it.
         let later: Vec<&lincov::Consistency> =
             reduced.reports.iter().filter(|r| r.after_s > 0.0).collect();
-        let n = later.len() as f64;
         let ratios: Vec<[f64; REPORTED]> = later.iter().map(|r| r.ratio()).collect();
-        let mean = |i: usize| ratios.iter().map(|r| r[i]).sum::<f64>() / n;
         let over = |(a, b): (&lincov::Consistency, &lincov::Consistency)| {
             PerState(std::array::from_fn(|i| a.rmse[i] / b.rmse[i]))
         };
@@ -416,8 +415,8 @@ impl ReductionQuality {
                 .iter()
                 .map(|e| PerState(e.ratio()))
                 .collect(),
-            mean: PerState(std::array::from_fn(mean)),
-            nees: later.iter().map(|r| r.nees).sum::<f64>() / n,
+            mean: PerState(std::array::from_fn(|i| mean(ratios.iter().map(|r| r[i])))),
+            nees: mean(later.iter().map(|r| r.nees)),
             rmse_over_full: full.map(|f| {
                 reduced
                     .outage_ends

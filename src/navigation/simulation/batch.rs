@@ -11,6 +11,7 @@ use crate::ekf::{
 use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::Sensor;
 use crate::lanes::{LANES, Lanes, Real, Vec3};
+use crate::linalg::mean;
 use crate::sensors::aiding::Aid;
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
@@ -195,10 +196,7 @@ impl Candidate {
         });
         let kept: Vec<usize> = (0..self.live).filter(|lane| !diverged[*lane]).collect();
         let epochs = self.trace.iter().map(|e| e.sum(&kept)).collect();
-        let reports = self.trace.len() as f64;
-        let mean = |value: &dyn Fn(&EpochLanes) -> f64| {
-            self.trace.iter().map(value).sum::<f64>() / reports
-        };
+        let mean = |value: &dyn Fn(&EpochLanes) -> f64| mean(self.trace.iter().map(value));
         let record = |lane: usize| RunRecord {
             run: first + lane as u64,
             diverged: diverged[lane],

@@ -4,6 +4,7 @@ use super::track::{Mark, NAV, Nav, Row, SIGNALS, Sides, Sources, Step, StepOfSou
 use super::truth::{TrueErrors, TruthSide};
 use crate::ekf::Belief;
 use crate::ekf::covariance::PSI;
+use crate::linalg::mean;
 use crate::noise::Model;
 use crate::sensors::outage::Outage;
 use crate::simulation::{BIASES, REPORTED};
@@ -57,9 +58,8 @@ impl Assessment {
     /// True RMSE over stated standard deviation over the whole run, as verdicts have it: the root mean square over the
     /// reports.
     pub fn ratio_over_run(&self) -> [f64; REPORTED] {
-        let count = self.reports.len() as f64;
         let ratios: Vec<[f64; REPORTED]> = self.reports.iter().map(Consistency::ratio).collect();
-        std::array::from_fn(|i| (ratios.iter().map(|r| r[i].powi(2)).sum::<f64>() / count).sqrt())
+        std::array::from_fn(|i| mean(ratios.iter().map(|r| r[i].powi(2))).sqrt())
     }
 }
 
@@ -207,15 +207,14 @@ impl<'a> FilterPass<'a> {
 
     /// Their means over the reports within each of some outages.
     pub fn sigma_means(&self, outages: &[Outage]) -> Vec<[f64; REPORTED]> {
-        let mean = |outage: &Outage| {
+        let of_outage = |outage: &Outage| {
             let within = self.stated().filter(|(mark, _)| outage.withholds(mark.t_s));
             let sigmas: Vec<[f64; REPORTED]> = within
                 .map(|(mark, believed)| deviations(&mark.jacobian, believed))
                 .collect();
-            let count = sigmas.len() as f64;
-            std::array::from_fn(|i| sigmas.iter().map(|sigma| sigma[i]).sum::<f64>() / count)
+            std::array::from_fn(|i| mean(sigmas.iter().map(|sigma| sigma[i])))
         };
-        outages.iter().map(mean).collect()
+        outages.iter().map(of_outage).collect()
     }
 
     /// As [`assess`], of the filter's own belief, where settings state more of the true errors than a noise model.

@@ -12,6 +12,7 @@ use crate::earth::GravityModel;
 use crate::ekf::belief::white_of;
 use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings};
 use crate::imu::{Axis, Channel};
+use crate::linalg::mean;
 use crate::noise::{Model, reduction};
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::defects::ImuSettings;
@@ -240,9 +241,7 @@ fn steep(assessment: &Assessment) -> Vec<Steep> {
     if reports.is_empty() {
         return all;
     }
-    let mean = |of: &dyn Fn(&Consistency) -> f64| {
-        reports.iter().map(of).sum::<f64>() / reports.len() as f64
-    };
+    let mean = |of: &dyn Fn(&Consistency) -> f64| mean(reports.iter().map(of));
     // Root mean square over the way, so that one bad minute is not hidden by an hour that is good.
     let over_way = |i: usize| 0.5 * mean(&|c| c.ratio()[i].powi(2)).ln();
     all.extend((0..REPORTED).map(|i| Steep {
@@ -291,18 +290,15 @@ fn shape(law: &ErrorLaw) -> impl Iterator<Item = Part> {
 
 /// The divergence on the average and at the outage ends, where `beside` is added to it.
 pub(super) fn divergence(assessment: &Assessment, beside: impl Fn(&Consistency) -> f64) -> f64 {
-    let mean = |c: &[Consistency], f: &dyn Fn(&Consistency) -> f64| {
-        c.iter().map(f).sum::<f64>() / c.len() as f64
-    };
     // The first instant is the initial state, which no belief about the IMU changes. A trajectory of a few
     // seconds has no other: the mean of none is NaN, and a search ends where it starts.
-    let all = mean(assessment.reports.get(1..).unwrap_or_default(), &|c| {
-        c.divergence
-    });
+    let reports = assessment.reports.get(1..).unwrap_or_default();
+    let all = mean(reports.iter().map(|c| c.divergence));
     if assessment.outage_ends.is_empty() {
         return all;
     }
-    let ends = mean(&assessment.outage_ends, &|c| c.divergence + beside(c));
+    let ends = &assessment.outage_ends;
+    let ends = mean(ends.iter().map(|c| c.divergence + beside(c)));
     ENDS * ends + (1.0 - ENDS) * all
 }
 

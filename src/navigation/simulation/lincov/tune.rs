@@ -11,6 +11,7 @@ use super::track::Track;
 use super::truth::TrueErrors;
 use crate::ekf::{Belief, BeliefError};
 use crate::imu::{Channel, Sensor};
+use crate::linalg::mean;
 use crate::noise::{Kind, Model, Process};
 use crate::simulation::{NEES_DOF, REPORTED};
 use rayon::prelude::*;
@@ -432,8 +433,7 @@ impl FilterConsistency {
     /// Of one filter under several truths.
     fn of(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Self {
         let count = assessments.len() as f64;
-        let mean =
-            |a: &Assessment| a.reports.iter().map(|r| r.nees).sum::<f64>() / a.reports.len() as f64;
+        let mean_nees = |a: &Assessment| mean(a.reports.iter().map(|r| r.nees));
         let end_s: Vec<f64> = assessments[0]
             .outage_ends
             .iter()
@@ -449,13 +449,13 @@ impl FilterConsistency {
         }
         rmse_end.iter_mut().flatten().for_each(|x| *x = x.sqrt());
         let largest = Departure::largest(&departures(assessments, drawn));
-        let nees = assessments.iter().map(mean).sum::<f64>() / count;
+        let nees = mean(assessments.iter().map(mean_nees));
         let first = if drawn.is_some() {
             &assessments[..1]
         } else {
             assessments
         };
-        let nees_over_run = first.iter().map(mean).sum::<f64>() / first.len() as f64;
+        let nees_over_run = mean(first.iter().map(mean_nees));
         let at_ends = first
             .iter()
             .flat_map(|a| a.outage_ends.iter().map(|end| end.nees));
