@@ -2,10 +2,16 @@
 
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Vector3};
+use std::cmp::Ordering;
 
 /// The larger of two numbers; NaN where either is, so that what was lost is not overlooked.
 pub const fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a >= b { a } else { b }
+}
+
+/// The order of pairs by their second number.
+pub(crate) fn by_value<T>(a: &(T, f64), b: &(T, f64)) -> Ordering {
+    a.1.total_cmp(&b.1)
 }
 
 /// Mean; NaN of nothing.

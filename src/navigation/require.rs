@@ -14,7 +14,7 @@
 
 use crate::ekf::{Belief, BeliefError};
 use crate::imu::Sensor;
-use crate::metrics::QuadraticForm;
+use crate::metrics::{QuadraticForm, name_and_limit};
 use crate::noise::{Composite, Flicker, Kind, Model, Process, White, continuous};
 use crate::scenario::Scenario;
 use crate::sensors::imu::Truth;
@@ -89,18 +89,13 @@ impl FromStr for Limit {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let read = || {
-            let (name, most) = text.split_once("<=").or_else(|| text.split_once('<'))?;
-            let most: f64 = most.trim().parse().ok()?;
-            let quantity = name.trim().parse().ok()?;
-            (most > 0.0 && most.is_finite()).then_some(Self { quantity, most })
+            let (name, most) = name_and_limit(text)?;
+            let quantity = name.parse().ok()?;
+            Some(Self { quantity, most })
         };
-        let names = || Quantity::NAMES.join(", ");
-        read().ok_or_else(|| {
-            format!(
-                "expected NAME<=LIMIT with a positive limit, NAME one of {}",
-                names()
-            )
-        })
+        let names = Quantity::NAMES.join(", ");
+        let expected = "expected NAME<=LIMIT with a positive limit, NAME one of";
+        read().ok_or_else(|| format!("{expected} {names}"))
     }
 }
 

@@ -8,12 +8,15 @@
 //! contradict is given up for the next, and a heading that they move is not believed as well as it says.
 
 use super::outcome::{Finding, nis_bound, total_nis, used};
+use super::run::rates;
+use super::vehicle::{force, rate};
 use super::{Found, Heading, Levelling, Recorded, Settings, Solution, Start, fuse};
 use crate::earth::{gravity_down, moved, ned_difference};
 use crate::ekf::{Belief, InitialSettings};
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
 use crate::gnss::GnssFix;
 use crate::imu::{ImuIncrement, Sensor};
+use crate::linalg::mean;
 use crate::metrics::VerdictKind;
 use crate::units::{DEG, Refused};
 use glam::{DQuat, DVec3};
@@ -420,17 +423,12 @@ impl Moving {
 
     /// Standard deviation of the vehicle's axis about the course (rad).
     fn heading_sigma(&self, imu: &[ImuIncrement]) -> f64 {
-        let sum =
-            |samples: &[ImuIncrement]| samples.iter().map(|s| s.dtheta).sum::<DVec3>().length();
-        let turned = sum(between(imu, self.fix.t_s - self.lag_s, self.fix.t_s));
+        let t_s = self.fix.t_s;
+        let turns = between(imu, t_s - self.lag_s, t_s).iter().map(|s| s.dtheta);
+        let turned = turns.sum::<DVec3>().length();
         // the angular rate over a second around the fix
-        let around = between(imu, self.fix.t_s - 0.5, self.fix.t_s + 0.5);
-        let seconds: f64 = around.iter().map(|s| s.dt_s).sum();
-        let rate = if seconds > 0.0 {
-            sum(around) / seconds
-        } else {
-            0.0
-        };
+        let (seconds, [_, omega]) = rates(between(imu, t_s - 0.5, t_s + 0.5));
+        let rate = if seconds > 0.0 { omega.length() } else { 0.0 };
         // the first fast fix is one whose error makes it fast: the vehicle moves more slowly than it says
         let speed = self.speed() - 1.5 * self.sigma();
         (self.sigma() / speed)
@@ -564,20 +562,12 @@ struct Window {
 }
 
 fn window(samples: &[ImuIncrement], q_s_b: DQuat) -> Window {
-    let seconds: f64 = samples.iter().map(|s| s.dt_s).sum();
-    let f = samples.iter().map(|s| s.dv).sum::<DVec3>() / seconds;
-    let omega = samples.iter().map(|s| s.dtheta).sum::<DVec3>() / seconds;
-    let n = samples.len() as f64;
-    let force = samples
-        .iter()
-        .map(|s| (s.dv / s.dt_s - f).length_squared())
-        .sum::<f64>();
-    let rate = samples
-        .iter()
-        .map(|s| (s.dtheta / s.dt_s - omega).length_squared())
-        .sum::<f64>();
+    let (seconds, [f, omega]) = rates(samples);
+    let spread = |of: fn(&ImuIncrement) -> DVec3, about: DVec3| {
+        mean(samples.iter().map(|s| (of(s) - about).length_squared())).sqrt()
+    };
+    let spread = (spread(force, f), spread(rate, omega));
     let end_s = samples.last().map_or(f64::NAN, |s| s.t_s);
-    let spread = ((force / n).sqrt(), (rate / n).sqrt());
     Window {
         end_s,
         seconds,

@@ -9,7 +9,7 @@ use crate::ekf::Belief;
 use crate::frames::wrap_angle;
 use crate::gnss::GnssFix;
 use crate::imu::ImuIncrement;
-use crate::linalg::mean;
+use crate::linalg::{by_value, mean};
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -72,7 +72,7 @@ fn agreement(recorded: &Recorded<'_>) -> Option<[f64; 3]> {
     let steps = (LONGEST_S / STEP_S) as i32;
     let lags = (-steps..=steps).map(|k| f64::from(k) * STEP_S);
     let tried = lags.filter_map(|lag_s| Some((lag_s, correlation(&turns, &turned, lag_s)?)));
-    let (lag_s, best) = tried.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (lag_s, best) = tried.max_by(by_value)?;
     let now = correlation(&turns, &turned, 0.0)?;
     (best >= SAME).then_some([lag_s, best, now])
 }

@@ -122,9 +122,14 @@ impl Settings {
 
     /// The fixes that are not withheld.
     fn kept(&self, gnss: &[GnssFix]) -> Vec<GnssFix> {
-        let is_kept = |f: &&GnssFix| !self.outages.iter().any(|o| o.withholds(f.t_s));
-        gnss.iter().filter(is_kept).copied().collect()
+        kept(gnss, &self.outages)
     }
+}
+
+/// The fixes that no outage withholds.
+fn kept(gnss: &[GnssFix], outages: &[Outage]) -> Vec<GnssFix> {
+    let is_kept = |fix: &&GnssFix| !Outage::any_withholds(outages, fix.t_s);
+    gnss.iter().filter(is_kept).copied().collect()
 }
 
 /// How it is fused.

@@ -60,7 +60,23 @@ pub fn find(
     let gnss = settings.kept(recorded.gnss);
     let recorded = recorded.with_gnss(&gnss);
     let rough = along(&recorded, settings)?;
-    let found = refined(&recorded, settings, belief, rough)?;
+    // with standard deviations as stated, or where the fixes contradict those, with what makes their NIS 1
+    let (mut widened, mut factor) = (gnss.clone(), 1.0);
+    let found = loop {
+        match through(&recorded.with_gnss(&widened), settings, belief, rough)? {
+            Ok(found) => break found,
+            Err(nis) if nis > 1.0 && factor * nis.sqrt() <= MOST_WIDENED => {
+                factor *= nis.sqrt();
+                let fixes = gnss.iter();
+                let fixes = fixes.map(|fix| fix.with_sigmas_times(factor, factor));
+                widened = fixes.collect();
+            }
+            Err(nis) => {
+                let why = "the fixes contradict the filter, NIS";
+                return Err(not_found(format!("{why} {nis:.1} per component")));
+            }
+        }
+    };
     let named = ["roll", "pitch", "yaw"]
         .into_iter()
         .zip(found.sigma_b.to_array());
@@ -71,7 +87,10 @@ pub fn find(
     if let Some((axis, sigma)) = worst {
         return Err(undetermined(axis, sigma, DETERMINED));
     }
-    Ok(found)
+    Ok(Mounting {
+        sigma_factor: factor,
+        ..found
+    })
 }
 
 fn not_found(why: impl Display) -> Refused {
@@ -96,38 +115,6 @@ fn too_slow(seconds: f64) -> Refused {
 
 /// Most that the standard deviations of fixes are widened by: what contradicts more is not the receiver's word.
 const MOST_WIDENED: f64 = 5.0;
-
-/// Refined with standard deviations as stated, or where the fixes contradict those, with what makes their NIS 1.
-fn refined(
-    recorded: &Recorded<'_>,
-    settings: &Settings,
-    belief: &Belief,
-    rough: (DQuat, f64),
-) -> Result<Mounting, Refused> {
-    let (mut gnss, mut factor) = (recorded.gnss.to_vec(), 1.0);
-    loop {
-        match through(&recorded.with_gnss(&gnss), settings, belief, rough)? {
-            Err(nis) if nis > 1.0 && factor * nis.sqrt() <= MOST_WIDENED => {
-                factor *= nis.sqrt();
-                gnss = recorded
-                    .gnss
-                    .iter()
-                    .map(|fix| fix.with_sigmas_times(factor, factor))
-                    .collect();
-            }
-            found => {
-                let found = found.map_err(|nis| {
-                    let why = "the fixes contradict the filter, NIS";
-                    not_found(format!("{why} {nis:.1} per component"))
-                })?;
-                return Ok(Mounting {
-                    sigma_factor: factor,
-                    ..found
-                });
-            }
-        }
-    }
-}
 
 // Weighted means of what is correlated in time, and their standard deviations.
 

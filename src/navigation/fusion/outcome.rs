@@ -1,7 +1,7 @@
 //! Figures of a fusion: fixes used, consistency, errors at the ends of outages. They serialize as `summary.json` has them.
 
 use super::{AidInnovations, FixRecord, Nine, Row, RowError, Solution, Weighed, aid_innovations};
-use crate::linalg::{mean, median};
+use crate::linalg::{by_value, mean, median};
 use crate::metrics::{PerState, VerdictKind};
 use crate::sensors::outage::Outage;
 use crate::simulation::REPORTED_NAMES;
@@ -379,14 +379,13 @@ impl FromReference {
     pub fn confidence(&self) -> Confidence {
         let all = (self.nees_mean / self.nees_dof as f64).sqrt();
         let states = || REPORTED_NAMES.into_iter().zip(self.error_over_sigma.0);
-        let by_size = |a: &(&str, f64), b: &(&str, f64)| a.1.total_cmp(&b.1);
-        let largest = states().max_by(by_size).unwrap_or_default();
+        let largest = states().max_by(by_value).unwrap_or_default();
         let (verdict, worst) = if all > ALL_STATES.1 || largest.1 > ONE_STATE {
             (VerdictKind::Overconfident, largest)
         } else if all < ALL_STATES.0 && largest.1 < 1.0 {
             (
                 VerdictKind::Underconfident,
-                states().min_by(by_size).unwrap_or_default(),
+                states().min_by(by_value).unwrap_or_default(),
             )
         } else {
             (VerdictKind::Consistent, largest)
@@ -521,7 +520,7 @@ fn stretches(solution: &Solution) -> Option<(VerdictKind, Finding)> {
         .enumerate()
         .filter_map(|(k, fixes)| Some((k, far(fixes)?)))
         .collect();
-    let (worst, nis_per_component) = *bad.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (worst, nis_per_component) = *bad.iter().max_by(|a, b| by_value(a, b))?;
     let minutes = Finding::Minutes {
         bad: bad.len(),
         of,

@@ -1,5 +1,6 @@
 //! A run of the filter through recorded data.
 
+use super::vehicle::{force, rate};
 use super::{
     AidRecord, FixRecord, FusionError, Nine, Recorded, Row, RowError, Settings, Solution, Start,
     VehicleVelocity, check_clocks, spans,
@@ -14,6 +15,7 @@ use crate::gnss::GnssFix;
 use crate::imu::{ImuIncrement, ImuSample, Sensor};
 use crate::lanes::{Lanes, Vec3};
 use crate::linalg::{Link, median, to_nalgebra};
+use crate::sensors::outage::Outage;
 use crate::simulation::reported_error;
 use crate::strapdown::Strapdown;
 use crate::trajectory::reference::Reference;
@@ -168,7 +170,7 @@ impl Run<'_> {
     fn fix(&mut self, fix: &GnssFix) -> Result<(), FusionError> {
         let mut record = self.filter.look_at(fix);
         record.error = self.error().map(|e| e.values);
-        record.used = !self.settings.outages.iter().any(|o| o.withholds(fix.t_s));
+        record.used = !Outage::any_withholds(&self.settings.outages, fix.t_s);
         if record.used {
             self.taped(|filter| filter.update(fix));
         }
@@ -277,8 +279,8 @@ impl Filter {
     /// Through an interval that was set, with the mean of a sample.
     fn step(&mut self, sample: &ImuIncrement) {
         let mean = ImuSample {
-            omega_ib_b: sample.dtheta / sample.dt_s,
-            f_ib_b: sample.dv / sample.dt_s,
+            omega_ib_b: rate(sample),
+            f_ib_b: force(sample),
         };
         advance(&mut self.ekf, &[mean], &[[Vec3::ZERO; 2]]);
     }
@@ -484,8 +486,8 @@ pub fn bridged(samples: &[ImuIncrement], step_s: f64) -> Vec<ImuIncrement> {
         // not beyond the next hole
         let end = holes.get(i + 1).copied().unwrap_or(samples.len());
         // A few samples only: further away the motion is no longer that at the edges of the gap.
-        let before = rates(&samples[k.saturating_sub(BESIDE).max(done)..k]);
-        let after = rates(&samples[k..(k + BESIDE).min(end)]);
+        let (_, before) = rates(&samples[k.saturating_sub(BESIDE).max(done)..k]);
+        let (_, after) = rates(&samples[k..(k + BESIDE).min(end)]);
         let dt_s = hole(k);
         let [dv, dtheta] = [0, 1].map(|i| 0.5 * (before[i] + after[i]) * dt_s);
         filled.push(ImuIncrement {
@@ -500,13 +502,11 @@ pub fn bridged(samples: &[ImuIncrement], step_s: f64) -> Vec<ImuIncrement> {
     filled
 }
 
-/// Mean specific force (m/s²) and angular rate (rad/s).
-fn rates(samples: &[ImuIncrement]) -> [DVec3; 2] {
+/// How long samples last (s), their mean specific force (m/s²) and angular rate (rad/s).
+pub(super) fn rates(samples: &[ImuIncrement]) -> (f64, [DVec3; 2]) {
     let seconds: f64 = samples.iter().map(|s| s.dt_s).sum();
-    [
-        samples.iter().map(|s| s.dv).sum::<DVec3>() / seconds,
-        samples.iter().map(|s| s.dtheta).sum::<DVec3>() / seconds,
-    ]
+    let mean = |of: fn(&ImuIncrement) -> DVec3| samples.iter().map(of).sum::<DVec3>() / seconds;
+    (seconds, [mean(|s| s.dv), mean(|s| s.dtheta)])
 }
 
 /// Which samples of a recording are bridges, and how far from the truth.
@@ -555,7 +555,7 @@ impl<'a> Bridges<'a> {
             }
             let (before, rest) = part.split_at(BESIDE);
             let (window, after) = rest.split_at(steps);
-            let [before, window, after] = [before, window, after].map(rates);
+            let [before, window, after] = [before, window, after].map(|samples| rates(samples).1);
             for sensor in 0..2 {
                 let error = window[sensor] - 0.5 * (before[sensor] + after[sensor]);
                 (0..3).for_each(|axis| off[3 * sensor + axis].push(error[axis].abs()));

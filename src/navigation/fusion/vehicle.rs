@@ -1,10 +1,8 @@
 //! What a vehicle knows of its own velocity, made from a recording: it moves neither sideways nor up, a wheel turns, it
 //! stands.
 
-use super::Recorded;
-use super::Whiteness;
 use super::alignment::courses;
-use crate::gnss::GnssFix;
+use super::{Recorded, Whiteness, kept};
 use crate::imu::ImuIncrement;
 use crate::linalg::median;
 use crate::metrics::{Band, chi_square_band};
@@ -178,9 +176,7 @@ fn every<T>(all: &[T], t_s: impl Fn(&T) -> f64, rate_hz: f64) -> impl Iterator<I
 
 /// Horizontal speeds of the fixes: their own, or by positions a second apart.
 fn speeds(recorded: &Recorded<'_>, outages: &[Outage]) -> Vec<(f64, f64)> {
-    let is_known = |f: &&GnssFix| !outages.iter().any(|o| o.withholds(f.t_s));
-    let known: Vec<GnssFix> = recorded.gnss.iter().filter(is_known).copied().collect();
-    let courses = courses(&known, recorded.imu).into_iter();
+    let courses = courses(&kept(recorded.gnss, outages), recorded.imu).into_iter();
     courses.map(|m| (m.fix.t_s, m.speed())).collect()
 }
 
@@ -288,11 +284,11 @@ fn moments(window: &[ImuIncrement]) -> [(DVec3, f64); 2] {
     })
 }
 
-fn force(sample: &ImuIncrement) -> DVec3 {
+pub(super) fn force(sample: &ImuIncrement) -> DVec3 {
     sample.dv / sample.dt_s
 }
 
-fn rate(sample: &ImuIncrement) -> DVec3 {
+pub(super) fn rate(sample: &ImuIncrement) -> DVec3 {
     sample.dtheta / sample.dt_s
 }
 

@@ -7,6 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
 use std::collections::HashMap;
 use std::f64::consts::PI;
+use std::iter::Sum;
 
 /// A value estimated from runs and its Monte-Carlo standard error (NaN when one run cannot tell).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -305,12 +306,12 @@ impl QuadraticForm {
 
     /// Expectation, c + Σ w (1 + d²).
     fn mean(&self) -> f64 {
-        self.certain
-            + self
-                .terms
-                .iter()
-                .map(|(w, d)| w * (1.0 + d * d))
-                .sum::<f64>()
+        self.certain + self.sum(|w, d| w * (1.0 + d * d))
+    }
+
+    /// The sum of a function of weights and shifts.
+    fn sum<T: Sum>(&self, of: impl Fn(f64, f64) -> T) -> T {
+        self.terms.iter().map(|(w, d)| of(*w, *d)).sum()
     }
 
     /// P(Q ≤ x): the inversion of [Imhof](crate::bibliography::Imhof61).
@@ -319,7 +320,7 @@ impl QuadraticForm {
         if x <= 0.0 || self.terms.is_empty() {
             return f64::from(u8::from(x >= 0.0 && self.terms.is_empty()));
         }
-        let far = self.terms.iter().map(|(_, d)| d * d).sum::<f64>() > FAR;
+        let far = self.sum(|_, d| d * d) > FAR;
         let probability = if far {
             self.along_line(x)
         } else {
@@ -374,11 +375,11 @@ impl QuadraticForm {
     /// The least of e^{px} φ(p)/p for p > 0, and the width of the integrand across it. The logarithm is convex there.
     fn saddle(&self, x: f64) -> (f64, f64) {
         let slope = |p: f64| {
-            let term = |(w, d): &(f64, f64)| {
+            let sum = self.sum(|w, d| {
                 let base = 1.0 + 2.0 * w * p;
                 w / base + w * d * d / (base * base)
-            };
-            x - self.terms.iter().map(term).sum::<f64>() - 1.0 / p
+            });
+            x - sum - 1.0 / p
         };
         // At p = 1/x the slope is −Σ … < 0: the least lies above.
         let (mut low, mut high) = (0.0, 1.0 / x);
@@ -395,16 +396,11 @@ impl QuadraticForm {
             }
         }
         let p = 0.5 * (low + high);
-        let term = |(w, d): &(f64, f64)| {
+        let curvature = self.sum(|w, d| {
             let base = 1.0 + 2.0 * w * p;
             2.0 * w * w / (base * base) + 4.0 * w * w * d * d / (base * base * base)
-        };
-        (
-            p,
-            (1.0 / (p * p) + self.terms.iter().map(term).sum::<f64>())
-                .sqrt()
-                .recip(),
-        )
+        });
+        (p, (1.0 / (p * p) + curvature).sqrt().recip())
     }
 
     /// The x with P(Q ≤ x) = `probability`, to 1e-12 of itself.
@@ -451,20 +447,19 @@ impl QuadraticForm {
 
     /// ln E e^(−pQ) for p ≥ 0.
     fn ln_transform(&self, p: f64) -> f64 {
-        let term = |(w, d): &(f64, f64)| {
+        let sum = self.sum(|w, d| {
             let q = 2.0 * w * p;
             -0.5 * (q.ln_1p() + d * d * q / (1.0 + q))
-        };
-        self.terms.iter().map(term).sum::<f64>() - self.certain * p
+        });
+        sum - self.certain * p
     }
 
     /// ln E e^(−p(Q − c)) for a complex p on the right.
     fn ln_transform_at(&self, p: Complex<f64>) -> Complex<f64> {
-        let term = |(w, d): &(f64, f64)| {
+        self.sum(|w, d| {
             let q = p * (2.0 * w);
             ((1.0 + q).ln() + q / (1.0 + q) * (d * d)) * -0.5
-        };
-        self.terms.iter().map(term).sum()
+        })
     }
 
     /// E e^(−p(Q − c)).

@@ -3,7 +3,7 @@
 use super::estimate::{Band, PerState, SampleSize, chi_square_band, coverage_band};
 use super::outage::{Budget, EpochMetrics, outages};
 use super::verdict::{OutageVerdict, Verdict, VerdictKind, judged};
-use crate::linalg::mean;
+use crate::linalg::{by_value, mean};
 use crate::simulation::lincov::{self, Assessment};
 use crate::simulation::{NEES_DOF, REPORTED, REPORTED_NAMES, RunResult};
 use serde::Serialize;
@@ -443,7 +443,7 @@ impl ReductionQuality {
     pub fn cost(&self) -> Option<(f64, (usize, f64))> {
         let ends = || self.rmse_over_full.iter().flatten();
         let most = |state: usize| (state, ends().map(|end| end.0[state]).fold(0.0, f64::max));
-        let worst = (0..REPORTED).map(most).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let worst = (0..REPORTED).map(most).max_by(by_value)?;
         (worst.1 > 0.0).then_some((most(0).1.max(most(1).1), worst))
     }
 }
@@ -492,6 +492,13 @@ pub struct Met {
     pub beyond_linear: Option<usize>,
 }
 
+/// NAME<=LIMIT with a positive limit.
+pub(crate) fn name_and_limit(text: &str) -> Option<(&str, f64)> {
+    let (name, limit) = text.split_once("<=").or_else(|| text.split_once('<'))?;
+    let limit: f64 = limit.trim().parse().ok()?;
+    (limit > 0.0 && limit.is_finite()).then_some((name.trim(), limit))
+}
+
 impl FromStr for Requirement {
     type Err = &'static str;
 
@@ -503,16 +510,14 @@ impl FromStr for Requirement {
             });
         }
         let read = || {
-            let (name, limit) = text.split_once("<=").or_else(|| text.split_once('<'))?;
-            let limit: f64 = limit.trim().parse().ok()?;
-            let name = name.trim();
+            let (name, limit) = name_and_limit(text)?;
             let state = name.strip_prefix("rmse_").unwrap_or(name);
             let figure = match name {
                 "p50_m" => Figure::P50,
                 "p95_m" => Figure::P95,
                 _ => Figure::Rmse(REPORTED_NAMES.iter().position(|known| *known == state)?),
             };
-            (limit > 0.0 && limit.is_finite()).then_some(Self { figure, limit })
+            Some(Self { figure, limit })
         };
         read().ok_or(
             "expected \"consistent\" or NAME<=LIMIT with a positive limit, NAME one of p50_m, p95_m, rmse_pos_e_m, yaw_deg and the other states",

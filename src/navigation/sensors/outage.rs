@@ -43,6 +43,11 @@ impl Outage {
         self.start_s <= t_s + SLACK_S && !self.is_over(t_s)
     }
 
+    /// Whether a fix at `t_s` is missing by any of some outages.
+    pub fn any_withholds(outages: &[Self], t_s: f64) -> bool {
+        outages.iter().any(|outage| outage.withholds(t_s))
+    }
+
     /// Whether a fix at `t_s` comes after it.
     pub(crate) fn is_over(&self, t_s: f64) -> bool {
         self.end_s <= t_s + SLACK_S

@@ -259,7 +259,7 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
         // already.
         let is_due = |step: usize| sample > 0 && sample.is_multiple_of(step);
         let gnss_epoch = is_due(per_fix);
-        let withheld = experiment.outages.iter().any(|o| o.withholds(t_s));
+        let withheld = Outage::any_withholds(experiment.outages, t_s);
         Ok(Event {
             sample,
             t_s,
@@ -339,10 +339,7 @@ fn aided<'a>(
     if aids.peek().is_none() {
         return Vec::new();
     }
-    let in_outage = experiment
-        .outages
-        .iter()
-        .any(|outage| outage.withholds(t_s));
+    let in_outage = Outage::any_withholds(experiment.outages, t_s);
     let k = experiment.trajectory.kinematics(t_s);
     let to_b = k.q_b_e.inverse();
     let (v_b, a_b) = (to_b * k.v_e, to_b * k.a_e);

@@ -2,7 +2,7 @@
 //! velocities that agree with positions.
 
 use super::Trajectory;
-use crate::linalg::larger;
+use crate::linalg::{by_value, larger};
 use crate::units::DEG;
 use glam::DVec3;
 use std::fmt;
@@ -140,7 +140,7 @@ impl VelocityMisfit {
             .iter()
             .map(|(t_s, v)| (*t_s, (*v - found(*t_s)).length()))
             .collect();
-        let (worst_s, worst) = off.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (worst_s, worst) = off.iter().copied().max_by(by_value)?;
         let rms = |squares: f64| (squares / off.len() as f64).sqrt();
         let speed = velocities
             .iter()

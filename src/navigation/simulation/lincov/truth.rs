@@ -3,6 +3,7 @@
 use super::track::{CROSSED, Measured, Outer, PUSHED, RECTIFIED, SCALED, Source, Sources, WARMED};
 use crate::ekf::Belief;
 use crate::imu::{Axis, Channel, Sensor};
+use crate::linalg::by_value;
 use crate::noise::{Kind, Model, Process};
 use crate::sensors::aiding::{Aid, AidError, AidingSettings};
 use crate::sensors::defects::ImuSettings;
@@ -315,7 +316,7 @@ const SETTLED_S: f64 = 120.0;
 /// and the standard deviations of yaw there (degrees). The first two minutes belong to the alignment.
 pub fn weak_heading(while_fixed: impl Iterator<Item = (f64, f64)>) -> Option<String> {
     let settled = while_fixed.filter(|(after_s, _)| *after_s >= SETTLED_S);
-    let worst = settled.max_by(|a, b| a.1.total_cmp(&b.1));
+    let worst = settled.max_by(by_value);
     let (after_s, sigma_deg) = worst.filter(|(_, sigma_deg)| *sigma_deg > LARGE_DEG)?;
     // beyond half a turn a linear deviation is only a large number
     let sigma = if sigma_deg < 180.0 {
