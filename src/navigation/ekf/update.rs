@@ -413,7 +413,7 @@ struct BodyRows<L> {
     /// δ(Cᵀ u) = Cᵀ (δu + \[u×\] psi).
     of_psi: Mat3<L>,
     /// ∂(velocity in n)/∂(gyroscope's bias).
-    of_gyro: Mat3<L>,
+    of_bias: Mat3<L>,
 }
 
 impl<L: Real> BodyRows<L> {
@@ -421,12 +421,11 @@ impl<L: Real> BodyRows<L> {
     fn new(point: &Antenna<L>, ins: &Strapdown<L>) -> Self {
         let c_b_n = ins.q_b_n.to_matrix();
         let u = ins.v_n + point.swing_n;
-        let of_psi = point.of_psi - Mat3::skew(-u);
         Self {
             c_b_n,
             v_b: times_transposed(&c_b_n, u),
-            of_psi,
-            of_gyro: point.of_bias,
+            of_psi: point.of_psi - Mat3::skew(-u),
+            of_bias: point.of_bias,
         }
     }
 
@@ -438,7 +437,7 @@ impl<L: Real> BodyRows<L> {
             Vec3::splat(DVec3::ZERO),
             axis_n,
             times_transposed(&self.of_psi, axis_n),
-            times_transposed(&self.of_gyro, axis_n),
+            times_transposed(&self.of_bias, axis_n),
         ])
     }
 }

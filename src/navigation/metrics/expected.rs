@@ -16,7 +16,6 @@ use crate::simulation::{
 };
 use crate::units::DEG;
 use nalgebra::DMatrix;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// States of the coverage statistic among those of the filter: position, attitude.
 const COVERED: [usize; COVERAGE_DOF] = [0, 1, 2, 6, 7, 8];
@@ -48,9 +47,7 @@ impl Expected {
         let truth = TruthSide::together(&TruthSide::sources(experiment, truth));
         let filter = FilterPass::new(track, belief);
         let law = filter.errors(&truth);
-        let chi2 = ChiSquared::new(COVERAGE_DOF as f64).expect("degrees of freedom are positive");
-        // The limit that the filter itself would take for this level: it believes in a chi-square law.
-        let limit = chi2.inverse_cdf(experiment.coverage_level);
+        let limit = experiment.coverage_quantile();
         let reports = law.reports.iter().zip(filter.bias_sigmas());
         let epochs: Vec<EpochMetrics> = reports
             .map(|(instant, bias)| epoch(instant, *bias, limit))

@@ -52,6 +52,15 @@ pub struct Experiment<'a> {
     pub coverage_level: f64,
 }
 
+impl Experiment<'_> {
+    /// The quantile of the coverage statistic: a filter believes in a chi-square law.
+    pub(crate) fn coverage_quantile(&self) -> f64 {
+        let chi2 = ChiSquared::new(super::COVERAGE_DOF as f64);
+        let chi2 = chi2.expect("degrees of freedom are positive");
+        chi2.inverse_cdf(self.coverage_level)
+    }
+}
+
 /// Why an experiment cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum ExperimentError {
@@ -146,9 +155,6 @@ impl<'a> Plan<'a> {
         let ideal = ideal_imu(trajectory, rate_hz, gravity)?;
         check_rotation(&ideal, trajectory.start_s(), rate_hz)?;
         let events = schedule(experiment, ideal.len())?;
-        let chi2 =
-            ChiSquared::new(super::COVERAGE_DOF as f64).expect("degrees of freedom are positive");
-        let coverage_quantile = chi2.inverse_cdf(experiment.coverage_level);
         let start = trajectory.state(trajectory.start_s());
         let outages = experiment
             .outages
@@ -162,7 +168,7 @@ impl<'a> Plan<'a> {
             start,
             events,
             outages,
-            coverage_quantile,
+            coverage_quantile: experiment.coverage_quantile(),
         })
     }
 

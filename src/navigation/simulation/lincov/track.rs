@@ -498,29 +498,48 @@ impl Track {
     /// mean at the last of them.
     pub(super) fn outline(&self) -> Self {
         let last_fixes = self.last_fixes();
-        let (mut steps, mut marks, mut block) = (Vec::new(), Vec::new(), Block::default());
-        let mut report_s = f64::NEG_INFINITY;
+        let (mut steps, mut marks) = (Vec::new(), Vec::new());
+        let (mut report_s, mut begin_s, mut before_s) = (f64::NEG_INFINITY, 0.0, 0.0);
+        // What becomes one step, and one measurement of each kind: the last of so many, with the mean of their noise.
+        let mut step: Option<Step> = None;
+        let mut measured: [(Vec<Row>, f64); Measured::KINDS] = Default::default();
         for (i, (leg, mark)) in self.legs(0..self.marks.len()).enumerate() {
-            block.add(
-                leg,
-                mark,
-                i.checked_sub(1)
-                    .map_or(0.0, |before| self.marks[before].after_s),
-            );
+            if step.is_none() {
+                begin_s = before_s;
+            }
+            before_s = mark.after_s;
+            let all = step.into_iter().chain(leg.iter().cloned());
+            step = all.reduce(|a, b| a.of_means(&b));
+            for (kind, (rows, count)) in measured.iter_mut().enumerate() {
+                let own = mark.rows.iter().filter(|row| row.what.kind() == kind);
+                let own: Vec<Row> = own.copied().collect();
+                if !own.is_empty() {
+                    (*rows, *count) = (own, *count + 1.0);
+                }
+            }
+            let longest_s = OUTLINE_STEP_S[usize::from(measured[0].1 == 0.0)] + SLACK_S;
             let next = self.marks.get(i + 1).filter(|next| next.outages.is_empty());
             // An outage begins with its first missing fix and ends with the first fix after it, no step later.
             let is_bound = !mark.outages.is_empty() || last_fixes.contains(&i);
-            if !is_bound && next.is_some_and(|next| block.has_room_until(next.after_s)) {
+            if !is_bound && next.is_some_and(|next| next.after_s - begin_s <= longest_s) {
                 continue;
             }
-            let Block { step, measured, .. } = std::mem::take(&mut block);
-            steps.extend(step);
+            steps.extend(step.take());
             let report = mark.after_s - report_s >= REPORT_S - SLACK_S;
             report_s = if report { mark.after_s } else { report_s };
-            let rows = measured.into_iter().flat_map(Together::mean).collect();
+            let mean = |(rows, count): (Vec<Row>, f64)| {
+                rows.into_iter().map(move |row| Row {
+                    r: row.r / count,
+                    noise: row.noise / count,
+                    ..row
+                })
+            };
             marks.push(Mark {
                 steps: steps.len(),
-                rows,
+                rows: std::mem::take(&mut measured)
+                    .into_iter()
+                    .flat_map(mean)
+                    .collect(),
                 report,
                 ..mark.clone()
             });
@@ -549,68 +568,6 @@ impl Track {
 
 /// Times of marks are sums of samples: this much apart they are the same (s).
 const SLACK_S: f64 = 1e-6;
-
-/// Steps and measurements that become one of each.
-#[derive(Default)]
-struct Block {
-    begin_s: f64,
-    step: Option<Step>,
-    /// By kind, fixes first.
-    measured: [Together; Measured::KINDS],
-}
-
-impl Block {
-    /// Adds a mark with the steps that lead to it from `before_s`.
-    fn add(&mut self, leg: &[Step], mark: &Mark, before_s: f64) {
-        if self.step.is_none() {
-            self.begin_s = before_s;
-        }
-        self.step = self
-            .step
-            .take()
-            .into_iter()
-            .chain(leg.iter().cloned())
-            .reduce(|a, b| a.of_means(&b));
-        for (kind, together) in self.measured.iter_mut().enumerate() {
-            together.add(
-                mark.rows
-                    .iter()
-                    .filter(|row| row.what.kind() == kind)
-                    .copied()
-                    .collect(),
-            );
-        }
-    }
-
-    fn has_room_until(&self, after_s: f64) -> bool {
-        after_s - self.begin_s <= OUTLINE_STEP_S[usize::from(self.measured[0].count == 0)] + SLACK_S
-    }
-}
-
-/// Measurements of one kind, taken at the last of them.
-#[derive(Default)]
-struct Together {
-    rows: Vec<Row>,
-    count: u32,
-}
-
-impl Together {
-    fn add(&mut self, rows: Vec<Row>) {
-        if !rows.is_empty() {
-            (self.rows, self.count) = (rows, self.count + 1);
-        }
-    }
-
-    /// One measurement of the mean of their noise.
-    fn mean(self) -> impl Iterator<Item = Row> {
-        let count = f64::from(self.count);
-        self.rows.into_iter().map(move |row| Row {
-            r: row.r / count,
-            noise: row.noise / count,
-            ..row
-        })
-    }
-}
 
 impl Step {
     /// This step and then another, as one.

@@ -238,12 +238,11 @@ impl Task<'_> {
     ) -> Vec<Assessment> {
         // No truth changes the filter: its gains are found once.
         let pass = FilterPass::new(track, belief);
-        let count = if draw_factors.is_some() {
-            1
-        } else {
-            self.truths.len()
+        let truths = match draw_factors {
+            Some(_) => &self.truths[..1],
+            None => self.truths,
         };
-        self.truths[..count]
+        truths
             .par_iter()
             .map(|truth| pass.assess_stated(belief, truth))
             .collect()
@@ -275,9 +274,9 @@ impl Task<'_> {
                 .sum()
         };
         let mut assessments = self.assessments(&belief, track, draw_factors);
-        draw_factors
-            .into_iter()
-            .for_each(|draw_factors| assessments.iter_mut().for_each(|a| draw_factors.enlarge(a)));
+        if let Some(draw_factors) = draw_factors {
+            assessments.iter_mut().for_each(|a| draw_factors.enlarge(a));
+        }
         let share = 1.0 / assessments.len() as f64;
         let (mut cost, mut parts) = (0.0, Vec::new());
         for assessment in &assessments {
@@ -546,31 +545,28 @@ impl DrawFactors {
     fn consistency(&self, first: &[Assessment]) -> FilterConsistency {
         let mut consistency = FilterConsistency::of(first, None);
         let mut departures = departures(first, None);
-        departures
-            .iter_mut()
-            .zip(&self.ratios)
-            .for_each(|(d, margin)| d.ratio *= margin);
+        multiply(departures.iter_mut().map(|d| &mut d.ratio), &self.ratios);
         consistency.largest = Departure::largest(&departures);
         consistency.nees *= self.nees;
         let ends = consistency.rmse_end.iter_mut().flatten();
-        ends.zip(self.rmse_end.iter().flatten())
-            .for_each(|(rmse, margin)| *rmse *= margin);
+        multiply(ends, self.rmse_end.as_flattened());
         consistency
     }
 
     /// Takes the errors of the first truth to the upper ends of their intervals.
     fn enlarge(&self, first: &mut Assessment) {
         let ends = first.outage_ends.iter_mut().flat_map(|end| &mut end.rmse);
-        ends.zip(&self.ratios)
-            .for_each(|(rmse, margin)| *rmse *= margin);
+        multiply(ends, &self.ratios);
         for report in &mut first.reports {
-            report
-                .rmse
-                .iter_mut()
-                .zip(&self.over_run)
-                .for_each(|(rmse, margin)| *rmse *= margin);
+            multiply(&mut report.rmse, &self.over_run);
         }
     }
+}
+
+fn multiply<'a>(all: impl IntoIterator<Item = &'a mut f64>, factors: &[f64]) {
+    all.into_iter()
+        .zip(factors)
+        .for_each(|(x, factor)| *x *= factor);
 }
 
 /// Every state at every place where a filter is judged: at the ends of outages and then over the whole run; without outages
