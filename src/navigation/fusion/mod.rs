@@ -93,11 +93,8 @@ pub struct Recorded<'a> {
 
 impl<'a> Recorded<'a> {
     /// The same with other fixes.
-    fn with_gnss<'b>(self, gnss: &'b [GnssFix]) -> Recorded<'b>
-    where
-        'a: 'b,
-    {
-        Recorded { gnss, ..self }
+    const fn with_gnss(self, gnss: &'a [GnssFix]) -> Self {
+        Self { gnss, ..self }
     }
 
     /// Samples and fixes up to a time (s).

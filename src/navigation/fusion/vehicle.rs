@@ -271,8 +271,10 @@ struct Standstill {
     thresholds: [f64; 2],
 }
 
-/// Means and pooled variances of a component of specific force and angular rate.
-fn moments(window: &[ImuIncrement]) -> [(DVec3, f64); 2] {
+/// Means and pooled variances of a component, of specific force and angular rate.
+type Moments = [(DVec3, f64); 2];
+
+fn moments(window: &[ImuIncrement]) -> Moments {
     let n = window.len() as f64;
     [force, rate].map(|value: fn(&ImuIncrement) -> DVec3| {
         let mean = window.iter().map(value).sum::<DVec3>() / n;
@@ -306,14 +308,13 @@ impl Standstill {
                 .filter(move |(_, m)| *m == motion)
                 .map(|(window, _)| *window)
         };
-        let still: Vec<[(DVec3, f64); 2]> = of(Motion::Still).map(moments).collect();
+        let still: Vec<Moments> = of(Motion::Still).map(moments).collect();
         let samples = of(Motion::Still).next()?.len();
         if still.len() < FEWEST {
             return None;
         }
-        let median = |value: &dyn Fn(&[(DVec3, f64); 2]) -> f64| {
-            quantile(still.iter().map(value).collect(), 0.5)
-        };
+        let median =
+            |value: &dyn Fn(&Moments) -> f64| quantile(still.iter().map(value).collect(), 0.5);
         // the median of chi-square of k degrees is k (1 − 2/9k)³ (Wilson and Hilferty)
         let of_median = (1.0 - 2.0 / (27.0 * (samples as f64 - 1.0))).powi(3);
         let mut found = Self {

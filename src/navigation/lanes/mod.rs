@@ -338,21 +338,19 @@ fn dot3<L: Real>(row: &[L; 3], v: &Vec3<L>) -> L {
     row[2].mul_add(v.0[2], row[1].mul_add(v.0[1], row[0] * v.0[0]))
 }
 
-impl<L: Real> Add for Vec3<L> {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, b: Self) -> Self {
-        Self([self.0[0] + b.0[0], self.0[1] + b.0[1], self.0[2] + b.0[2]])
-    }
+macro_rules! vector_operator {
+    ($trait:ident, $method:ident, $op:tt) => {
+        impl<L: Real> $trait for Vec3<L> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, b: Self) -> Self {
+                Self([self.0[0] $op b.0[0], self.0[1] $op b.0[1], self.0[2] $op b.0[2]])
+            }
+        }
+    };
 }
-
-impl<L: Real> Sub for Vec3<L> {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, b: Self) -> Self {
-        Self([self.0[0] - b.0[0], self.0[1] - b.0[1], self.0[2] - b.0[2]])
-    }
-}
+vector_operator!(Add, add, +);
+vector_operator!(Sub, sub, -);
 
 impl<L: Real> Neg for Vec3<L> {
     type Output = Self;

@@ -48,7 +48,7 @@ impl Expected {
         let filter = FilterPass::new(track, belief);
         let law = filter.errors(&truth);
         let limit = experiment.coverage_quantile();
-        let reports = law.reports.iter().zip(filter.bias_sigmas());
+        let reports = law.reports.iter().zip(&filter.biases);
         let epochs: Vec<EpochMetrics> = reports
             .map(|(instant, bias)| epoch(instant, *bias, limit))
             .collect::<Option<_>>()?;

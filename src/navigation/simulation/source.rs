@@ -8,7 +8,7 @@ use crate::frames::{NavState, RollPitchYaw};
 use crate::gnss::{GnssFix, GnssVelocity};
 use crate::imu::{ImuIncrement, Sensor};
 use crate::lanes::{Lanes, Vec3};
-use crate::linalg;
+use crate::linalg::to_nalgebra;
 use crate::rng::{Generator, StreamKey};
 use crate::sensors::aiding::{Aid, AidNoise};
 use crate::sensors::defects::Defects;
@@ -177,14 +177,14 @@ fn nominal_start(plan: &Plan<'_>, key: StreamKey<'_>) -> NavState {
     let angles = draw("attitude", initial.att_sigma_deg.map(|s| s * DEG));
     // Drawn as roll, pitch, yaw and brought to psi_n by the map that makes the filter's covariance: the NEES
     // at the start is a χ² of nine degrees of freedom, to first order.
-    let psi = linalg::to_glam(&(psi_of_angles(truth.q_b_n) * linalg::to_nalgebra(angles)));
+    let psi = psi_of_angles(truth.q_b_n) * to_nalgebra(angles);
     let [lat, lon, h] = moved(truth.place(), dr);
     NavState {
         lat,
         lon,
         h,
         v_n: truth.v_n + dv,
-        q_b_n: DQuat::from_scaled_axis(psi) * truth.q_b_n,
+        q_b_n: DQuat::from_scaled_axis(DVec3::from_slice(psi.as_slice())) * truth.q_b_n,
     }
 }
 

@@ -507,7 +507,7 @@ impl Shape {
     }
 
     /// The change so far: the integral of the rate.
-    pub(in crate::trajectory) fn value(self, x: f64) -> f64 {
+    fn value(self, x: f64) -> f64 {
         if x > 0.5 {
             // The rate is symmetric about the middle: one formula for both ramps, and exactly 1 at the end.
             return 1.0 - self.value(1.0 - x);

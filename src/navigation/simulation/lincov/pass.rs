@@ -136,8 +136,8 @@ pub struct FilterPass<'a> {
     /// The gain of every scalar measurement, in sequence, and the variance that the filter states for its innovation.
     gains: Vec<(Column, f64)>,
     reports: Vec<[Nav; NAV]>,
-    /// Standard deviations that the filter states of the biases, at every report.
-    biases: Vec<[f64; BIASES]>,
+    /// Standard deviations that the filter states of the sensors' biases (m/s², rad/s), at every report.
+    pub biases: Vec<[f64; BIASES]>,
     /// The covariance that the filter states at the end of each outage.
     ends: Vec<[Nav; NAV]>,
 }
@@ -170,11 +170,6 @@ impl<'a> FilterPass<'a> {
             ends,
             believed,
         }
-    }
-
-    /// Standard deviations that the filter states of the sensors' biases (m/s², rad/s), at every report.
-    pub fn bias_sigmas(&self) -> &[[f64; BIASES]] {
-        &self.biases
     }
 
     /// The reports, and what the filter states there.
