@@ -129,18 +129,24 @@ impl Search<'_> {
         let belief = self.belief(ln);
         let law = FilterPass::new(&self.track, &belief).errors_as_expected(&belief, self.model);
         let assessment = law.assessment();
-        let mut steep = off(&assessment);
-        steep.extend(self.lost(&assessment));
-        let cost = divergence(&assessment, |_| 0.0) + steep.iter().map(|s| s.0).sum::<f64>();
-        let parts = shape(&law).chain(steep.into_iter().map(|s| s.1)).collect();
+        let steep: Vec<Steep> = steep(&assessment)
+            .into_iter()
+            .chain(self.lost(&assessment))
+            .collect();
+        let cost = divergence(&assessment, |_| 0.0) + steep.iter().map(Steep::cost).sum::<f64>();
+        let parts = shape(&law).chain(steep.iter().map(Steep::part)).collect();
         Value { cost, parts }.with_ridge(RIDGE, ln)
     }
 
     /// What the horizontal position at the outage ends loses to the filter with all states counts where it is a fiftieth, steeply.
-    fn lost(&self, assessment: &Assessment) -> impl Iterator<Item = (f64, Part)> {
+    fn lost(&self, assessment: &Assessment) -> Vec<Steep> {
         let weight = ENDS * LOST_WEIGHT / self.best.len().max(1) as f64;
-        let pairs = horizontal_m(assessment).zip(&self.best);
-        pairs.map(move |(own, best)| steep((own / best).ln().max(0.0), LOST, weight))
+        let lost = |(own, best): (f64, &f64)| Steep {
+            x: (own / best).ln().max(0.0),
+            scale: LOST,
+            weight,
+        };
+        horizontal_m(assessment).zip(&self.best).map(lost).collect()
     }
 
     /// The factors that are free descend from where the search starts.
@@ -195,25 +201,42 @@ fn horizontal_m(assessment: &Assessment) -> impl Iterator<Item = f64> {
         .map(|end| end.rmse[0].hypot(end.rmse[1]))
 }
 
-/// A logarithm that costs its fourth power, and what it is to the cost: `scale` off costs `weight`, half of that a sixteenth,
-/// twice as much sixteen times; both directions count alike.
-fn steep(x: f64, scale: f64, weight: f64) -> (f64, Part) {
-    // The square of (x/scale)², whose slope is 2 x/scale²: as Gauss and Newton have it, so that a step halves x.
-    let part = Part {
-        value: x,
-        curvature: 8.0 * weight * x.powi(2) / scale.powi(4),
-    };
-    (weight * (x / scale).powi(4), part)
+/// A logarithm that costs its fourth power: `scale` off costs `weight`, half of that a sixteenth, twice as much sixteen times;
+/// both directions count alike.
+struct Steep {
+    x: f64,
+    scale: f64,
+    weight: f64,
+}
+
+impl Steep {
+    fn cost(&self) -> f64 {
+        self.weight * (self.x / self.scale).powi(4)
+    }
+
+    fn part(&self) -> Part {
+        // The square of (x/scale)², whose slope is 2 x/scale²: as Gauss and Newton have it, so that a step halves x.
+        Part {
+            value: self.x,
+            curvature: 8.0 * self.weight * self.x.powi(2) / self.scale.powi(4),
+        }
+    }
 }
 
 /// What costs beside the divergence: a single state whose ratio is a tenth off, at an outage's end or over the whole way,
 /// since the divergence alone gives one state away for eight; and the mean NEES, since the divergence is that of a filter
 /// that is rather underconfident.
-fn off(assessment: &Assessment) -> Vec<(f64, Part)> {
+fn steep(assessment: &Assessment) -> Vec<Steep> {
     let ends = &assessment.outage_ends;
     let of_end = ENDS * OFF_WEIGHT / ends.len() as f64;
     let at_ends = ends.iter().flat_map(|end| end.ratio());
-    let mut all: Vec<_> = at_ends.map(|r| steep(r.ln(), OFF, of_end)).collect();
+    let mut all: Vec<Steep> = at_ends
+        .map(|r| Steep {
+            x: r.ln(),
+            scale: OFF,
+            weight: of_end,
+        })
+        .collect();
     let reports = assessment.reports.get(1..).unwrap_or_default();
     if reports.is_empty() {
         return all;
@@ -221,9 +244,17 @@ fn off(assessment: &Assessment) -> Vec<(f64, Part)> {
     let mean = |of: &dyn Fn(&Consistency) -> f64| mean(reports.iter().map(of));
     // Root mean square over the way, so that one bad minute is not hidden by an hour that is good.
     let over_way = |i: usize| 0.5 * mean(&|c| c.ratio()[i].powi(2)).ln();
-    all.extend((0..REPORTED).map(|i| steep(over_way(i), OFF, WAY * OFF_WEIGHT)));
+    all.extend((0..REPORTED).map(|i| Steep {
+        x: over_way(i),
+        scale: OFF,
+        weight: WAY * OFF_WEIGHT,
+    }));
     let nees = (mean(&|c| c.nees) / NEES_DOF as f64).ln();
-    all.push(steep(nees, NEES_OFF, WAY * NEES_WEIGHT));
+    all.push(Steep {
+        x: nees,
+        scale: NEES_OFF,
+        weight: WAY * NEES_WEIGHT,
+    });
     all
 }
 
