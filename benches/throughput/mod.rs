@@ -10,7 +10,7 @@ use nav_sim_navigation::ekf::{
 };
 use nav_sim_navigation::frames::NavState;
 use nav_sim_navigation::lanes::{LANES, Lanes, Level, Vec3};
-use nav_sim_navigation::sensors::imu::{ErrorSource, ImuErrors, LaneErrors};
+use nav_sim_navigation::sensors::imu::{ImuErrors, LaneErrors, Truth};
 use nav_sim_navigation::strapdown::Strapdown;
 use nav_sim_signal::imu::ImuSample;
 use nav_sim_signal::noise::{Composite, Model, ParameterError, Process};
@@ -77,7 +77,7 @@ impl<'a> Load<'a> {
             process: "",
         };
         let imu = (0..LANES as u64)
-            .map(|run| ImuErrors::new(&ErrorSource::Model(model), key(run), SAMPLES));
+            .map(|run| ImuErrors::new(&Truth::Model(model), &[], key(run), SAMPLES));
         let settings = InitialSettings::default();
         Ok(Self {
             ekf: Ekf::new(Strapdown::new(&start, gravity), &belief, &start, &settings)

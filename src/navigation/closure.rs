@@ -11,7 +11,7 @@ use crate::trajectory::Trajectory;
 use crate::units::Refused;
 
 /// How far the mechanised samples come away from the trajectory.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize)]
 pub struct Closure {
     /// IMU rate (Hz).
     pub rate_hz: f64,
@@ -28,7 +28,7 @@ pub struct Closure {
 }
 
 /// What a closure must not exceed.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, serde::Serialize)]
 pub struct Bounds {
     /// Distance (m).
     pub position_m: f64,
@@ -67,10 +67,7 @@ impl Closure {
         let mut closure = Self {
             rate_hz,
             duration_s,
-            position_m: 0.0,
-            horizontal_m: 0.0,
-            velocity_m_s: 0.0,
-            attitude_rad: 0.0,
+            ..Self::default()
         };
         // The mean over an interval leads to its end: sample k is compared at t_{k+1}.
         for (k, sample) in samples.iter().enumerate() {
@@ -96,7 +93,7 @@ impl Closure {
     }
 
     fn widen(&mut self, truth: &NavState, found: &NavState) {
-        let apart = ned_difference(truth, found.lat, found.lon, found.h);
+        let apart = ned_difference(truth.place(), found.place());
         // 2 sin(θ/2) for θ: the bound is 1 µrad, and the vector part keeps digits there that 2 acos(w) would
         // lose.
         let turned = 2.0 * (truth.q_b_n.conjugate() * found.q_b_n).xyz().length();

@@ -13,7 +13,7 @@
 //! assert!((geodetic_to_ecef(0.0, 0.0, 100.0).x - (A + 100.0)).abs() < 1e-6);
 //! ```
 
-use crate::frames::{NavState, q_e_n};
+use crate::frames::q_e_n;
 use crate::lanes::Real;
 use glam::DVec3;
 
@@ -187,16 +187,26 @@ pub fn omega_en_n(lat: f64, h: f64, v_n: DVec3) -> DVec3 {
     DVec3::new(east, -v_n.x / (r.meridian + h), -east * lat.tan())
 }
 
-/// Position difference `b − a` in metres north, east, down at a: curvilinear, (R_N + h) δlat,
-/// (R_E + h) cos(lat) δlon, −δh.
-pub fn ned_difference(a: &NavState, lat: f64, lon: f64, h: f64) -> DVec3 {
-    let r = radii(a.lat.sin());
+/// Position difference `b − a` of two places (latitude, longitude (rad), height (m)) in metres north, east, down at a:
+/// curvilinear, (R_N + h) δlat, (R_E + h) cos(lat) δlon, −δh.
+pub fn ned_difference([lat, lon, h]: [f64; 3], b: [f64; 3]) -> DVec3 {
+    let r = radii(lat.sin());
     DVec3::new(
-        (lat - a.lat) * (r.meridian + a.h),
+        (b[0] - lat) * (r.meridian + h),
         // Two points either side of ±180° are neighbours, not a turn apart.
-        crate::frames::wrap_angle(lon - a.lon) * (r.transverse + a.h) * a.lat.cos(),
-        a.h - h,
+        crate::frames::wrap_angle(b[1] - lon) * (r.transverse + h) * lat.cos(),
+        h - b[2],
     )
+}
+
+/// The place so many metres north, east, down of another: the inverse of [`ned_difference`].
+pub(crate) fn moved([lat, lon, h]: [f64; 3], by_n: DVec3) -> [f64; 3] {
+    let r = radii(lat.sin());
+    [
+        lat + by_n.x / (r.meridian + h),
+        lon + by_n.y / ((r.transverse + h) * lat.cos()),
+        h - by_n.z,
+    ]
 }
 
 /// A vector of e written in n at the given place.

@@ -30,8 +30,15 @@ pub struct NavState {
     pub q_b_n: DQuat,
 }
 
+impl NavState {
+    /// Latitude, longitude (rad) and height (m).
+    pub const fn place(&self) -> [f64; 3] {
+        [self.lat, self.lon, self.h]
+    }
+}
+
 /// Roll, pitch and yaw.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct RollPitchYaw {
     /// Roll, in (−π, π] (rad).
     pub roll: f64,

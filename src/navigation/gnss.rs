@@ -59,7 +59,7 @@ impl GnssVelocity {
 }
 
 /// Standard deviations of fixes that state none: north, east, down.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct FixSigma {
     /// Of the position (m).
     pub pos_m: [f64; 3],
@@ -68,6 +68,11 @@ pub struct FixSigma {
 }
 
 impl GnssFix {
+    /// Latitude, longitude (rad) and height (m).
+    pub const fn place(&self) -> [f64; 3] {
+        [self.lat, self.lon, self.h]
+    }
+
     /// With its standard deviations of position and velocity times these; what was not measured stays open.
     pub fn with_sigmas_times(mut self, position: f64, velocity: f64) -> Self {
         self.pos_sigma_n *= position;

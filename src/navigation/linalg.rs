@@ -2,10 +2,24 @@
 
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Vector3};
+use std::cmp::Ordering;
 
 /// The larger of two numbers; NaN where either is, so that what was lost is not overlooked.
 pub const fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a >= b { a } else { b }
+}
+
+/// The order of pairs by their second number.
+pub(crate) fn by_value<T>(a: &(T, f64), b: &(T, f64)) -> Ordering {
+    a.1.total_cmp(&b.1)
+}
+
+/// Mean; NaN of nothing.
+pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (count, sum) = values
+        .into_iter()
+        .fold((0.0, 0.0), |(count, sum), x| (count + 1.0, sum + x));
+    sum / count
 }
 
 /// The value in the middle, in order.
@@ -18,11 +32,6 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
 /// glam vector to nalgebra.
 pub(crate) fn to_nalgebra(v: DVec3) -> Vector3<f64> {
     Vector3::new(v.x, v.y, v.z)
-}
-
-/// nalgebra vector to glam.
-pub(crate) fn to_glam(v: &Vector3<f64>) -> DVec3 {
-    DVec3::new(v.x, v.y, v.z)
 }
 
 /// The regression of the error at an instant on that at the next one, for a backward smoother.
@@ -109,9 +118,9 @@ mod tests {
     }
 
     #[test]
-    fn vectors_go_there_and_back() {
+    fn vectors_keep_their_order() {
         let v = DVec3::new(0.1, -0.2, 0.3);
-        assert_eq!(to_glam(&to_nalgebra(v)), v);
+        assert_eq!(to_nalgebra(v).as_slice(), v.to_array());
     }
 
     /// Numbers between −1/2 and 1/2 without pattern.

@@ -14,7 +14,7 @@
 
 use crate::ekf::{Belief, BeliefError};
 use crate::imu::Sensor;
-use crate::metrics::QuadraticForm;
+use crate::metrics::{QuadraticForm, name_and_limit};
 use crate::noise::{Composite, Flicker, Kind, Model, Process, continuous};
 use crate::scenario::Scenario;
 use crate::sensors::imu::Truth;
@@ -31,7 +31,7 @@ use serde::Serialize;
 use std::str::FromStr;
 
 /// What is limited at the end of an outage.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Quantity {
     /// 95 % quantile of the horizontal error (m).
     P95,
@@ -75,7 +75,7 @@ impl Quantity {
 }
 
 /// A quantity and the most it may be.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize)]
 pub struct Limit {
     /// The quantity.
     pub quantity: Quantity,
@@ -89,23 +89,18 @@ impl FromStr for Limit {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let read = || {
-            let (name, most) = text.split_once("<=").or_else(|| text.split_once('<'))?;
-            let most: f64 = most.trim().parse().ok()?;
-            let quantity = name.trim().parse().ok()?;
-            (most > 0.0 && most.is_finite()).then_some(Self { quantity, most })
+            let (name, most) = name_and_limit(text)?;
+            let quantity = name.parse().ok()?;
+            Some(Self { quantity, most })
         };
-        let names = || Quantity::NAMES.join(", ");
-        read().ok_or_else(|| {
-            format!(
-                "expected NAME<=LIMIT with a positive limit, NAME one of {}",
-                names()
-            )
-        })
+        let names = Quantity::NAMES.join(", ");
+        let expected = "expected NAME<=LIMIT with a positive limit, NAME one of";
+        read().ok_or_else(|| format!("{expected} {names}"))
     }
 }
 
 /// The limit that is the hardest to keep, and where.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize)]
 pub struct Worst {
     /// The limit.
     #[serde(flatten)]
@@ -156,14 +151,12 @@ pub enum RequireError {
         value: f64,
     },
     /// The poorest IMU that is sought keeps every limit.
-    #[error("no IMU is too poor for {} ≤ {}: any that is sought keeps it; with the poorest of the search the error is {} ({})", limit.quantity.name(), limit.quantity.shown(limit.most), limit.quantity.shown(*value), poorest.in_words())]
+    #[error("no IMU is too poor for {} ≤ {}: any that is sought keeps it; with the poorest of the search the error is {}", limit.quantity.name(), limit.quantity.shown(limit.most), limit.quantity.shown(*value))]
     Loose {
         /// The hardest limit.
         limit: Limit,
         /// The error with the poorest IMU.
         value: f64,
-        /// That IMU.
-        poorest: ImuParameters,
     },
     /// The model has no filter.
     #[error(transparent)]
@@ -346,32 +339,6 @@ impl<'a> Course<'a> {
         Ok(laws.into_iter().zip(&self.outages).map(curve).collect())
     }
 
-    /// The errors of each group of sources alone, under the gains of the filter that knows them all.
-    fn parts(
-        &self,
-        place: usize,
-        scenario: &Scenario,
-        model: &Model,
-        group: &(dyn Fn(&NamedSource) -> usize + Sync),
-        groups: usize,
-    ) -> Result<Vec<Drift>, BeliefError> {
-        let belief = self.belief(scenario, model)?;
-        let sources = self.sources(scenario, model);
-        let part = |g: usize| {
-            let own: Vec<NamedSource> = sources
-                .iter()
-                .filter(|source| group(source) == g)
-                .cloned()
-                .collect();
-            self.ends(
-                &self.outages[place..=place],
-                &belief,
-                &TruthSide::together(&own),
-            )[0]
-        };
-        Ok((0..groups).into_par_iter().map(part).collect())
-    }
-
     /// The hardest limit of a filter that knows the model.
     fn worst(
         &self,
@@ -379,45 +346,7 @@ impl<'a> Course<'a> {
         model: &Model,
         limits: &[Limit],
     ) -> Result<Worst, BeliefError> {
-        let worst = Worst::of(limits, &self.drifts(scenario, model)?);
-        Ok(worst.expect("at least one limit and one place"))
-    }
-
-    /// Where the margin of the hardest limit falls to `reserve` along IMUs of a rising logarithm, each with the scenario
-    /// of a filter that knows it, as [`Crossing::from`] 0; the logarithm and what is left beyond the reserve.
-    ///
-    /// The search is at the places that were the worst so far; what it finds is held against all, and it goes on where
-    /// another is worse. The answer is that of all places, at the cost of a few.
-    fn crossing(
-        &self,
-        limits: &[Limit],
-        (crossing, reserve): (&Crossing, f64),
-        imu_at: impl Fn(f64) -> (Scenario, Model),
-    ) -> Result<(f64, f64), BeliefError> {
-        let worst_at = |ln: f64| {
-            let (scenario, model) = imu_at(ln);
-            self.worst(&scenario, &model, limits)
-        };
-        let mut places = vec![worst_at(0.0)?.place];
-        let mut start = 0.0;
-        loop {
-            let outages: Vec<Outage> = places.iter().map(|place| self.outages[*place]).collect();
-            let margin_there = |ln: f64| {
-                let (scenario, model) = imu_at(ln);
-                let worst = Worst::of(limits, &self.drifts_in(&outages, &scenario, &model)?);
-                Ok::<_, BeliefError>(
-                    worst.expect("at least one limit and one place").margin() - reserve,
-                )
-            };
-            let (ln, there) = crossing.from(start, margin_there)?;
-            let worst = worst_at(ln)?;
-            let everywhere = worst.margin() - reserve;
-            if everywhere >= there - crossing.exact || places.contains(&worst.place) {
-                return Ok((ln, everywhere));
-            }
-            places.push(worst.place);
-            start = ln;
-        }
+        Ok(hardest(limits, &self.drifts(scenario, model)?))
     }
 
     fn drifts_in(
@@ -457,6 +386,10 @@ impl<'a> Course<'a> {
     }
 }
 
+fn hardest(limits: &[Limit], drifts: &[Drift]) -> Worst {
+    Worst::of(limits, drifts).expect("at least one limit and one place")
+}
+
 /// Outages of one length at `places` times, the first at `first_s`, evenly to the end of the trajectory.
 pub fn evenly(first_s: f64, end_s: f64, length_s: f64, places: u32) -> Vec<Outage> {
     let last_s = end_s - length_s;
@@ -484,7 +417,7 @@ pub fn evenly(first_s: f64, end_s: f64, length_s: f64, places: u32) -> Vec<Outag
 pub const IMU_PARAMETERS: usize = 4;
 
 /// Intensities of an IMU, all axes alike.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct ImuParameters {
     /// Velocity random walk (m/s/√s), bias instability of the accelerometer (m/s²), angle random walk (rad/√s), bias
     /// instability of the gyroscope (rad/s).
@@ -572,20 +505,6 @@ impl ImuParameters {
         "gyroscope bias instability (deg/h)",
     ];
 
-    /// `velocity random walk (m/s/√h) 18.0, …`
-    fn in_words(&self) -> String {
-        let figure = |i: usize| {
-            let value = Self::in_datasheets(i, self.values[i]);
-            // Three digits: the figures are bounds of a search, not measurements.
-            let decimals = (2.0 - value.log10().floor()).max(0.0) as usize;
-            format!("{} {value:.decimals$}", Self::NAMES[i])
-        };
-        (0..IMU_PARAMETERS)
-            .map(figure)
-            .collect::<Vec<_>>()
-            .join(", ")
-    }
-
     /// As good as without noise.
     fn perfect(t_corr_s: f64) -> Self {
         // 1e-5 of a consumer IMU, not zero: intensities are sought as logarithms.
@@ -605,7 +524,7 @@ impl ImuParameters {
 }
 
 /// An intensity that keeps the limits, or none that matters.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Answer {
     /// At most this.
     AtMost(f64),
@@ -645,13 +564,11 @@ impl Need<'_> {
                 value: perfect.value,
             });
         }
-        let poorest = start.times([POOREST; IMU_PARAMETERS]);
-        let worst = self.worst(&poorest)?;
+        let worst = self.worst(&start.times([POOREST; IMU_PARAMETERS]))?;
         if worst.margin() >= RESERVE {
             return Err(RequireError::Loose {
                 limit: worst.limit,
                 value: worst.value,
-                poorest,
             });
         }
         let mut imu = self.at_limit(&start, [1.0; IMU_PARAMETERS])?.1;
@@ -726,22 +643,33 @@ impl Need<'_> {
         imu: &ImuParameters,
         weights: [f64; IMU_PARAMETERS],
     ) -> Result<(f64, ImuParameters), BeliefError> {
-        let scaled = |ln: f64| imu.times(weights.map(|w| (w * ln).exp()));
         let crossing = Crossing {
             bounds: (-RANGE, RANGE),
             step: 0.7,
             exact: EXACT,
         };
-        let imu_at = |ln: f64| {
-            (
-                self.scenario.clone(),
-                scaled(ln).model(self.scenario.imu.rate_hz),
-            )
-        };
-        let (ln, margin) = self
-            .course
-            .crossing(self.limits, (&crossing, RESERVE), imu_at)?;
-        Ok((margin, scaled(ln)))
+        let scaled = |ln: f64| imu.times(weights.map(|w| (w * ln).exp()));
+        let (course, scenario) = (self.course, self.scenario);
+        // The search is at the places that were the worst so far; what it finds is held against all, and it goes on
+        // where another is worse. The answer is that of all places, at the cost of a few.
+        let mut places = vec![self.worst(imu)?.place];
+        let mut start = 0.0;
+        loop {
+            let outages: Vec<Outage> = places.iter().map(|at| course.outages[*at]).collect();
+            let margin_there = |ln: f64| {
+                let model = scaled(ln).model(scenario.imu.rate_hz);
+                let drifts = course.drifts_in(&outages, scenario, &model)?;
+                Ok::<_, BeliefError>(hardest(self.limits, &drifts).margin() - RESERVE)
+            };
+            let (ln, there) = crossing.from(start, margin_there)?;
+            let worst = self.worst(&scaled(ln))?;
+            let everywhere = worst.margin() - RESERVE;
+            if everywhere >= there - EXACT || places.contains(&worst.place) {
+                return Ok((everywhere, scaled(ln)));
+            }
+            places.push(worst.place);
+            start = ln;
+        }
     }
 
     /// Mean squares of the four sources and of everything else in what is limited the hardest.
@@ -750,31 +678,31 @@ impl Need<'_> {
         imu: &ImuParameters,
     ) -> Result<(Worst, [f64; IMU_PARAMETERS + 1]), BeliefError> {
         let worst = self.worst(imu)?;
-        let model = imu.model(self.scenario.imu.rate_hz);
-        let group = |source: &NamedSource| {
-            let own = ImuParameters::PROCESSES
-                .iter()
-                .position(|process| source.process == Some(*process));
-            own.unwrap_or(IMU_PARAMETERS)
+        let (course, model) = (self.course, imu.model(self.scenario.imu.rate_hz));
+        let belief = course.belief(self.scenario, &model)?;
+        let sources = course.sources(self.scenario, &model);
+        let outage = &course.outages[worst.place..=worst.place];
+        // each group of sources alone, under the gains of the filter that knows them all
+        let square = |group: usize| {
+            let is_own = |source: &&NamedSource| {
+                let mut processes = ImuParameters::PROCESSES.iter();
+                let own = processes.position(|process| source.process == Some(*process));
+                own.unwrap_or(IMU_PARAMETERS) == group
+            };
+            let own: Vec<NamedSource> = sources.iter().filter(is_own).cloned().collect();
+            let drift = course.ends(outage, &belief, &TruthSide::together(&own))[0];
+            drift.square(worst.limit.quantity)
         };
-        let parts = self.course.parts(
-            worst.place,
-            self.scenario,
-            &model,
-            &group,
-            IMU_PARAMETERS + 1,
-        )?;
-        Ok((
-            worst,
-            std::array::from_fn(|i| parts[i].square(worst.limit.quantity)),
-        ))
+        let groups = (0..=IMU_PARAMETERS).into_par_iter();
+        let squares: Vec<f64> = groups.map(square).collect();
+        Ok((worst, std::array::from_fn(|i| squares[i])))
     }
 }
 
 // How far a given IMU is from its limits, and what one without errors would leave.
 
 /// How an IMU stands to its limits.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Margins {
     /// Whether the limits are kept.
     pub met: bool,

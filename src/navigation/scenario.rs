@@ -288,24 +288,35 @@ impl Scenario {
         let mut found = Vec::new();
         for sensor in Sensor::ALL {
             let (bias, ppm) = self.imu.deviations(sensor);
-            // of half of what is there, errors may be twice as large as stated
-            let expected = self.initial.bias_sigma(sensor).unwrap_or(0.0);
-            if expected < 0.5 * bias {
-                found.push(format!(
-                    "the true {sensor} has a turn-on bias of {bias} {}, the filter expects {expected}: initial.{} \
-                     gives it states",
-                    sensor.unit(),
-                    InitialSettings::bias_key(sensor)
-                ));
-            }
+            let [bias_key, scale_key] = [
+                InitialSettings::bias_key(sensor),
+                InitialSettings::scale_key(sensor),
+            ];
             let by_default = self.filter.states.scale_sigma() * 1e6;
-            let expected = self.initial.scale_sigma_ppm(sensor).unwrap_or(by_default);
-            if expected < 0.5 * ppm {
-                found.push(format!(
-                    "the true {sensor} has a scale-factor error of {ppm} ppm, the filter expects {expected}: --scale-ppm \
-                     (initial.{}) gives it states",
-                    InitialSettings::scale_key(sensor)
-                ));
+            let bias_remedy = format!("initial.{bias_key}");
+            let scale_remedy = format!("--scale-ppm (initial.{scale_key})");
+            for (what, is, unit, expected, remedy) in [
+                (
+                    "turn-on bias",
+                    bias,
+                    sensor.unit(),
+                    self.initial.bias_sigma(sensor).unwrap_or(0.0),
+                    bias_remedy,
+                ),
+                (
+                    "scale-factor error",
+                    ppm,
+                    "ppm",
+                    self.initial.scale_sigma_ppm(sensor).unwrap_or(by_default),
+                    scale_remedy,
+                ),
+            ] {
+                // of half of what is there, errors may be twice as large as stated
+                if expected < 0.5 * is {
+                    found.push(format!(
+                        "the true {sensor} has a {what} of {is} {unit}, the filter expects {expected}: {remedy} gives it states"
+                    ));
+                }
             }
         }
         for (sensor, key, sigma, unit) in self.imu.without_states() {

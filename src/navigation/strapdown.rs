@@ -302,7 +302,7 @@ mod tests {
             );
         }
         let end = ins.lane(7);
-        let moved = earth::ned_difference(&state, end.lat, end.lon, end.h);
+        let moved = earth::ned_difference(state.place(), end.place());
         // What the scheme leaves out is of second order in the rotation of a sample, (7e-7)²·g/4 =
         // 1.2e-12 m/s² of false acceleration: 0.5 µm in 900 s, and rounding beside it.
         assert!(moved.length() < 3e-6, "moved {moved}");
@@ -334,7 +334,7 @@ mod tests {
         let transverse = radii(state.lat.sin()).transverse;
         let lon = 3.1 + 200.0 * 3600.0 / ((transverse + state.h) * state.lat.cos());
         let expected = NavState { lon, ..state };
-        let error = earth::ned_difference(&expected, end.lat, end.lon, end.h);
+        let error = earth::ned_difference(expected.place(), end.place());
         // Second order in n's rotation per sample: (2e-6)²·g/4 = 1e-11 m/s², 0.06 mm in an hour; the
         // vertical channel is unstable and multiplies it by cosh(√(2g/R)·3600 s) = 280 at most.
         assert!(

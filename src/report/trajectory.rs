@@ -14,7 +14,7 @@ pub(crate) fn track(trajectory: &Trajectory) -> Vec<(f64, [f64; 2])> {
     let instant = |k: u32| {
         let t_s = trajectory.start_s() + step * f64::from(k);
         let state = trajectory.state(t_s);
-        let moved = ned_difference(&start, state.lat, state.lon, state.h);
+        let moved = ned_difference(start.place(), state.place());
         (t_s, [moved.y, moved.x])
     };
     (0..=INSTANTS).map(instant).collect()

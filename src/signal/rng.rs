@@ -39,6 +39,16 @@ pub struct StreamKey<'a> {
 }
 
 impl StreamKey<'_> {
+    /// The generator of a stream of the same run.
+    pub fn stream(self, source: &str, process: &str) -> Generator {
+        StreamKey {
+            source,
+            process,
+            ..self
+        }
+        .generator()
+    }
+
     /// The generator of this stream, at its beginning.
     pub fn generator(&self) -> Generator {
         let mut hasher = blake3::Hasher::new();

@@ -192,7 +192,7 @@ fn the_whole_reference_drive() {
         if k % 100 == 0 {
             let end = ins.lane(0);
             errors.push(
-                ned_difference(&state(&truth[k / 100]), end.lat, end.lon, end.h)
+                ned_difference(state(&truth[k / 100]).place(), end.place())
                     .truncate()
                     .length(),
             );

@@ -267,7 +267,7 @@ fn sampled_runs_scatter_as_computed() {
             report.sigma[i]
         );
     }
-    let biases = FilterPass::new(&track, &beliefs[0]).bias_sigmas()[at];
+    let biases = FilterPass::new(&track, &beliefs[0]).biases[at];
     for (sum, sigma) in sampled.bias_see.iter().zip(biases) {
         let see = sum / sampled.count as f64;
         assert!(

@@ -255,7 +255,7 @@ fn mechanising_independent_increments_follows_independent_states() {
             ins.step(Vec3::splat(dtheta), Vec3::splat(dv), 0.01 * every as f64);
         }
         let (state, truth) = (ins.lane(0), trajectory.state(90.0));
-        let apart = ned_difference(&truth, state.lat, state.lon, state.h);
+        let apart = ned_difference(truth.place(), state.place());
         let turned = 2.0 * (truth.q_b_n.conjugate() * state.q_b_n).xyz().length();
         (apart, (state.v_n - v_n[1]).length(), turned)
     };

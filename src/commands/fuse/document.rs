@@ -358,7 +358,7 @@ const SMOOTHED: Colour = Colour::Hue(2);
 fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let place = |row: &Row| {
         let NavState { lat, lon, h, .. } = row.state;
-        let moved = ned_difference(&solution.rows[0].state, lat, lon, h);
+        let moved = ned_difference(solution.rows[0].state.place(), [lat, lon, h]);
         DVec2::new(moved.y, moved.x)
     };
     let error = |row: &Row| {

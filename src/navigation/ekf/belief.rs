@@ -33,7 +33,7 @@ const MAX_GROUPS: usize = 8;
 pub(super) const MAX_BLOCKS: usize = MAX_GROUPS + 1 + KINDS;
 
 /// A model that cannot be made into filter states.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 pub enum BeliefError {
     /// More bias states than the filter carries.
     #[error(

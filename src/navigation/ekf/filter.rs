@@ -13,6 +13,7 @@ use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Matrix3};
+use std::ops::Range;
 
 /// Error-state extended Kalman filter, closed loop.
 #[derive(Debug, Clone)]
@@ -191,9 +192,8 @@ impl Ekf {
         {
             let estimate = estimate.load();
             if regressor.kind == UnknownKind::Drift {
-                let age = Vec3::splat(DVec3::splat(age));
-                sample = sample - times(estimate, age);
-                regressor.value.store(age);
+                sample = sample - estimate * W::from(age);
+                regressor.value = Vec3::splat(DVec3::splat(age));
             } else {
                 for axis in 0..3 {
                     sample[axis] = sample[axis] / (estimate[axis] + 1.0);
@@ -206,17 +206,21 @@ impl Ekf {
         sample
     }
 
+    /// The bias groups of a sensor among the blocks behind the navigation's.
+    #[inline(always)]
+    fn bias_blocks(&self, sensor: Sensor) -> Range<usize> {
+        let [accel, gyro] = self.belief.groups.each_ref().map(Vec::len);
+        match sensor {
+            Sensor::Accel => 0..accel,
+            Sensor::Gyro => accel..accel + gyro,
+        }
+    }
+
     /// The sum of the bias groups of a sensor.
     #[inline(always)]
     fn bias_sum<W: Wide>(&self, sensor: Sensor) -> Vec3<W> {
-        let [accel, gyro] = self.belief.groups.each_ref().map(Vec::len);
-        let of_sensor = if sensor == Sensor::Accel {
-            0..accel
-        } else {
-            accel..accel + gyro
-        };
         let mut sum = Vec3::splat(DVec3::ZERO);
-        for bias in &self.estimates[of_sensor] {
+        for bias in &self.estimates[self.bias_blocks(sensor)] {
             sum = sum + bias.load();
         }
         sum
@@ -283,12 +287,6 @@ impl Ekf {
             }
         }
     }
-}
-
-/// The product axis by axis.
-#[inline(always)]
-fn times<W: Wide>(a: Vec3<W>, b: Vec3<W>) -> Vec3<W> {
-    Vec3([a[0] * b[0], a[1] * b[1], a[2] * b[2]])
 }
 
 /// Adds the same block to the diagonal of all lanes.
@@ -417,7 +415,7 @@ impl Ekf {
             // The other lanes get no correction: zero moves them nowhere.
             to[0] = *from;
         }
-        apply_correction(self);
+        super::update::apply_correction(self);
     }
 
     /// What the last update took out of the state of the first lane.
@@ -426,22 +424,6 @@ impl Ekf {
             self.p.dim(),
             self.scratch.error.iter().map(|error| error[0]),
         )
-    }
-}
-
-/// Takes the estimated errors out of the state and the estimates of all lanes.
-pub(super) fn apply_correction(ekf: &mut Ekf) {
-    dispatch(ekf.level, Correct(ekf));
-}
-
-struct Correct<'a>(&'a mut Ekf);
-
-impl Kernel for Correct<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<W: Wide>(self) {
-        let ins = self.0.nominal.load::<W>();
-        self.0.correct(ins);
     }
 }
 
@@ -506,54 +488,27 @@ impl Ekf {
 
     /// Standard deviations of that estimate on the three axes (m/s² or rad/s).
     pub(crate) fn bias_sigma(&self, sensor: Sensor) -> Vec3 {
-        let sources = self.sources();
-        let [accel, gyro] = sources.biases;
-        let blocks = if sensor == Sensor::Accel {
-            0..accel
-        } else {
-            accel..accel + gyro
-        };
         let one = Vec3::splat(DVec3::ONE);
-        let groups = blocks.map(move |g| (BIAS + g, one));
-        self.deviation(groups.chain(self.drift_term(sensor)))
-    }
-
-    /// Standard deviations of the estimated scale-factor error of a sensor (1); none where the filter has no state for it.
-    pub fn scale_sigma(&self, sensor: Sensor) -> Option<Vec3> {
-        let block = self.unknown_block(sensor, UnknownKind::ScaleFactor)?;
-        Some(self.deviation(std::iter::once((block, Vec3::splat(DVec3::ONE)))))
-    }
-
-    /// The block of an unknown of a sensor, if there is one.
-    fn unknown_block(&self, sensor: Sensor, kind: UnknownKind) -> Option<usize> {
-        let sources = self.sources();
-        let u = sources.regressors[sensor as usize]
-            .iter()
-            .position(|r| r.kind == kind)?;
-        Some(BIAS + sources.unknowns(sensor) + u)
-    }
-
-    /// The slope of a sensor's drift and the age of the last sample.
-    fn drift_term(&self, sensor: Sensor) -> Option<Term> {
-        let drift = self.sources().regressors[sensor as usize]
-            .iter()
-            .find(|r| r.kind == UnknownKind::Drift)?;
-        Some((self.unknown_block(sensor, UnknownKind::Drift)?, drift.value))
-    }
-
-    /// Standard deviations of the sum of the terms on the three axes.
-    fn deviation(&self, terms: impl Iterator<Item = Term> + Clone) -> Vec3 {
+        let groups = self.bias_blocks(sensor).map(|g| (BIAS + g, one));
+        let terms: Vec<Term> = groups.chain(self.drift_term(sensor)).collect();
         let variance = |axis: usize| {
             // Var(Σ c_a x_a) with all covariances: after some fixes the groups of an axis are strongly
             // anti-correlated (the sum is observed, not its parts), and a sum of variances would be too large
             // many times over.
-            let pairs = terms
-                .clone()
-                .flat_map(|a| terms.clone().map(move |b| (a, b)));
+            let pairs = terms.iter().flat_map(|a| terms.iter().map(move |b| (a, b)));
             pairs.fold(Lanes::ZERO, |sum, ((a, of_a), (b, of_b))| {
                 sum + self.p.get::<Lanes>(3 * a + axis, 3 * b + axis) * of_a[axis] * of_b[axis]
             })
         };
         Vec3([0, 1, 2].map(|axis| variance(axis).sqrt()))
+    }
+
+    /// The slope of a sensor's drift and the age of the last sample.
+    fn drift_term(&self, sensor: Sensor) -> Option<Term> {
+        let sources = self.sources();
+        // in the order of their kinds: a drift is the first
+        let first = sources.regressors[sensor as usize].first()?;
+        let is_drift = first.kind == UnknownKind::Drift;
+        is_drift.then(|| (BIAS + sources.unknowns(sensor), first.value))
     }
 }

@@ -49,7 +49,7 @@ pub(super) fn random_case(g: &mut Generator) -> (NavState, DVec3, DVec3) {
 
 /// The error of lane `i` about a nominal state: metres, m/s, rad.
 pub(super) fn error_of(lane: &NavState, nominal: &NavState) -> [f64; 9] {
-    let r = earth::ned_difference(nominal, lane.lat, lane.lon, lane.h);
+    let r = earth::ned_difference(nominal.place(), lane.place());
     let v = lane.v_n - nominal.v_n;
     // the logarithm of a small rotation: 2 asin of the vector part, to fourth order
     let half = (lane.q_b_n * nominal.q_b_n.inverse()).xyz();

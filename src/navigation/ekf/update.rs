@@ -1,7 +1,7 @@
 //! GNSS updates: position and velocity of an antenna on a lever arm, as scalars in sequence.
 
 use super::covariance::{BIAS, NAV, PSI, R, V};
-use super::filter::{Ekf, apply_correction, settle};
+use super::filter::{Ekf, settle};
 use crate::earth::{OMEGA_IE, radii};
 use crate::frames::wrap_angle;
 use crate::imu::Sensor;
@@ -99,7 +99,7 @@ impl Ekf {
 
     /// Takes the estimated error out of the nominal state and the biases.
     #[inline(always)]
-    pub(super) fn correct<W: Wide>(&mut self, mut ins: Strapdown<W>) {
+    fn correct<W: Wide>(&mut self, mut ins: Strapdown<W>) {
         let (dr, dv, psi) = (
             self.scratch.of::<W>(R),
             self.scratch.of(V),
@@ -173,9 +173,13 @@ pub(super) struct Scalar {
 fn use_scalars(ekf: &mut Ekf, scalars: &[Scalar]) -> Innovations {
     settle(ekf);
     ekf.scratch.error.fill(Lanes::ZERO);
-    let found = dispatch(ekf.level, UseScalars { ekf, scalars });
-    apply_correction(ekf);
-    found
+    dispatch(ekf.level, UseScalars { ekf, scalars })
+}
+
+/// Takes the estimated errors out of the state and the estimates of all lanes.
+pub(super) fn apply_correction(ekf: &mut Ekf) {
+    let scalars = &[];
+    let _ = dispatch(ekf.level, UseScalars { ekf, scalars });
 }
 
 struct UseScalars<'a> {
@@ -193,6 +197,7 @@ impl Kernel for UseScalars<'_> {
             innovation.store(z);
             variance.store(s);
         }
+        self.ekf.correct(self.ekf.nominal.load::<W>());
         found
     }
 }
@@ -408,7 +413,7 @@ struct BodyRows<L> {
     /// δ(Cᵀ u) = Cᵀ (δu + \[u×\] psi).
     of_psi: Mat3<L>,
     /// ∂(velocity in n)/∂(gyroscope's bias).
-    of_gyro: Mat3<L>,
+    of_bias: Mat3<L>,
 }
 
 impl<L: Real> BodyRows<L> {
@@ -416,12 +421,11 @@ impl<L: Real> BodyRows<L> {
     fn new(point: &Antenna<L>, ins: &Strapdown<L>) -> Self {
         let c_b_n = ins.q_b_n.to_matrix();
         let u = ins.v_n + point.swing_n;
-        let of_psi = point.of_psi - Mat3::skew(-u);
         Self {
             c_b_n,
             v_b: times_transposed(&c_b_n, u),
-            of_psi,
-            of_gyro: point.of_bias,
+            of_psi: point.of_psi - Mat3::skew(-u),
+            of_bias: point.of_bias,
         }
     }
 
@@ -433,7 +437,7 @@ impl<L: Real> BodyRows<L> {
             Vec3::splat(DVec3::ZERO),
             axis_n,
             times_transposed(&self.of_psi, axis_n),
-            times_transposed(&self.of_gyro, axis_n),
+            times_transposed(&self.of_bias, axis_n),
         ])
     }
 }

@@ -7,33 +7,28 @@
 //! change of the GNSS velocity, whichever is known better. A start that the fixes of the following minute
 //! contradict is given up for the next, and a heading that they move is not believed as well as it says.
 
-use super::outcome::{Finding, nis_bound};
+use super::outcome::{Finding, nis_bound, total_nis, used};
+use super::run::rates;
+use super::vehicle::{force, rate};
 use super::{Found, Heading, Levelling, Recorded, Settings, Solution, Start, fuse};
-use crate::earth::{gravity_down, radii};
+use crate::earth::{gravity_down, moved, ned_difference};
 use crate::ekf::{Belief, InitialSettings};
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
 use crate::gnss::GnssFix;
 use crate::imu::{ImuIncrement, Sensor};
+use crate::linalg::mean;
 use crate::metrics::VerdictKind;
 use crate::units::{DEG, Refused};
 use glam::{DQuat, DVec3};
-use std::f64::consts::PI;
+use std::f64::consts::{PI, SQRT_2};
 
 /// How much later other starts are tried (s), where none at the first moving fix agrees with what follows.
 const LATER_S: [f64; 5] = [15.0, 30.0, 60.0, 120.0, 240.0];
 /// Tilt beyond which the axes of an IMU are hardly those of a vehicle (rad).
 const UPRIGHT: f64 = 45.0 * DEG;
 
-/// Standard deviations of the biases, which spoil a levelling.
-struct BiasSigma {
-    /// Accelerometer (m/s²).
-    accel: f64,
-    /// Gyroscope (rad/s).
-    gyro: f64,
-}
-
 /// A start found in the recording.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Alignment {
     /// Where the filter starts.
     pub start: Start,
@@ -51,7 +46,6 @@ pub fn coarse(
     belief: &Belief,
 ) -> Result<Alignment, Refused> {
     let gnss = settings.kept(recorded.gnss);
-    let recorded = recorded.with_gnss(&gnss);
     let courses = courses(&gnss, recorded.imu);
     let Some(first) = first_fast(&courses, f64::NEG_INFINITY) else {
         let nearest = nearest_to_fast(&courses).map_or_else(String::new, |(t, v, s)| {
@@ -62,14 +56,11 @@ pub fn coarse(
             SLOW.0
         )));
     };
+    let scene = Scene::new(&recorded.with_gnss(&gnss), settings, belief);
     let first_s = courses[first].fix.t_s;
     let later = LATER_S
         .iter()
         .filter_map(|s| first_fast(&courses, first_s + s));
-    let finished = |mut candidate: Candidate| {
-        widen(&recorded, belief, settings, &mut candidate.start);
-        candidate.alignment()
-    };
     let mut best: Option<Candidate> = None;
     let mut tried_s = f64::NEG_INFINITY;
     for at in std::iter::once(first).chain(later) {
@@ -77,15 +68,15 @@ pub fn coarse(
             continue;
         }
         tried_s = courses[at].fix.t_s;
-        for candidate in candidates(&recorded, settings, belief, &courses, at) {
+        for candidate in scene.at(&courses[at].fix).candidates(&courses, at) {
             // on a straight road anything agrees: a later start must also tell forwards from backwards
-            if candidate.agrees() && (at == first || candidate.trial.decided) {
-                return Ok(finished(candidate));
+            if candidate.agrees() && (at == first || candidate.decided) {
+                return Ok(scene.finished(candidate));
             }
             best.get_or_insert(candidate);
         }
     }
-    best.map(finished).ok_or_else(|| {
+    best.map(|best| scene.finished(best)).ok_or_else(|| {
         Refused(format!(
             "no IMU samples after the first moving fix at {first_s:.2} s to level with"
         ))
@@ -103,165 +94,241 @@ pub fn towards(
     heading: Heading,
 ) -> Result<Alignment, Refused> {
     let gnss = settings.kept(recorded.gnss);
-    let recorded = recorded.with_gnss(&gnss);
     let courses = courses(&gnss, recorded.imu);
+    let scene = Scene::new(&recorded.with_gnss(&gnss), settings, belief);
     let sigma = heading.sigma.hypot(settings.mounting_sigma_b.z);
     let start_at = |at: usize| {
-        let scene = Scene::new(&recorded, settings, belief, &courses[at].fix);
+        let scene = scene.at(&courses[at].fix);
         let rest = scene.at_rest(&courses[..at], &courses[at]);
         let level = rest.or_else(|| scene.in_motion(&courses[at..], heading.yaw, sigma))?;
-        Some(start(
-            &courses[at],
-            &level,
-            Along::Given,
-            (heading.yaw, sigma),
-            settings,
-        ))
+        Some(scene.start(&courses[at], &level, (heading.yaw, sigma), [true, false]))
     };
-    let mut start = (0..courses.len())
+    let start = (0..courses.len())
         .find_map(start_at)
         .ok_or_else(|| Refused("no fix with IMU samples around it to level with".to_owned()))?;
-    let trial = alone(&recorded, belief, settings, &start);
-    widen(&recorded, belief, settings, &mut start);
-    Ok(Candidate { start, trial }.alignment())
-}
-
-/// Which way the vehicle goes along its course.
-#[derive(PartialEq)]
-enum Along {
-    Forwards,
-    Backwards,
-    /// Not asked: the heading is given.
-    Given,
+    let agreement = scene.agreement(&start, TRIAL_S);
+    Ok(scene.finished(Candidate {
+        start,
+        decided: true,
+        agreements: [agreement; 2],
+    }))
 }
 
 /// A start that was tried on the fixes after it.
 struct Candidate {
     start: Start,
-    trial: Trial,
+    /// Whether the opposite one is refuted.
+    decided: bool,
+    /// How well it agrees with the first minute, and with all that was tried.
+    agreements: [Agreement; 2],
 }
 
 impl Candidate {
     fn agrees(&self) -> bool {
-        self.trial.agreements.iter().all(Agreement::holds)
+        self.agreements.iter().all(Agreement::holds)
+    }
+}
+
+/// A recording, and the filter that is tried on it.
+#[derive(Clone, Copy)]
+struct Scene<'a> {
+    recorded: Recorded<'a>,
+    settings: &'a Settings,
+    belief: &'a Belief,
+    /// Standard deviations of the biases, which spoil a levelling: accelerometer (m/s²), gyroscope (rad/s).
+    bias: [f64; 2],
+    /// Gravity at the fix that is looked at (m/s²).
+    g: f64,
+}
+
+impl<'a> Scene<'a> {
+    fn new(recorded: &Recorded<'a>, settings: &'a Settings, belief: &'a Belief) -> Self {
+        Self {
+            recorded: *recorded,
+            settings,
+            belief,
+            bias: Sensor::ALL.map(|sensor| belief.initial_bias_sigma(sensor)),
+            g: f64::NAN,
+        }
     }
 
-    fn alignment(self) -> Alignment {
-        let mut doubts = Vec::new();
-        if !self.agrees() {
-            let nis_per_component = self.trial.agreements[0].nis;
-            doubts.push((
-                VerdictKind::Overconfident,
-                Finding::Start { nis_per_component },
-            ));
+    /// About a fix.
+    fn at(self, fix: &GnssFix) -> Self {
+        let g = gravity_down(self.settings.gravity, fix.lat.sin(), fix.h);
+        Self { g, ..self }
+    }
+
+    /// The starts at a moving fix, the one whose levelling is known best first, in the direction that the fixes
+    /// speak for.
+    fn candidates(&self, courses: &[Moving], at: usize) -> Vec<Candidate> {
+        let moving = &courses[at];
+        // the course is the heading of the vehicle; how the IMU sits in it is not better known than the mounting
+        let heading_sigma = moving
+            .heading_sigma(self.recorded.imu)
+            .hypot(self.settings.mounting_sigma_b.z);
+        // forwards and backwards
+        let headings = [moving.course(), wrap_angle(moving.course() + PI)];
+        let rest = self.at_rest(&courses[..at], moving).map(|level| [level; 2]);
+        let [forwards, backwards] =
+            headings.map(|yaw| self.in_motion(&courses[at..], yaw, heading_sigma));
+        let motion = forwards.zip(backwards).map(|(f, b)| [f, b]);
+        let mut levels: Vec<[Level; 2]> = [rest, motion].into_iter().flatten().collect();
+        levels.sort_by(|a, b| a[0].sigma.total_cmp(&b[0].sigma));
+        let tried = |levels: [Level; 2]| {
+            self.opposite([0, 1].map(|i| {
+                let heading = (headings[i], heading_sigma);
+                self.start(moving, &levels[i], heading, [false, i == 1])
+            }))
+        };
+        levels.into_iter().map(tried).collect()
+    }
+
+    /// The start at a fix; whether its heading is given, and whether it is opposite to the course.
+    fn start(
+        &self,
+        moving: &Moving,
+        level: &Level,
+        (yaw, heading_sigma): (f64, f64),
+        [is_given, is_reversing]: [bool; 2],
+    ) -> Start {
+        let fix = moving.fix;
+        let q_b_n = RollPitchYaw {
+            yaw,
+            ..level.angles
         }
-        if !self.trial.decided {
-            doubts.push((VerdictKind::Doubtful, Finding::Direction));
+        .to_quat();
+        let [lat, lon, h] = moved(fix.place(), -(q_b_n * self.settings.lever_arm_b));
+        let degrees = |angle: f64| (angle / DEG).min(WIDEST_DEG);
+        let (tilt, heading) = (degrees(level.sigma), degrees(heading_sigma));
+        Start {
+            t_s: fix.t_s,
+            state: NavState {
+                lat,
+                lon,
+                h,
+                v_n: moving.v_n,
+                q_b_n,
+            },
+            sigma: InitialSettings {
+                pos_sigma_m: fix.pos_sigma_n.to_array(),
+                vel_sigma_m_s: moving.sigma_n.to_array(),
+                att_sigma_deg: [tilt, tilt, heading],
+                ..InitialSettings::default()
+            },
+            found: Some(Found {
+                level: level.from,
+                course_sigma_deg: heading,
+                is_given,
+                is_reversing,
+                moved_deg: None,
+            }),
         }
-        // a vehicle is level, more or less, at its start
-        let RollPitchYaw { roll, pitch, .. } = RollPitchYaw::from_quat(self.start.state.q_b_n);
-        if (roll.cos() * pitch.cos()).acos() > UPRIGHT {
-            let (roll_deg, pitch_deg) = (roll / DEG, pitch / DEG);
-            doubts.push((
-                VerdictKind::Doubtful,
-                Finding::NotLevel {
-                    roll_deg,
-                    pitch_deg,
-                },
-            ));
+    }
+
+    /// The alignment by a candidate. Its heading is widened where it is not the course: wind sets an aircraft off, currents a
+    /// boat. The smoother, from all fixes of the first minute, says how far.
+    fn finished(&self, mut candidate: Candidate) -> Alignment {
+        let doubts = candidate.doubts();
+        let start = &mut candidate.start;
+        let settings = Settings {
+            smooth: true,
+            ..self.settings.trial()
+        };
+        let solution = self.until(&settings, start, TRIAL_S);
+        if let Some([first, ..]) = solution.as_ref().and_then(|s| s.smoothed.as_deref()) {
+            let [course, heading] =
+                [start.state.q_b_n, first.state.q_b_n].map(|q| RollPitchYaw::from_quat(q).yaw);
+            let moved_deg = wrap_angle(heading - course) / DEG;
+            let sigma_deg = &mut start.sigma.att_sigma_deg[2];
+            if moved_deg.abs() > MOVED * *sigma_deg {
+                *sigma_deg = sigma_deg.hypot(moved_deg).min(WIDEST_DEG);
+                start
+                    .found
+                    .iter_mut()
+                    .for_each(|found| found.moved_deg = Some(moved_deg));
+            }
         }
         Alignment {
-            start: self.start,
+            start: candidate.start,
             doubts,
         }
     }
-}
 
-/// The starts at a moving fix, the one whose levelling is known best first, in the direction that the fixes
-/// speak for.
-fn candidates(
-    recorded: &Recorded<'_>,
-    settings: &Settings,
-    belief: &Belief,
-    courses: &[Moving],
-    at: usize,
-) -> Vec<Candidate> {
-    let moving = &courses[at];
-    let scene = Scene::new(recorded, settings, belief, &moving.fix);
-    // the course is the heading of the vehicle; how the IMU sits in it is not better known than the mounting
-    let heading_sigma = moving
-        .heading_sigma(recorded.imu)
-        .hypot(settings.mounting_sigma_b.z);
-    let in_motion = |heading| scene.in_motion(&courses[at..], heading, heading_sigma);
-    let forwards = moving.course();
-    let backwards = wrap_angle(forwards + PI);
-    let rest = scene
-        .at_rest(&courses[..at], moving)
-        .map(|level| [level; 2]);
-    let motion = in_motion(forwards)
-        .zip(in_motion(backwards))
-        .map(|(f, b)| [f, b]);
-    let mut levels: Vec<[Level; 2]> = [rest, motion].into_iter().flatten().collect();
-    levels.sort_by(|a, b| a[0].sigma.total_cmp(&b[0].sigma));
-    let tried = |[f, b]: [Level; 2]| {
-        let starts = [
-            (f, Along::Forwards, forwards),
-            (b, Along::Backwards, backwards),
-        ]
-        .map(|(level, along, yaw)| start(moving, &level, along, (yaw, heading_sigma), settings));
-        let trial = opposite(recorded, belief, settings, starts.each_ref());
-        let [f, b] = starts;
-        Candidate {
-            start: if trial.better == 0 { f } else { b },
-            trial,
-        }
-    };
-    levels.into_iter().map(tried).collect()
-}
-
-fn start(
-    moving: &Moving,
-    level: &Level,
-    along: Along,
-    (yaw, heading_sigma): (f64, f64),
-    settings: &Settings,
-) -> Start {
-    let fix = moving.fix;
-    let q_b_n = RollPitchYaw {
-        roll: level.roll,
-        pitch: level.pitch,
-        yaw,
+    /// The solution from a start over so many seconds, its rows those of the start and the end.
+    fn until(&self, settings: &Settings, start: &Start, seconds: f64) -> Option<Solution> {
+        let recorded = self.recorded.until(start.t_s + seconds);
+        fuse(&recorded, self.belief, start, settings, None).ok()
     }
-    .to_quat();
-    let arm_n = q_b_n * settings.lever_arm_b;
-    let r = radii(fix.lat.sin());
-    let state = NavState {
-        lat: fix.lat - arm_n.x / (r.meridian + fix.h),
-        lon: fix.lon - arm_n.y / ((r.transverse + fix.h) * fix.lat.cos()),
-        h: fix.h + arm_n.z,
-        v_n: moving.v_n,
-        q_b_n,
-    };
-    let degrees = |angle: f64| (angle / DEG).min(30.0);
-    let (tilt, heading) = (degrees(level.sigma), degrees(heading_sigma));
-    let sigma = InitialSettings {
-        pos_sigma_m: fix.pos_sigma_n.to_array(),
-        vel_sigma_m_s: moving.sigma_n.to_array(),
-        att_sigma_deg: [tilt, tilt, heading],
-        ..InitialSettings::default()
-    };
-    let found = Found {
-        level: level.from,
-        course_sigma_deg: heading,
-        is_given: along == Along::Given,
-        is_reversing: along == Along::Backwards,
-        moved_deg: None,
-    };
-    Start {
-        t_s: fix.t_s,
-        state,
-        sigma,
-        found: Some(found),
+
+    fn agreement(&self, start: &Start, seconds: f64) -> Agreement {
+        let Some(solution) = self.until(&self.settings.trial(), start, seconds) else {
+            return Agreement {
+                cost: f64::INFINITY,
+                nis: f64::INFINITY,
+                components: 0,
+            };
+        };
+        let (nis, components) = total_nis(used(&solution));
+        Agreement {
+            // the sum of the logarithms stands for the determinant: the correlations of both starts are alike
+            cost: used(&solution)
+                .map(|f| f.nis + 2.0 * f.sigma.iter().map(|s| s.ln()).sum::<f64>())
+                .sum(),
+            nis: nis / components.max(1) as f64,
+            components,
+        }
+    }
+
+    /// Runs the filter from two opposite starts over the first minute, and longer while that does not tell them apart; the
+    /// better one.
+    fn opposite(&self, starts: [Start; 2]) -> Candidate {
+        let begin_s = starts[0].t_s;
+        let end_s = self.recorded.gnss.last().map_or(begin_s, |f| f.t_s);
+        let mut window_s = TRIAL_S;
+        let mut first: Option<[Agreement; 2]> = None;
+        loop {
+            let both = starts
+                .each_ref()
+                .map(|start| self.agreement(start, window_s));
+            let first = *first.get_or_insert(both);
+            // a receiver that is worse than it says exaggerates the difference as much as the NIS of the better
+            let least = both[0].nis.min(both[1].nis).max(1.0);
+            let gain = (both[0].cost - both[1].cost) / least;
+            let decided = gain.abs() >= DECIDED;
+            if decided || begin_s + window_s >= end_s {
+                // forwards unless that is refuted
+                let better = usize::from(decided && gain > 0.0);
+                let [forwards, backwards] = starts;
+                return Candidate {
+                    start: if better == 0 { forwards } else { backwards },
+                    decided,
+                    agreements: [first[better], both[better]],
+                };
+            }
+            window_s *= 2.0;
+        }
+    }
+}
+
+impl Candidate {
+    fn doubts(&self) -> Vec<(VerdictKind, Finding)> {
+        let nis_per_component = self.agreements[0].nis;
+        let contradicted = Finding::Start { nis_per_component };
+        // a vehicle is level, more or less, at its start
+        let RollPitchYaw { roll, pitch, .. } = RollPitchYaw::from_quat(self.start.state.q_b_n);
+        let tilted = Finding::NotLevel {
+            roll_deg: roll / DEG,
+            pitch_deg: pitch / DEG,
+        };
+        [
+            (!self.agrees()).then_some((VerdictKind::Overconfident, contradicted)),
+            (!self.decided).then_some((VerdictKind::Doubtful, Finding::Direction)),
+            ((roll.cos() * pitch.cos()).acos() > UPRIGHT)
+                .then_some((VerdictKind::Doubtful, tilted)),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
     }
 }
 
@@ -356,17 +423,12 @@ impl Moving {
 
     /// Standard deviation of the vehicle's axis about the course (rad).
     fn heading_sigma(&self, imu: &[ImuIncrement]) -> f64 {
-        let sum =
-            |samples: &[ImuIncrement]| samples.iter().map(|s| s.dtheta).sum::<DVec3>().length();
-        let turned = sum(between(imu, self.fix.t_s - self.lag_s, self.fix.t_s));
+        let t_s = self.fix.t_s;
+        let turns = between(imu, t_s - self.lag_s, t_s).iter().map(|s| s.dtheta);
+        let turned = turns.sum::<DVec3>().length();
         // the angular rate over a second around the fix
-        let around = between(imu, self.fix.t_s - 0.5, self.fix.t_s + 0.5);
-        let seconds: f64 = around.iter().map(|s| s.dt_s).sum();
-        let rate = if seconds > 0.0 {
-            sum(around) / seconds
-        } else {
-            0.0
-        };
+        let (seconds, [_, omega]) = rates(between(imu, t_s - 0.5, t_s + 0.5));
+        let rate = if seconds > 0.0 { omega.length() } else { 0.0 };
         // the first fast fix is one whose error makes it fast: the vehicle moves more slowly than it says
         let speed = self.speed() - 1.5 * self.sigma();
         (self.sigma() / speed)
@@ -445,13 +507,11 @@ fn nearest_to_fast(courses: &[Moving]) -> Option<(f64, f64, f64)> {
 
 /// The mean velocity between two fixes; none where they are too far apart in time.
 fn derived(before: &GnssFix, fix: &GnssFix) -> Option<Moving> {
-    let (r, dt) = (radii(fix.lat.sin()), fix.t_s - before.t_s);
+    let dt = fix.t_s - before.t_s;
     if dt > BASELINE_S.1 {
         return None;
     }
-    let north = (fix.lat - before.lat) * (r.meridian + fix.h);
-    let east = wrap_angle(fix.lon - before.lon) * (r.transverse + fix.h) * fix.lat.cos();
-    let v_n = DVec3::new(north, east, before.h - fix.h) / dt;
+    let v_n = -ned_difference(fix.place(), before.place()) / dt;
     let lag_s = 0.5 * dt;
     let variance = (fix.pos_sigma_n.powf(2.0) + before.pos_sigma_n.powf(2.0)) / (dt * dt);
     let sigma_n = (variance + DVec3::splat((ACCELERATION * lag_s).powi(2))).powf(0.5);
@@ -480,22 +540,14 @@ const STILL: (f64, f64) = (0.5, 0.03);
 /// How many times the spread of the quietest window a static one may have: engines idle, roads shake more.
 const QUIET: f64 = 3.0;
 
-/// What levelling needs to know.
-struct Scene<'a> {
-    recorded: Recorded<'a>,
-    settings: &'a Settings,
-    bias: BiasSigma,
-    g: f64,
-}
-
 /// Roll and pitch at the first moving fix.
 #[derive(Clone, Copy)]
 struct Level {
-    roll: f64,
-    pitch: f64,
+    /// Without yaw.
+    angles: RollPitchYaw,
     /// Standard deviation of both (rad).
-    pub sigma: f64,
-    pub from: Levelling,
+    sigma: f64,
+    from: Levelling,
 }
 
 /// Statistics of a window in the vehicle's axes.
@@ -510,20 +562,12 @@ struct Window {
 }
 
 fn window(samples: &[ImuIncrement], q_s_b: DQuat) -> Window {
-    let seconds: f64 = samples.iter().map(|s| s.dt_s).sum();
-    let f = samples.iter().map(|s| s.dv).sum::<DVec3>() / seconds;
-    let omega = samples.iter().map(|s| s.dtheta).sum::<DVec3>() / seconds;
-    let n = samples.len() as f64;
-    let force = samples
-        .iter()
-        .map(|s| (s.dv / s.dt_s - f).length_squared())
-        .sum::<f64>();
-    let rate = samples
-        .iter()
-        .map(|s| (s.dtheta / s.dt_s - omega).length_squared())
-        .sum::<f64>();
+    let (seconds, [f, omega]) = rates(samples);
+    let spread = |of: fn(&ImuIncrement) -> DVec3, about: DVec3| {
+        mean(samples.iter().map(|s| (of(s) - about).length_squared())).sqrt()
+    };
+    let spread = (spread(force, f), spread(rate, omega));
     let end_s = samples.last().map_or(f64::NAN, |s| s.t_s);
-    let spread = ((force / n).sqrt(), (rate / n).sqrt());
     Window {
         end_s,
         seconds,
@@ -538,33 +582,13 @@ pub fn moves(imu: &[ImuIncrement]) -> bool {
     window(imu, DQuat::IDENTITY).spread.0 >= STILL.0
 }
 
-impl<'a> Scene<'a> {
-    /// About a fix.
-    fn new(
-        recorded: &Recorded<'a>,
-        settings: &'a Settings,
-        belief: &Belief,
-        fix: &GnssFix,
-    ) -> Self {
-        let sigma = |sensor| belief.initial_bias_sigma(sensor);
-        let bias = BiasSigma {
-            accel: sigma(Sensor::Accel),
-            gyro: sigma(Sensor::Gyro),
-        };
-        Self {
-            recorded: *recorded,
-            settings,
-            bias,
-            g: gravity_down(settings.gravity, fix.lat.sin(), fix.h),
-        }
-    }
-
+impl Scene<'_> {
     /// The tilt's standard deviation with the biases and a levelling of age `age_s` (rad).
     fn tilt_sigma(&self, age_s: f64, own: f64) -> f64 {
-        (self.bias.accel / self.g)
-            .hypot(self.bias.gyro * age_s)
+        (self.bias[0] / self.g)
+            .hypot(self.bias[1] * age_s)
             .hypot(own)
-            .hypot(0.3 * crate::units::DEG)
+            .hypot(0.3 * DEG)
     }
 
     /// Levelling in the static window that says most of the attitude at the fix, carried on by the gyroscopes.
@@ -605,8 +629,8 @@ impl<'a> Scene<'a> {
         // constant, as gravity and biases are; the spread's share is for vibrations, which average out slowly
         let constant = first.f.distance(second.f) < 0.1 + force / 4.0
             && first.omega.distance(second.omega) < 0.01 + rate / 4.0;
-        let gravity = (whole.f.length() - self.g).abs() < 0.5_f64.max(4.0 * self.bias.accel);
-        let turning = whole.omega.length() > STILL.1.max(4.0 * self.bias.gyro);
+        let gravity = (whole.f.length() - self.g).abs() < 0.5_f64.max(4.0 * self.bias[0]);
+        let turning = whole.omega.length() > STILL.1.max(4.0 * self.bias[1]);
         let calm =
             whole.seconds > 0.8 * length_s && force < STILL.0 && constant && gravity && !turning;
         calm.then_some(whole)
@@ -622,38 +646,26 @@ impl<'a> Scene<'a> {
                 .iter()
                 .filter(|m| (from..=departed).contains(&m.fix.t_s))
                 .collect();
-            slow(&seen)
-                .then(|| std::f64::consts::SQRT_2 * seen[0].sigma() / (w.seconds * self.g))?
+            slow(&seen).then(|| SQRT_2 * seen[0].sigma() / (w.seconds * self.g))?
         } else {
             // positions alone are slow to tell rest from acceleration: what the IMU gained on the way must be
             // the speed that GNSS then shows
             let agrees = (gained.truncate().length() - moving.speed()).abs() < 3.0 * moving.sigma();
             (stays(before, from, departed) && agrees).then(|| moving.sigma() / (age_s * self.g))?
         };
-        let now = RollPitchYaw::from_quat(q);
         let own = (w.spread.0 / self.g / 10.0).hypot(unseen);
-        let from = Levelling::AtRest(w.end_s);
         Some(Level {
-            roll: now.roll,
-            pitch: now.pitch,
+            angles: RollPitchYaw::from_quat(q),
             sigma: self.tilt_sigma(age_s, own),
-            from,
+            from: Levelling::AtRest(w.end_s),
         })
     }
 
     /// A levelling at rest carried on with the gyroscopes: the attitude from level axes whose first is the
     /// heading of the body then, and the velocity gained in them.
     fn carry(&self, w: &Window, to_s: f64) -> (DQuat, DVec3) {
-        let (roll, pitch) = level(w.f, DVec3::Z * -self.g);
-        let (mut q, mut gained) = (
-            RollPitchYaw {
-                roll,
-                pitch,
-                yaw: 0.0,
-            }
-            .to_quat(),
-            DVec3::ZERO,
-        );
+        let mut q = level(w.f, DVec3::Z * -self.g).to_quat();
+        let mut gained = DVec3::ZERO;
         for s in between(self.recorded.imu, w.end_s, to_s) {
             gained += q * (self.settings.q_s_b * s.dv) + DVec3::Z * self.g * s.dt_s;
             q = (q * DQuat::from_scaled_axis(self.settings.q_s_b * s.dtheta)).normalize();
@@ -678,17 +690,12 @@ impl<'a> Scene<'a> {
         }
         let dv = self.settings.q_s_b * carried(samples).1;
         let a_n = (to.v_n - from.v_n) / seconds;
-        let (roll, pitch) = level(
-            dv / seconds,
-            DQuat::from_rotation_z(-heading) * (a_n - DVec3::Z * self.g),
-        );
+        let f_h = DQuat::from_rotation_z(-heading) * (a_n - DVec3::Z * self.g);
         let velocities = from.sigma().hypot(to.sigma()) / (seconds * self.g);
         let own = velocities.hypot(heading_sigma * a_n.truncate().length() / self.g);
-        let sigma = self.tilt_sigma(0.5 * seconds, own);
         Some(Level {
-            roll,
-            pitch,
-            sigma,
+            angles: level(dv / seconds, f_h),
+            sigma: self.tilt_sigma(0.5 * seconds, own),
             from: Levelling::InMotion(seconds),
         })
     }
@@ -719,29 +726,27 @@ fn stays(fixes: &[Moving], from: f64, to: f64) -> bool {
     let Some((first, rest)) = within.split_first() else {
         return false;
     };
-    let r = radii(first.lat.sin());
     let near = |f: &&GnssFix| {
-        let north = (f.lat - first.lat) * (r.meridian + first.h);
-        let east = wrap_angle(f.lon - first.lon) * (r.transverse + first.h) * first.lat.cos();
-        let sigma = f
-            .pos_sigma_n
-            .truncate()
-            .length()
-            .hypot(first.pos_sigma_n.truncate().length());
-        north.hypot(east) < 0.5_f64.max(4.0 / std::f64::consts::SQRT_2 * sigma)
+        let apart = ned_difference(first.place(), f.place()).truncate();
+        let [sigma, sigma_of_first] = [f, first].map(|f| f.pos_sigma_n.truncate().length());
+        apart.length() < 0.5_f64.max(4.0 / SQRT_2 * sigma.hypot(sigma_of_first))
     };
     rest.len() >= 2 && rest.iter().all(near)
 }
 
 /// Roll and pitch that take a specific force in b to the same one in level axes of the right heading:
-/// f_h = R_y(pitch) R_x(roll) f_b, upright.
-fn level(f_b: DVec3, f_h: DVec3) -> (f64, f64) {
+/// f_h = R_y(pitch) R_x(roll) f_b, upright. Yaw is 0.
+fn level(f_b: DVec3, f_h: DVec3) -> RollPitchYaw {
     // After the roll, y is as it is in the level axes: ρ sin(delta − roll) = f_h.y with f_z < 0.
     let (rho, delta) = (f_b.y.hypot(f_b.z), f_b.y.atan2(f_b.z));
-    let roll = wrap_angle(delta - std::f64::consts::PI + (f_h.y / rho).clamp(-1.0, 1.0).asin());
+    let roll = wrap_angle(delta - PI + (f_h.y / rho).clamp(-1.0, 1.0).asin());
     let v = DQuat::from_rotation_x(roll) * f_b;
     let pitch = (v.z * f_h.x - v.x * f_h.z).atan2(v.x * f_h.x + v.z * f_h.z);
-    (roll, pitch)
+    RollPitchYaw {
+        roll,
+        pitch,
+        yaw: 0.0,
+    }
 }
 
 // Which of two starts the fixes that follow speak for: the filter is run from both, and its innovations tell.
@@ -761,160 +766,12 @@ struct Agreement {
     /// −2 ln(likelihood) of the innovations, up to a constant.
     cost: f64,
     /// Mean NIS per component, and of how many components.
-    pub nis: f64,
+    nis: f64,
     components: usize,
 }
 
 impl Agreement {
     fn holds(&self) -> bool {
         self.nis <= nis_bound(self.components)
-    }
-}
-
-/// What the trial of two opposite starts says.
-pub struct Trial {
-    /// The better one, 0 or 1, and whether the other is refuted.
-    better: usize,
-    decided: bool,
-    /// How well the better one agrees with the first minute, and with all that was tried.
-    agreements: [Agreement; 2],
-}
-
-/// The solution from a start as far as `to_s`, its rows those of the start and the end.
-fn until(
-    recorded: &Recorded<'_>,
-    belief: &Belief,
-    settings: &Settings,
-    start: &Start,
-    to_s: f64,
-) -> Option<Solution> {
-    fuse(&recorded.until(to_s), belief, start, settings, None).ok()
-}
-
-fn agreement(
-    recorded: &Recorded<'_>,
-    belief: &Belief,
-    settings: &Settings,
-    start: &Start,
-    to_s: f64,
-) -> Agreement {
-    let failed = Agreement {
-        cost: f64::INFINITY,
-        nis: f64::INFINITY,
-        components: 0,
-    };
-    let Some(solution) = until(recorded, belief, &settings.trial(), start, to_s) else {
-        return failed;
-    };
-    let mut sum = Agreement {
-        cost: 0.0,
-        nis: 0.0,
-        components: 0,
-    };
-    for fix in solution.fixes.iter().filter(|f| f.used) {
-        // the sum of the logarithms stands for the determinant: the correlations of both starts are alike
-        sum.cost += fix.nis + 2.0 * fix.sigma.iter().map(|s| s.ln()).sum::<f64>();
-        sum.nis += fix.nis;
-        sum.components += fix.innovation.len();
-    }
-    sum.nis = if sum.components > 0 {
-        sum.nis / sum.components as f64
-    } else {
-        0.0
-    };
-    sum
-}
-
-/// Runs the filter from both starts over the first minute, and longer while that does not tell them apart.
-fn opposite(
-    recorded: &Recorded<'_>,
-    belief: &Belief,
-    settings: &Settings,
-    starts: [&Start; 2],
-) -> Trial {
-    let begin_s = starts[0].t_s;
-    let end_s = recorded.gnss.last().map_or(begin_s, |f| f.t_s);
-    let mut window_s = TRIAL_S;
-    let mut first: Option<[Agreement; 2]> = None;
-    loop {
-        let to_s = begin_s + window_s;
-        let both = starts.map(|start| agreement(recorded, belief, settings, start, to_s));
-        let first = *first.get_or_insert(both);
-        // a receiver that is worse than it says exaggerates the difference as much as the NIS of the better
-        let least = both[0].nis.min(both[1].nis).max(1.0);
-        let gain = (both[0].cost - both[1].cost) / least;
-        let decided = gain.abs() >= DECIDED;
-        if decided || to_s >= end_s {
-            // forwards unless that is refuted
-            let better = usize::from(decided && gain > 0.0);
-            return Trial {
-                better,
-                decided,
-                agreements: [first[better], both[better]],
-            };
-        }
-        window_s *= 2.0;
-    }
-}
-
-/// Runs the filter from a start that has no other beside it, over the first minute.
-fn alone(recorded: &Recorded<'_>, belief: &Belief, settings: &Settings, start: &Start) -> Trial {
-    let agreement = agreement(recorded, belief, settings, start, start.t_s + TRIAL_S);
-    Trial {
-        better: 0,
-        decided: true,
-        agreements: [agreement; 2],
-    }
-}
-
-/// Widens the standard deviation of a heading that is not the course: wind sets an aircraft off, currents a boat. The
-/// smoother, from all fixes of the first minute, says how far.
-fn widen(recorded: &Recorded<'_>, belief: &Belief, settings: &Settings, start: &mut Start) {
-    let settings = Settings {
-        smooth: true,
-        ..settings.trial()
-    };
-    let solution = until(recorded, belief, &settings, start, start.t_s + TRIAL_S);
-    let Some([first, ..]) = solution.as_ref().and_then(|s| s.smoothed.as_deref()) else {
-        return;
-    };
-    let [course, heading] =
-        [start.state.q_b_n, first.state.q_b_n].map(|q| RollPitchYaw::from_quat(q).yaw);
-    let moved_deg = wrap_angle(heading - course) / DEG;
-    let sigma_deg = &mut start.sigma.att_sigma_deg[2];
-    if moved_deg.abs() > MOVED * *sigma_deg {
-        *sigma_deg = sigma_deg.hypot(moved_deg).min(WIDEST_DEG);
-        start
-            .found
-            .iter_mut()
-            .for_each(|found| found.moved_deg = Some(moved_deg));
-    }
-}
-
-#[cfg(test)]
-mod levelling_tests {
-    use super::*;
-
-    /// The two angles that made the specific force come out again, at rest and while turning and braking.
-    #[test]
-    fn levelling_inverts_the_attitude() {
-        for (roll, pitch) in [(0.0, 0.0), (0.3, -0.4), (-1.0, 0.7)] {
-            for a_h in [DVec3::ZERO, DVec3::new(2.0, -3.0, 0.5)] {
-                let f_h = a_h - DVec3::Z * 9.81;
-                let f_b = RollPitchYaw {
-                    roll,
-                    pitch,
-                    yaw: 0.0,
-                }
-                .to_quat()
-                .inverse()
-                    * f_h;
-                let (r, p) = level(f_b, f_h);
-                assert!(
-                    (r - roll).abs() < 1e-12 && (p - pitch).abs() < 1e-12,
-                    "{roll} {pitch}: {r} {p}"
-                );
-            }
-        }
     }
 }

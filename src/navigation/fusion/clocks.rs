@@ -9,6 +9,7 @@ use crate::ekf::Belief;
 use crate::frames::wrap_angle;
 use crate::gnss::GnssFix;
 use crate::imu::ImuIncrement;
+use crate::linalg::{by_value, mean};
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -71,7 +72,7 @@ fn agreement(recorded: &Recorded<'_>) -> Option<[f64; 3]> {
     let steps = (LONGEST_S / STEP_S) as i32;
     let lags = (-steps..=steps).map(|k| f64::from(k) * STEP_S);
     let tried = lags.filter_map(|lag_s| Some((lag_s, correlation(&turns, &turned, lag_s)?)));
-    let (lag_s, best) = tried.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (lag_s, best) = tried.max_by(by_value)?;
     let now = correlation(&turns, &turned, 0.0)?;
     (best >= SAME).then_some([lag_s, best, now])
 }
@@ -118,20 +119,13 @@ fn correlation(turns: &[Turn], turned: &Turned, lag_s: f64) -> Option<f64> {
     if pairs.len() < FEWEST.max(turns.len() / 2) {
         return None;
     }
-    let count = pairs.len() as f64;
-    let mean_x = pairs.iter().map(|p| p.0).sum::<f64>() / count;
-    let mean_y = pairs.iter().map(|p| p.1).sum::<f64>() / count;
-    let product = |f: &dyn Fn(f64, f64) -> f64| {
-        pairs
-            .iter()
-            .map(|(x, y)| f(x - mean_x, y - mean_y))
-            .sum::<f64>()
+    let mean_x = mean(pairs.iter().map(|p| p.0));
+    let mean_y = mean(pairs.iter().map(|p| p.1));
+    let products = |[xx, yy, xy]: [f64; 3], (x, y): &(f64, f64)| {
+        let (x, y) = (x - mean_x, y - mean_y);
+        [xx + x * x, yy + y * y, xy + x * y]
     };
-    let (xx, yy, xy) = (
-        product(&|x, _| x * x),
-        product(&|_, y| y * y),
-        product(&|x, y| x * y),
-    );
+    let [xx, yy, xy] = pairs.iter().fold([0.0; 3], products);
     Some(xy / (xx * yy).sqrt()).filter(|r| r.is_finite())
 }
 

@@ -6,6 +6,7 @@
 //! here). What was found is a cause only if the NIS of the filter, run with it, is smaller: an explanation is tested by
 //! taking the cause away.
 
+use super::outcome::total_nis;
 use super::{FixRecord, FusionError, Recorded, Settings, Solution, Start, earlier, fuse};
 use crate::ekf::Belief;
 use crate::gnss::GnssFix;
@@ -59,25 +60,27 @@ pub fn displaced(
         start,
         settings,
     };
-    let now = scene.innovations(&Vector4::zeros())?;
-    let (mut x, mut normal) = (Vector4::zeros(), scene.normal(&Vector4::zeros(), &now)?);
-    let mut best = scene.step(&mut x, &normal)?;
-    for _ in 1..STEPS.0 {
-        let before = best.nis();
-        normal = scene.normal(&x, &best)?;
-        best = scene.step(&mut x, &normal)?;
-        if best.nis() > (1.0 - STEPS.1) * before {
-            break;
+    let (mut x, mut steps) = (Vector4::zeros(), 0);
+    let mut best = scene.innovations(&x)?;
+    let now = nis(&best);
+    let normal = loop {
+        let before = nis(&best);
+        let normal = scene.normal(&x, &best)?;
+        x += normal.inverse * normal.gradient;
+        best = scene.innovations(&x)?;
+        steps += 1;
+        if steps == STEPS.0 || steps > 1 && nis(&best) > (1.0 - STEPS.1) * before {
+            break normal;
         }
-    }
-    let scale = best.scale();
+    };
+    let scale = scale(&best);
     let kept = normal.needed(&x, scale)?;
     let (x, covariance) = normal.without_the_rest(&x, &kept)?;
     // either would do where both are kept for want of one that is needed by itself
     if normal.cost(&x, 0..4)? < COSTLY * scale {
         return None;
     }
-    let nis = [now.nis(), scene.innovations(&x)?.nis()];
+    let nis = [now, nis(&scene.innovations(&x)?)];
     let antenna_b = DVec3::new(x[0], x[1], x[2]);
     let is_cause = nis[1] < LEFT * nis[0];
     if !is_cause || antenna_b.length() > FARTHEST.0 || x[3].abs() > FARTHEST.1 {
@@ -105,8 +108,8 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// The innovations with the antenna and the delay off by `x`.
-    fn innovations(&self, x: &Vector4<f64>) -> Option<Innovations> {
+    /// The innovations of each fix that is used, with the antenna and the delay off by `x`.
+    fn innovations(&self, x: &Vector4<f64>) -> Option<Vec<Option<FixRecord>>> {
         let gnss = earlier(self.recorded.gnss, x[3]);
         let settings = Settings {
             lever_arm_b: self.settings.lever_arm_b + DVec3::new(x[0], x[1], x[2]),
@@ -116,35 +119,23 @@ impl Scene<'_> {
         let solution = fuse(&recorded, self.belief, self.start, &settings, None).ok()?;
         let first = gnss.partition_point(|f| f.t_s <= self.start.t_s);
         let mut of_fix = vec![None; gnss.len()];
-        for (k, fix) in solution
-            .fixes
-            .into_iter()
-            .enumerate()
-            .filter(|(_, f)| f.used)
-        {
-            of_fix[first + k] = Some(fix);
+        for (fix, record) in of_fix[first..].iter_mut().zip(solution.fixes) {
+            *fix = Some(record).filter(|record| record.used);
         }
-        Some(Innovations { of_fix })
-    }
-
-    /// Takes a Gauss-Newton step; returns the innovations where it leads.
-    fn step(&self, x: &mut Vector4<f64>, normal: &Normal) -> Option<Innovations> {
-        *x += normal.inverse * normal.gradient;
-        self.innovations(x)
+        Some(of_fix)
     }
 
     /// The normal equations about `x`, where the innovations are `there`.
-    fn normal(&self, x: &Vector4<f64>, there: &Innovations) -> Option<Normal> {
+    fn normal(&self, x: &Vector4<f64>, there: &[Option<FixRecord>]) -> Option<Normal> {
         let off = |k: usize| self.innovations(&(x + Vector4::ith(k, OFF[k])));
         let aside = (0..4)
             .into_par_iter()
             .map(off)
             .collect::<Option<Vec<_>>>()?;
         let (mut information, mut gradient) = (Matrix4::zeros(), Vector4::zeros());
-        for (i, fix) in there.of_fix.iter().enumerate() {
+        for (i, fix) in there.iter().enumerate() {
             let Some(fix) = fix else { continue };
-            let moved: Option<Vec<&FixRecord>> =
-                aside.iter().map(|a| a.of_fix[i].as_ref()).collect();
+            let moved: Option<Vec<&FixRecord>> = aside.iter().map(|a| a[i].as_ref()).collect();
             let Some(moved) = moved else { continue };
             for (c, (z, sigma)) in fix.innovation.iter().zip(&fix.sigma).enumerate() {
                 let slope =
@@ -160,27 +151,17 @@ impl Scene<'_> {
     }
 }
 
-/// What the filter made of each fix of the recording that it used.
-struct Innovations {
-    of_fix: Vec<Option<FixRecord>>,
+/// Mean NIS per component.
+fn nis(innovations: &[Option<FixRecord>]) -> f64 {
+    let (nis, components) = total_nis(innovations.iter().flatten());
+    nis / components.max(1) as f64
 }
 
-impl Innovations {
-    /// Mean NIS per component.
-    fn nis(&self) -> f64 {
-        let used = || self.of_fix.iter().flatten();
-        used().map(|f| f.nis).sum::<f64>()
-            / used().map(|f| f.innovation.len()).sum::<usize>().max(1) as f64
-    }
-}
-
-impl Innovations {
-    /// How many times a gain of independent innovations of NIS 1: errors that are larger, and errors that last, make any
-    /// gain as much larger (the sum of the autocorrelations of ρᵏ is (1 + ρ)/(1 − ρ)).
-    fn scale(&self) -> f64 {
-        let lag_1 = Whiteness::of(self.of_fix.iter().flatten()).map_or(0.0, |w| w.lag_1);
-        self.nis() * sigma_factor(lag_1).powi(2)
-    }
+/// How many times a gain of independent innovations of NIS 1: errors that are larger, and errors that last, make any
+/// gain as much larger (the sum of the autocorrelations of ρᵏ is (1 + ρ)/(1 − ρ)).
+fn scale(innovations: &[Option<FixRecord>]) -> f64 {
+    let lag_1 = Whiteness::of(innovations.iter().flatten()).map_or(0.0, |w| w.lag_1);
+    nis(innovations) * sigma_factor(lag_1).powi(2)
 }
 
 /// Least squares: the inverse of the information about the four, and the gradient.
@@ -255,7 +236,7 @@ const LARGEST: f64 = 0.998;
 const APART: f64 = 1.5;
 
 /// How long the errors of a receiver's positions last.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Correlation {
     /// As the innovations show.
@@ -268,7 +249,7 @@ pub enum Correlation {
 }
 
 /// Autocorrelation of normalised innovations (of a fix, those of position) from one to the next.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize)]
 pub struct Whiteness {
     /// Autocorrelation at lag 1: 0 if right.
     pub lag_1: f64,
@@ -313,7 +294,7 @@ impl Whiteness {
 }
 
 /// A solution and the fixes that it believes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Weighed {
     /// What came out.
     pub solution: Solution,
@@ -355,27 +336,23 @@ pub fn fuse_correlated(
             interval_s(recorded.gnss).map(|step_s| (-step_s / seconds).exp())
         }
     };
-    let Some(lag_1) = lag_1 else {
-        let gnss = recorded.gnss.to_vec();
-        return Ok(Weighed {
-            solution: stated,
-            as_stated: None,
-            whiteness,
-            pos_sigma_factor: 1.0,
-            gnss,
-        });
-    };
-    let pos_sigma_factor = sigma_factor(lag_1);
+    let pos_sigma_factor = lag_1.map_or(1.0, sigma_factor);
     let gnss: Vec<GnssFix> = recorded
         .gnss
         .iter()
         .map(|f| f.with_sigmas_times(pos_sigma_factor, 1.0))
         .collect();
     let recorded = recorded.with_gnss(&gnss);
-    let solution = fuse(&recorded, belief, start, settings, reference)?;
+    let (solution, as_stated) = match lag_1 {
+        None => (stated, None),
+        Some(_) => (
+            fuse(&recorded, belief, start, settings, reference)?,
+            Some(stated),
+        ),
+    };
     Ok(Weighed {
         solution,
-        as_stated: Some(stated),
+        as_stated,
         whiteness,
         pos_sigma_factor,
         gnss,

@@ -93,11 +93,8 @@ pub struct Recorded<'a> {
 
 impl<'a> Recorded<'a> {
     /// The same with other fixes.
-    fn with_gnss<'b>(self, gnss: &'b [GnssFix]) -> Recorded<'b>
-    where
-        'a: 'b,
-    {
-        Recorded { gnss, ..self }
+    const fn with_gnss(self, gnss: &'a [GnssFix]) -> Self {
+        Self { gnss, ..self }
     }
 
     /// Samples and fixes up to a time (s).
@@ -122,13 +119,18 @@ impl Settings {
 
     /// The fixes that are not withheld.
     fn kept(&self, gnss: &[GnssFix]) -> Vec<GnssFix> {
-        let is_kept = |f: &&GnssFix| !self.outages.iter().any(|o| o.withholds(f.t_s));
-        gnss.iter().filter(is_kept).copied().collect()
+        kept(gnss, &self.outages)
     }
 }
 
+/// The fixes that no outage withholds.
+fn kept(gnss: &[GnssFix], outages: &[Outage]) -> Vec<GnssFix> {
+    let is_kept = |fix: &&GnssFix| !Outage::any_withholds(outages, fix.t_s);
+    gnss.iter().filter(is_kept).copied().collect()
+}
+
 /// How it is fused.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Settings {
     /// The IMU in the vehicle: takes the IMU's axes, returns front, right, down.
     #[serde(rename = "imu_to_vehicle_xyzw")]
@@ -150,7 +152,7 @@ pub struct Settings {
 }
 
 /// Where the filter starts.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Start {
     /// When (s).
     pub t_s: f64,
@@ -174,7 +176,7 @@ pub struct Heading {
 }
 
 /// How [`alignment::coarse`] found a start.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Found {
     /// Where roll and pitch come from.
     pub level: Levelling,
@@ -190,7 +192,7 @@ pub struct Found {
 }
 
 /// Source of roll and pitch.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Levelling {
     /// Gravity at rest until a time (s), carried on by the gyroscopes.
     AtRest(f64),

@@ -21,7 +21,7 @@ use std::fmt::Display;
 const DETERMINED: f64 = 5.0 * DEG;
 
 /// A mounting that was found.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Mounting {
     /// Takes the IMU's axes, returns front, right, down.
     pub q_s_b: DQuat,
@@ -60,7 +60,23 @@ pub fn find(
     let gnss = settings.kept(recorded.gnss);
     let recorded = recorded.with_gnss(&gnss);
     let rough = along(&recorded, settings)?;
-    let found = refined(&recorded, settings, belief, &rough)?;
+    // with standard deviations as stated, or where the fixes contradict those, with what makes their NIS 1
+    let (mut widened, mut factor) = (gnss.clone(), 1.0);
+    let found = loop {
+        match through(&recorded.with_gnss(&widened), settings, belief, rough)? {
+            Ok(found) => break found,
+            Err(nis) if nis > 1.0 && factor * nis.sqrt() <= MOST_WIDENED => {
+                factor *= nis.sqrt();
+                let fixes = gnss.iter();
+                let fixes = fixes.map(|fix| fix.with_sigmas_times(factor, factor));
+                widened = fixes.collect();
+            }
+            Err(nis) => {
+                let why = "the fixes contradict the filter, NIS";
+                return Err(not_found(format!("{why} {nis:.1} per component")));
+            }
+        }
+    };
     let named = ["roll", "pitch", "yaw"]
         .into_iter()
         .zip(found.sigma_b.to_array());
@@ -71,7 +87,10 @@ pub fn find(
     if let Some((axis, sigma)) = worst {
         return Err(undetermined(axis, sigma, DETERMINED));
     }
-    Ok(found)
+    Ok(Mounting {
+        sigma_factor: factor,
+        ..found
+    })
 }
 
 fn not_found(why: impl Display) -> Refused {
@@ -96,38 +115,6 @@ fn too_slow(seconds: f64) -> Refused {
 
 /// Most that the standard deviations of fixes are widened by: what contradicts more is not the receiver's word.
 const MOST_WIDENED: f64 = 5.0;
-
-/// Refined with standard deviations as stated, or where the fixes contradict those, with what makes their NIS 1.
-fn refined(
-    recorded: &Recorded<'_>,
-    settings: &Settings,
-    belief: &Belief,
-    rough: &Rough,
-) -> Result<Mounting, Refused> {
-    let (mut gnss, mut factor) = (recorded.gnss.to_vec(), 1.0);
-    loop {
-        match through(&recorded.with_gnss(&gnss), settings, belief, rough)? {
-            Err(nis) if nis > 1.0 && factor * nis.sqrt() <= MOST_WIDENED => {
-                factor *= nis.sqrt();
-                gnss = recorded
-                    .gnss
-                    .iter()
-                    .map(|fix| fix.with_sigmas_times(factor, factor))
-                    .collect();
-            }
-            found => {
-                let found = found.map_err(|nis| {
-                    let why = "the fixes contradict the filter, NIS";
-                    not_found(format!("{why} {nis:.1} per component"))
-                })?;
-                return Ok(Mounting {
-                    sigma_factor: factor,
-                    ..found
-                });
-            }
-        }
-    }
-}
 
 // Weighted means of what is correlated in time, and their standard deviations.
 
@@ -233,12 +220,12 @@ fn through(
     recorded: &Recorded<'_>,
     settings: &Settings,
     belief: &Belief,
-    rough: &Rough,
+    rough: (DQuat, f64),
 ) -> Result<Result<Mounting, f64>, Refused> {
     let named = settings.q_s_b.inverse();
-    let loose = DVec3::Z * (LOOSE * rough.yaw_sigma);
+    let loose = DVec3::Z * (LOOSE * rough.1);
     let settings = Settings {
-        q_s_b: rough.q_s_b,
+        q_s_b: rough.0,
         mounting_sigma_b: loose,
         rows_hz: ROWS_HZ,
         ..settings.clone()
@@ -273,8 +260,8 @@ fn through(
     // drive shows.
     let scatter = DVec3::from_array(blocks.each_ref().map(Blocks::sigma));
     let sigma_b = (scatter.powf(2.0) + of_filter(&moments).powf(2.0) + UNSEEN.powf(2.0)).powf(0.5);
-    agreeing(mean, rough.yaw_sigma.hypot(sigma_b.z))?;
-    let q_s_b = (mean * rough.q_s_b).normalize();
+    agreeing(mean, rough.1.hypot(sigma_b.z))?;
+    let q_s_b = (mean * rough.0).normalize();
     Ok(Ok(Mounting {
         q_s_b,
         angles: RollPitchYaw::from_quat(q_s_b * named),
@@ -408,14 +395,6 @@ const SLOPE: f64 = 3.0 * DEG;
 /// Largest standard deviation of the yaw that the filter can begin with (rad).
 const ROUGH: f64 = 20.0 * DEG;
 
-/// A mounting, how well its yaw is known, and why.
-#[derive(Debug, Clone, Copy)]
-pub struct Rough {
-    q_s_b: DQuat,
-    /// Standard deviation of the yaw (rad).
-    yaw_sigma: f64,
-}
-
 /// A stretch between two velocities.
 struct Stretch {
     t_s: f64,
@@ -434,8 +413,8 @@ fn track_attitude(v_n: DVec3, sigma_down: f64) -> DQuat {
     DQuat::from_rotation_z(v_n.y.atan2(v_n.x)) * DQuat::from_rotation_y(slope * believed)
 }
 
-/// The rotation from the IMU to the track.
-fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<Rough, Refused> {
+/// The rotation from the IMU to the track, and the standard deviation of its yaw (rad).
+fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), Refused> {
     let stretches = stretches(recorded, settings);
     let mut seen = Blocks::default();
     stretches.iter().for_each(|s| seen.add(s.t_s, 0.0, 1.0));
@@ -457,52 +436,32 @@ fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<Rough, Refused>
     let up = mean_track.normalize();
     // less their means, so that neither a bias of the accelerometers nor a tilt counts as acceleration
     let pair = |s: &Stretch| (level * (s.f_s - mean_s), s.f_track - mean_track);
-    let (mut sine, mut cosine) = (0.0, 0.0);
+    // Wahba's problem about one axis: both vectors projected across `up`, sums of their sine and cosine.
+    let torque = |u: DVec3, w: DVec3| up.dot(u.cross(w));
+    let held = |u: DVec3, w: DVec3| u.dot(w) - up.dot(u) * up.dot(w);
+    let sum = |turn: DQuat, of: &dyn Fn(DVec3, DVec3) -> f64| -> f64 {
+        let terms = stretches.iter().map(|s| {
+            let (u, w) = pair(s);
+            s.weight * of(turn * u, w)
+        });
+        terms.fold(0.0, |a, b| a + b)
+    };
+    let none = DQuat::IDENTITY;
+    let turn = DQuat::from_axis_angle(up, sum(none, &torque).atan2(sum(none, &held)));
+    let mut torques = Blocks::default();
     for s in &stretches {
         let (u, w) = pair(s);
-        // Wahba's problem about one axis: both vectors projected across `up`, sums of their sine and cosine.
-        sine += s.weight * up.dot(u.cross(w));
-        cosine += s.weight * (u.dot(w) - up.dot(u) * up.dot(w));
+        torques.add(s.t_s, torque(turn * u, w), s.weight);
     }
-    let turn = DQuat::from_axis_angle(up, sine.atan2(cosine));
-    let yaw_sigma = turn_sigma(
-        &stretches,
-        |s| {
-            let (u, w) = pair(s);
-            (turn * u, w)
-        },
-        up,
-    );
+    // A sandwich: the deviation of the sum of the torques of what the turn leaves (σ of the weighted mean times the
+    // weights) over the slope of that sum with the turn, which is that of the products that hold it.
+    let yaw_sigma = torques.sigma() * weights / sum(turn, &held).max(0.0);
     if yaw_sigma <= ROUGH {
-        Ok(Rough {
-            q_s_b: (turn * level).normalize(),
-            yaw_sigma,
-        })
+        Ok(((turn * level).normalize(), yaw_sigma))
     } else {
         // NaN is not less than half a turn
         Err(undetermined("yaw", yaw_sigma.min(PI), ROUGH))
     }
-}
-
-/// Standard deviation of the turn about `up` (rad): of the sum of the torques of what it leaves, over that of the
-/// products that hold it.
-fn turn_sigma(
-    stretches: &[Stretch],
-    turned: impl Fn(&Stretch) -> (DVec3, DVec3),
-    up: DVec3,
-) -> f64 {
-    let mut torques = Blocks::default();
-    let mut stiffness = 0.0;
-    for s in stretches {
-        let (u, w) = turned(s);
-        let held = u.dot(w) - up.dot(u) * up.dot(w);
-        torques.add(s.t_s, up.dot(u.cross(w)), s.weight);
-        stiffness += s.weight * held;
-    }
-    let weights: f64 = stretches.iter().map(|s| s.weight).sum();
-    // A sandwich: the deviation of the sum of the torques (σ of the weighted mean times the weights) over the
-    // slope of that sum with the turn.
-    torques.sigma() * weights / stiffness.max(0.0)
 }
 
 /// The stretches between fixes that have a course.

@@ -1,7 +1,7 @@
 //! Figures of a fusion: fixes used, consistency, errors at the ends of outages. They serialize as `summary.json` has them.
 
 use super::{AidInnovations, FixRecord, Nine, Row, RowError, Solution, Weighed, aid_innovations};
-use crate::linalg::median;
+use crate::linalg::{by_value, mean, median};
 use crate::metrics::{PerState, VerdictKind};
 use crate::sensors::outage::Outage;
 use crate::simulation::REPORTED_NAMES;
@@ -47,7 +47,7 @@ pub struct Ends {
 }
 
 /// Fixes by what became of them.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FixCounts {
     /// Used.
     pub used: usize,
@@ -56,7 +56,7 @@ pub struct FixCounts {
 }
 
 /// Figures of a solution.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
     /// Fixes.
     pub fixes: FixCounts,
@@ -92,7 +92,7 @@ pub struct FromReference {
 }
 
 /// Figures of a smoothed solution beside the filter's.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SmoothedOutcome {
     /// Root mean square of the smoothed horizontal standard deviation (m).
     pub horizontal_sigma_rms_m: f64,
@@ -167,16 +167,20 @@ fn ends(solution: &Solution) -> Option<Ends> {
 
 /// Mean NIS of the fixes used, divided by their number of components.
 pub(super) fn nis_per_component(solution: &Solution) -> f64 {
-    let components: usize = used(solution).map(|f| f.innovation.len()).sum();
-    used(solution).map(|f| f.nis).sum::<f64>() / components as f64
+    let (nis, components) = total_nis(used(solution));
+    nis / components as f64
+}
+
+/// Sum of the NIS of fixes, and of how many components.
+pub(super) fn total_nis<'a>(fixes: impl Iterator<Item = &'a FixRecord>) -> (f64, usize) {
+    fixes.fold((0.0, 0), |(nis, components), fix| {
+        (nis + fix.nis, components + fix.innovation.len())
+    })
 }
 
 fn from_reference(rows: &[Row]) -> Option<FromReference> {
     let errors: Vec<RowError> = rows.iter().filter_map(|row| row.error).collect();
-    let n = errors.len() as f64;
-    let rms = |of: &dyn Fn(&RowError) -> f64| {
-        (errors.iter().map(|e| of(e).powi(2)).sum::<f64>() / n).sqrt()
-    };
+    let rms = |of: &dyn Fn(&RowError) -> f64| mean(errors.iter().map(|e| of(e).powi(2))).sqrt();
     let per_state =
         |of: &dyn Fn(&RowError, usize) -> f64| std::array::from_fn(|i| rms(&|e| of(e, i)));
     let rmse: Nine = per_state(&|e, i| e.values[i]);
@@ -190,7 +194,7 @@ fn from_reference(rows: &[Row]) -> Option<FromReference> {
         error_over_sigma: PerState(per_state(&|e, i| {
             e.values[i] / e.sigma[i].max(f64::MIN_POSITIVE)
         })),
-        nees_mean: errors.iter().map(|e| e.nees).sum::<f64>() / n,
+        nees_mean: mean(errors.iter().map(|e| e.nees)),
         nees_dof: rmse.len(),
         velocity_sigma_m_s: rms(&|e| e.velocity_sigma),
     })
@@ -202,12 +206,8 @@ fn horizontal(values: &Nine) -> f64 {
 
 fn smoothed(filtered: &[Row], smoothed: &[Row], outages: &[Outage]) -> SmoothedOutcome {
     let sigma_rms = |rows: &[Row]| {
-        (rows
-            .iter()
-            .map(|row| horizontal(&row.sigma).powi(2))
-            .sum::<f64>()
-            / rows.len() as f64)
-            .sqrt()
+        let squares = rows.iter().map(|row| horizontal(&row.sigma).powi(2));
+        mean(squares).sqrt()
     };
     let of_outage = |outage: &Outage| {
         let [
@@ -353,7 +353,7 @@ pub enum Finding {
 }
 
 /// VerdictKind and evidence.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Assessment {
     /// The gravest of the findings.
     pub verdict: VerdictKind,
@@ -379,14 +379,13 @@ impl FromReference {
     pub fn confidence(&self) -> Confidence {
         let all = (self.nees_mean / self.nees_dof as f64).sqrt();
         let states = || REPORTED_NAMES.into_iter().zip(self.error_over_sigma.0);
-        let by_size = |a: &(&str, f64), b: &(&str, f64)| a.1.total_cmp(&b.1);
-        let largest = states().max_by(by_size).unwrap_or_default();
+        let largest = states().max_by(by_value).unwrap_or_default();
         let (verdict, worst) = if all > ALL_STATES.1 || largest.1 > ONE_STATE {
             (VerdictKind::Overconfident, largest)
         } else if all < ALL_STATES.0 && largest.1 < 1.0 {
             (
                 VerdictKind::Underconfident,
-                states().min_by(by_size).unwrap_or_default(),
+                states().min_by(by_value).unwrap_or_default(),
             )
         } else {
             (VerdictKind::Consistent, largest)
@@ -461,27 +460,24 @@ fn correlated(weighed: &Weighed) -> Option<(VerdictKind, Finding)> {
         .filter(super::Whiteness::is_correlated)?
         .lag_1;
     let pos_sigma_factor = weighed.pos_sigma_factor;
-    let verdict = if pos_sigma_factor > 1.0 {
-        VerdictKind::Undecided
-    } else {
-        VerdictKind::Doubtful
+    let verdict = match pos_sigma_factor > 1.0 {
+        true => VerdictKind::Undecided,
+        false => VerdictKind::Doubtful,
     };
-    Some((
-        verdict,
-        Finding::Correlated {
-            lag_1,
-            pos_sigma_factor,
-        },
-    ))
+    let found = Finding::Correlated {
+        lag_1,
+        pos_sigma_factor,
+    };
+    Some((verdict, found))
 }
 
-fn used(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
+pub(super) fn used(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
     solution.fixes.iter().filter(|f| f.used)
 }
 
 fn nis(solution: &Solution) -> (VerdictKind, Finding) {
-    let components: usize = used(solution).map(|f| f.innovation.len()).sum();
-    let per_component = nis_per_component(solution);
+    let (nis, components) = total_nis(used(solution));
+    let per_component = nis / components as f64;
     let verdict = match per_component {
         _ if components == 0 => return (VerdictKind::Doubtful, Finding::NoFix),
         nis if nis > nis_bound(components) => VerdictKind::Overconfident,
@@ -498,21 +494,14 @@ fn aids(solution: &Solution) -> impl Iterator<Item = (VerdictKind, Finding)> {
     aid_innovations(&solution.aids)
         .into_iter()
         .filter(is_far)
-        .map(
-            |AidInnovations {
-                 aid,
-                 nis_per_component,
-                 ..
-             }| {
-                (
-                    VerdictKind::Doubtful,
-                    Finding::Aid {
-                        aid,
-                        nis_per_component,
-                    },
-                )
-            },
-        )
+        .map(|w| {
+            let (aid, nis_per_component) = (w.aid, w.nis_per_component);
+            let found = Finding::Aid {
+                aid,
+                nis_per_component,
+            };
+            (VerdictKind::Doubtful, found)
+        })
 }
 
 /// Minutes in which most fixes are far from what is stated. The farthest tenth of them is left out: single
@@ -531,32 +520,24 @@ fn stretches(solution: &Solution) -> Option<(VerdictKind, Finding)> {
         .enumerate()
         .filter_map(|(k, fixes)| Some((k, far(fixes)?)))
         .collect();
-    let (worst, nis_per_component) = *bad.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let is_much = bad.len() as f64 > BAD_STRETCHES * of as f64;
-    let verdict = if is_much {
-        VerdictKind::Overconfident
-    } else {
-        VerdictKind::Doubtful
+    let (worst, nis_per_component) = *bad.iter().max_by(|a, b| by_value(a, b))?;
+    let minutes = Finding::Minutes {
+        bad: bad.len(),
+        of,
+        worst_s: begin_s + STRETCH_S * worst as f64,
+        nis_per_component,
     };
-    let worst_s = begin_s + STRETCH_S * worst as f64;
-    Some((
-        verdict,
-        Finding::Minutes {
-            bad: bad.len(),
-            of,
-            worst_s,
-            nis_per_component,
-        },
-    ))
+    let is_much = bad.len() as f64 > BAD_STRETCHES * of as f64;
+    Some((too_large(is_much), minutes))
 }
 
 /// Mean NIS per component of the nearest nine tenths of these fixes, where it is too large.
 fn far(fixes: &[&FixRecord]) -> Option<f64> {
-    let mut sorted: Vec<(f64, usize)> = fixes.iter().map(|f| (f.nis, f.innovation.len())).collect();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let kept = &sorted[..sorted.len() * 9 / 10];
-    let components: usize = kept.iter().map(|(_, n)| n).sum();
-    let nis = kept.iter().map(|(nis, _)| nis).sum::<f64>() / components.max(1) as f64;
+    let mut sorted = fixes.to_vec();
+    sorted.sort_by(|a, b| a.nis.total_cmp(&b.nis));
+    let kept = sorted[..sorted.len() * 9 / 10].iter().copied();
+    let (nis, components) = total_nis(kept);
+    let nis = nis / components.max(1) as f64;
     (components > 0 && nis > nis_bound(components)).then_some(nis)
 }
 
@@ -564,18 +545,21 @@ fn far(fixes: &[&FixRecord]) -> Option<f64> {
 fn ends_finding(outcome: &Outcome) -> Option<(VerdictKind, Finding)> {
     let ends = outcome.ends.filter(|ends| ends.p_value < ENDS.0)?;
     let is_much = ends.error_over_sigma > ENDS.1;
-    let verdict = if is_much {
-        VerdictKind::Overconfident
-    } else {
-        VerdictKind::Doubtful
-    };
-    Some((verdict, Finding::Ends(ends)))
+    Some((too_large(is_much), Finding::Ends(ends)))
+}
+
+/// Verdict on errors that are larger than stated.
+const fn too_large(is_much: bool) -> VerdictKind {
+    match is_much {
+        true => VerdictKind::Overconfident,
+        false => VerdictKind::Doubtful,
+    }
 }
 
 // Recorded data that cannot be fused.
 
 /// Recorded data that cannot be fused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 pub enum FusionError {
     /// The clocks have nothing in common.
     #[error("the clocks do not overlap: IMU {} to {} s, GNSS {} to {} s", .imu.0, .imu.1, .gnss.0, .gnss.1)]

@@ -1,5 +1,6 @@
 //! A run of the filter through recorded data.
 
+use super::vehicle::{force, rate};
 use super::{
     AidRecord, FixRecord, FusionError, Nine, Recorded, Row, RowError, Settings, Solution, Start,
     VehicleVelocity, check_clocks, spans,
@@ -14,7 +15,8 @@ use crate::gnss::GnssFix;
 use crate::imu::{ImuIncrement, ImuSample, Sensor};
 use crate::lanes::{Lanes, Vec3};
 use crate::linalg::{Link, median, to_nalgebra};
-use crate::simulation::{ReportedError, reported_error};
+use crate::sensors::outage::Outage;
+use crate::simulation::reported_error;
 use crate::strapdown::Strapdown;
 use crate::trajectory::reference::Reference;
 use crate::units::DEG;
@@ -168,11 +170,9 @@ impl Run<'_> {
     fn fix(&mut self, fix: &GnssFix) -> Result<(), FusionError> {
         let mut record = self.filter.look_at(fix);
         record.error = self.error().map(|e| e.values);
-        record.used = !self.settings.outages.iter().any(|o| o.withholds(fix.t_s));
-        match &mut self.tape {
-            _ if !record.used => {}
-            Some(tape) => tape.fix(&mut self.filter, self.now, |filter| filter.update(fix)),
-            None => self.filter.update(fix),
+        record.used = !Outage::any_withholds(&self.settings.outages, fix.t_s);
+        if record.used {
+            self.taped(|filter| filter.update(fix));
         }
         let nis = record.nis;
         self.solution.fixes.push(record);
@@ -182,26 +182,21 @@ impl Run<'_> {
     /// Refuses to go on with what is not a number.
     fn finite(&self, value: f64) -> Result<(), FusionError> {
         let diverged = FusionError::Diverged { t_s: self.now };
-        if value.is_finite() {
-            Ok(())
-        } else {
-            Err(diverged)
+        value.is_finite().then_some(()).ok_or(diverged)
+    }
+
+    /// An update of the filter, which a tape records if there is one.
+    fn taped<T>(&mut self, update: impl FnOnce(&mut Filter) -> T) -> T {
+        match &mut self.tape {
+            Some(tape) => tape.fix(&mut self.filter, self.now, update),
+            None => update(&mut self.filter),
         }
     }
 
     /// Uses what the vehicle knows of its velocity.
     fn aid(&mut self, aid: &VehicleVelocity) -> Result<(), FusionError> {
-        self.filter.settle();
-        let mut record = AidRecord {
-            t_s: aid.t_s,
-            aid: aid.aid,
-            normalised: Vec::new(),
-        };
-        let mut update = |filter: &mut Filter| record = filter.aid(aid);
-        match &mut self.tape {
-            Some(tape) => tape.fix(&mut self.filter, self.now, update),
-            None => update(&mut self.filter),
-        }
+        settle(&mut self.filter.ekf);
+        let record = self.taped(|filter| filter.aid(aid));
         let nis = record.nis();
         self.solution.aids.push(record);
         self.finite(nis)
@@ -284,8 +279,8 @@ impl Filter {
     /// Through an interval that was set, with the mean of a sample.
     fn step(&mut self, sample: &ImuIncrement) {
         let mean = ImuSample {
-            omega_ib_b: sample.dtheta / sample.dt_s,
-            f_ib_b: sample.dv / sample.dt_s,
+            omega_ib_b: rate(sample),
+            f_ib_b: force(sample),
         };
         advance(&mut self.ekf, &[mean], &[[Vec3::ZERO; 2]]);
     }
@@ -321,32 +316,26 @@ impl Filter {
         let measured = self.fix(fix);
         let components = fix.components();
         let (z, s) = self.ekf.innovation(&measured);
-        let z = z.rows(0, components).into_owned();
-        let s = s.view((0, 0), (components, components)).into_owned();
-        let sigma = s.diagonal().map(f64::sqrt).as_slice().to_vec();
-        let (north_east, of_these) = (
-            z.rows(0, 2).into_owned(),
-            s.view((0, 0), (2, 2)).into_owned(),
-        );
-        let horizontal_nis = of_these
-            .cholesky()
-            .map_or(f64::NAN, |c| north_east.dot(&c.solve(&north_east)));
-        let nis = s.cholesky().map_or(f64::NAN, |c| z.dot(&c.solve(&z)));
+        // of so many of the first components
+        let nis = |n: usize| {
+            let (z, s) = (
+                z.rows(0, n).into_owned(),
+                s.view((0, 0), (n, n)).into_owned(),
+            );
+            s.cholesky().map_or(f64::NAN, |c| z.dot(&c.solve(&z)))
+        };
+        let sigma = s.diagonal().map(f64::sqrt);
         let before = self.ekf.p.variances(R).lane(0);
         FixRecord {
-            horizontal_nis,
+            horizontal_nis: nis(2),
             horizontal_sigma_m: (before.x + before.y).sqrt(),
             t_s: fix.t_s,
             used: true,
-            innovation: z.as_slice().to_vec(),
-            sigma,
-            nis,
+            innovation: z.as_slice()[..components].to_vec(),
+            sigma: sigma.as_slice()[..components].to_vec(),
+            nis: nis(components),
             error: None,
         }
-    }
-
-    fn settle(&mut self) {
-        settle(&mut self.ekf);
     }
 
     /// Uses a velocity along the vehicle's axes.
@@ -422,7 +411,7 @@ impl Filter {
     /// Difference from a state whose velocity is known as well as `velocity_sigma` (m/s).
     fn error(&mut self, truth: &NavState, velocity_sigma: f64) -> RowError {
         settle(&mut self.ekf);
-        let ReportedError { values, psi_n } = reported_error(&self.state(), truth);
+        let (values, psi_n) = reported_error(&self.state(), truth);
         let mut x = SVector::from(values);
         x.fixed_rows_mut::<3>(3 * PSI)
             .copy_from(&to_nalgebra(psi_n));
@@ -497,8 +486,8 @@ pub fn bridged(samples: &[ImuIncrement], step_s: f64) -> Vec<ImuIncrement> {
         // not beyond the next hole
         let end = holes.get(i + 1).copied().unwrap_or(samples.len());
         // A few samples only: further away the motion is no longer that at the edges of the gap.
-        let before = rates(&samples[k.saturating_sub(BESIDE).max(done)..k]);
-        let after = rates(&samples[k..(k + BESIDE).min(end)]);
+        let (_, before) = rates(&samples[k.saturating_sub(BESIDE).max(done)..k]);
+        let (_, after) = rates(&samples[k..(k + BESIDE).min(end)]);
         let dt_s = hole(k);
         let [dv, dtheta] = [0, 1].map(|i| 0.5 * (before[i] + after[i]) * dt_s);
         filled.push(ImuIncrement {
@@ -513,13 +502,11 @@ pub fn bridged(samples: &[ImuIncrement], step_s: f64) -> Vec<ImuIncrement> {
     filled
 }
 
-/// Mean specific force (m/s²) and angular rate (rad/s).
-fn rates(samples: &[ImuIncrement]) -> [DVec3; 2] {
+/// How long samples last (s), their mean specific force (m/s²) and angular rate (rad/s).
+pub(super) fn rates(samples: &[ImuIncrement]) -> (f64, [DVec3; 2]) {
     let seconds: f64 = samples.iter().map(|s| s.dt_s).sum();
-    [
-        samples.iter().map(|s| s.dv).sum::<DVec3>() / seconds,
-        samples.iter().map(|s| s.dtheta).sum::<DVec3>() / seconds,
-    ]
+    let mean = |of: fn(&ImuIncrement) -> DVec3| samples.iter().map(of).sum::<DVec3>() / seconds;
+    (seconds, [mean(|s| s.dv), mean(|s| s.dtheta)])
 }
 
 /// Which samples of a recording are bridges, and how far from the truth.
@@ -566,11 +553,9 @@ impl<'a> Bridges<'a> {
             if part.iter().any(|s| s.dt_s > LONG * self.step_s) {
                 continue;
             }
-            let (before, window, after) = (
-                rates(&part[..BESIDE]),
-                rates(&part[BESIDE..BESIDE + steps]),
-                rates(&part[BESIDE + steps..]),
-            );
+            let (before, rest) = part.split_at(BESIDE);
+            let (window, after) = rest.split_at(steps);
+            let [before, window, after] = [before, window, after].map(|samples| rates(samples).1);
             for sensor in 0..2 {
                 let error = window[sensor] - 0.5 * (before[sensor] + after[sensor]);
                 (0..3).for_each(|axis| off[3 * sensor + axis].push(error[axis].abs()));
@@ -581,10 +566,7 @@ impl<'a> Bridges<'a> {
         }
         let at = ((off[0].len() - 1) as f64 * SHARE) as usize;
         let sigma = off.map(|mut errors| *errors.select_nth_unstable_by(at, f64::total_cmp).1);
-        [
-            DVec3::new(sigma[0], sigma[1], sigma[2]),
-            DVec3::new(sigma[3], sigma[4], sigma[5]),
-        ]
+        [&sigma[..3], &sigma[3..]].map(DVec3::from_slice)
     }
 }
 
@@ -674,18 +656,23 @@ impl Tape {
     }
 
     /// A fix is used here, by `update`.
-    fn fix(&mut self, filter: &mut Filter, t_s: f64, update: impl FnOnce(&mut Filter)) {
+    fn fix<T>(
+        &mut self,
+        filter: &mut Filter,
+        t_s: f64,
+        update: impl FnOnce(&mut Filter) -> T,
+    ) -> T {
         self.mark(filter, t_s);
-        update(filter);
-        let Some(last) = self.marks.last_mut() else {
-            return;
-        };
-        let mut correction = filter.ekf.correction();
-        if let Some(earlier) = &last.correction {
-            put_back(earlier, &mut correction);
+        let found = update(filter);
+        if let Some(last) = self.marks.last_mut() {
+            let mut correction = filter.ekf.correction();
+            if let Some(earlier) = &last.correction {
+                put_back(earlier, &mut correction);
+            }
+            (last.correction, last.after) = (Some(correction), filter.ekf.snapshot());
         }
-        (last.correction, last.after) = (Some(correction), filter.ekf.snapshot());
         self.covariance = filter.ekf.p.lane(0);
+        found
     }
 
     /// Runs backwards. `filtered` are the rows of the filter, which is used to show the smoothed ones.

@@ -1,10 +1,8 @@
 //! What a vehicle knows of its own velocity, made from a recording: it moves neither sideways nor up, a wheel turns, it
 //! stands.
 
-use super::Recorded;
-use super::Whiteness;
 use super::alignment::courses;
-use crate::gnss::GnssFix;
+use super::{Recorded, Whiteness, kept};
 use crate::imu::ImuIncrement;
 use crate::linalg::median;
 use crate::metrics::{Band, chi_square_band};
@@ -31,7 +29,7 @@ pub struct WheelSpeed {
 }
 
 /// Velocity of a point of the vehicle along some of its axes, as the vehicle knows it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct VehicleVelocity {
     /// Time (s).
     pub t_s: f64,
@@ -63,7 +61,7 @@ impl AidRecord {
 }
 
 /// Innovations of an aid.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize)]
 pub struct AidInnovations {
     /// `nhc`, `odometer` or `zupt`.
     pub aid: &'static str,
@@ -82,9 +80,7 @@ pub fn aid_innovations(records: &[AidRecord]) -> Vec<AidInnovations> {
     let worth = |aid: Aid| {
         let own: Vec<&AidRecord> = records.iter().filter(|r| r.aid == aid).collect();
         let (count, axes) = (own.len(), aid.axes().len());
-        let components = (count * axes) as f64;
         let band = chi_square_band(axes, count as f64);
-        let per_component = |nis: f64| nis / axes as f64;
         let series: Vec<(f64, &[f64])> = own
             .iter()
             .map(|r| (r.t_s, r.normalised.as_slice()))
@@ -92,10 +88,10 @@ pub fn aid_innovations(records: &[AidRecord]) -> Vec<AidInnovations> {
         (count > 0).then(|| AidInnovations {
             aid: aid.name(),
             count,
-            nis_per_component: own.iter().map(|r| r.nis()).sum::<f64>() / components,
+            nis_per_component: own.iter().map(|r| r.nis()).sum::<f64>() / (count * axes) as f64,
             nis_band: Band {
-                lower: per_component(band.lower),
-                upper: per_component(band.upper),
+                lower: band.lower / axes as f64,
+                upper: band.upper / axes as f64,
             },
             whiteness: Whiteness::of_series(&series),
         })
@@ -133,18 +129,12 @@ pub fn vehicle_velocities(
             sigma_m_s: settings.sigmas(aid)[0],
             lever_arm_b: settings.lever_arm_b(aid),
         };
-        let samples = || every(imu, |s| s.t_s, rate_hz);
         match aid {
-            Aid::Nhc => all.extend(
-                samples()
-                    .filter(|k| !stands(*k))
-                    .map(|k| measured(imu[k].t_s, 0.0)),
-            ),
-            Aid::Zupt => all.extend(
-                samples()
-                    .filter(|k| stands(*k))
-                    .map(|k| measured(imu[k].t_s, 0.0)),
-            ),
+            Aid::Nhc | Aid::Zupt => {
+                let at_rest = aid == Aid::Zupt;
+                let samples = every(imu, |s| s.t_s, rate_hz).filter(|k| stands(*k) == at_rest);
+                all.extend(samples.map(|k| measured(imu[k].t_s, 0.0)));
+            }
             Aid::Odometer => {
                 let turned = every(wheel, |w| w.t_s, rate_hz);
                 all.extend(turned.map(|k| measured(wheel[k].t_s, wheel[k].m_s)));
@@ -174,25 +164,19 @@ pub fn wheel_ratio(
 /// The first element of each interval of 1/`rate_hz`.
 fn every<T>(all: &[T], t_s: impl Fn(&T) -> f64, rate_hz: f64) -> impl Iterator<Item = usize> {
     let mut due_s = all.first().map_or(0.0, &t_s);
-    let is_due = move |element: &T| {
-        let now_s = t_s(element);
-        let due = now_s >= due_s - 1e-6;
-        if due {
-            due_s += ((now_s - due_s + 1e-6) * rate_hz).floor().max(0.0) / rate_hz + 1.0 / rate_hz;
+    all.iter().enumerate().filter_map(move |(k, element)| {
+        let late_s = t_s(element) - due_s + 1e-6;
+        let is_due = t_s(element) >= due_s - 1e-6;
+        if is_due {
+            due_s += (late_s * rate_hz).floor().max(0.0) / rate_hz + 1.0 / rate_hz;
         }
-        due
-    };
-    let mut is_due = is_due;
-    all.iter()
-        .enumerate()
-        .filter_map(move |(k, element)| is_due(element).then_some(k))
+        is_due.then_some(k)
+    })
 }
 
 /// Horizontal speeds of the fixes: their own, or by positions a second apart.
 fn speeds(recorded: &Recorded<'_>, outages: &[Outage]) -> Vec<(f64, f64)> {
-    let is_known = |f: &&GnssFix| !outages.iter().any(|o| o.withholds(f.t_s));
-    let known: Vec<GnssFix> = recorded.gnss.iter().filter(is_known).copied().collect();
-    let courses = courses(&known, recorded.imu).into_iter();
+    let courses = courses(&kept(recorded.gnss, outages), recorded.imu).into_iter();
     courses.map(|m| (m.fix.t_s, m.speed())).collect()
 }
 
@@ -287,34 +271,26 @@ struct Standstill {
     thresholds: [f64; 2],
 }
 
-/// Means, and pooled variances of a component.
-struct Moments {
-    mean: [DVec3; 2],
-    variance: [f64; 2],
-}
+/// Means and pooled variances of a component, of specific force and angular rate.
+type Moments = [(DVec3, f64); 2];
 
 fn moments(window: &[ImuIncrement]) -> Moments {
     let n = window.len() as f64;
-    let of = |value: fn(&ImuIncrement) -> DVec3| {
+    [force, rate].map(|value: fn(&ImuIncrement) -> DVec3| {
         let mean = window.iter().map(value).sum::<DVec3>() / n;
         let squares: f64 = window
             .iter()
             .map(|s| (value(s) - mean).length_squared())
             .sum();
         (mean, squares / (3.0 * (n - 1.0)))
-    };
-    let [(f, var_f), (w, var_w)] = [of(force), of(rate)];
-    Moments {
-        mean: [f, w],
-        variance: [var_f, var_w],
-    }
+    })
 }
 
-fn force(sample: &ImuIncrement) -> DVec3 {
+pub(super) fn force(sample: &ImuIncrement) -> DVec3 {
     sample.dv / sample.dt_s
 }
 
-fn rate(sample: &ImuIncrement) -> DVec3 {
+pub(super) fn rate(sample: &ImuIncrement) -> DVec3 {
     sample.dtheta / sample.dt_s
 }
 
@@ -342,9 +318,9 @@ impl Standstill {
         // the median of chi-square of k degrees is k (1 − 2/9k)³ (Wilson and Hilferty)
         let of_median = (1.0 - 2.0 / (27.0 * (samples as f64 - 1.0))).powi(3);
         let mut found = Self {
-            sigma: [0, 1].map(|i| (median(&|m| m.variance[i]) / of_median).sqrt()),
-            force: median(&|m| m.mean[0].length()),
-            rate: DVec3::from_array([0, 1, 2].map(|i| median(&|m| m.mean[1][i]))),
+            sigma: [0, 1].map(|i| (median(&|m| m[i].1) / of_median).sqrt()),
+            force: median(&|m| m[0].0.length()),
+            rate: DVec3::from_array([0, 1, 2].map(|i| median(&|m| m[1].0[i]))),
             thresholds: [0.0; 2],
         };
         let of_white = ChiSquared::new(degrees(samples))

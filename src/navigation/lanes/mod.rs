@@ -61,7 +61,7 @@ impl Real for f64 {
 }
 
 /// Eight independent values, one for each run of a batch.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C, align(64))]
 pub struct Lanes(pub [f64; LANES]);
 
@@ -262,7 +262,7 @@ fn horner<L: Real, const N: usize>(coefficients: &[f64; N], x: L) -> L {
 // Three-vectors, matrices and quaternions of lanes. Without a parameter they are in memory.
 
 /// Three-vector of lanes.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct Vec3<L = Lanes>(pub [L; 3]);
 
 impl Vec3 {
@@ -338,21 +338,19 @@ fn dot3<L: Real>(row: &[L; 3], v: &Vec3<L>) -> L {
     row[2].mul_add(v.0[2], row[1].mul_add(v.0[1], row[0] * v.0[0]))
 }
 
-impl<L: Real> Add for Vec3<L> {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, b: Self) -> Self {
-        Self([self.0[0] + b.0[0], self.0[1] + b.0[1], self.0[2] + b.0[2]])
-    }
+macro_rules! vector_operator {
+    ($trait:ident, $method:ident, $op:tt) => {
+        impl<L: Real> $trait for Vec3<L> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, b: Self) -> Self {
+                Self([self.0[0] $op b.0[0], self.0[1] $op b.0[1], self.0[2] $op b.0[2]])
+            }
+        }
+    };
 }
-
-impl<L: Real> Sub for Vec3<L> {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, b: Self) -> Self {
-        Self([self.0[0] - b.0[0], self.0[1] - b.0[1], self.0[2] - b.0[2]])
-    }
-}
+vector_operator!(Add, add, +);
+vector_operator!(Sub, sub, -);
 
 impl<L: Real> Neg for Vec3<L> {
     type Output = Self;
@@ -386,7 +384,7 @@ impl<L> IndexMut<usize> for Vec3<L> {
 }
 
 /// 3×3 matrix of lanes, `m[row][column]`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Mat3<L = Lanes>(pub [[L; 3]; 3]);
 
 impl Mat3 {
@@ -452,7 +450,7 @@ impl<L: Real> Sub for Mat3<L> {
 }
 
 /// Unit quaternion of lanes, `[w, x, y, z]`, Hamilton product.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Quat<L = Lanes> {
     /// Scalar part.
     pub w: L,

@@ -26,7 +26,7 @@ impl Wide for Lanes {
 }
 
 /// What the processor can do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Level {
     /// Whatever the compiler makes of plain arrays.
     Portable,

@@ -7,6 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
 use std::collections::HashMap;
 use std::f64::consts::PI;
+use std::iter::Sum;
 
 /// A value estimated from runs and its Monte-Carlo standard error (NaN when one run cannot tell).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,7 +75,7 @@ impl Estimate {
 }
 
 /// How many values a statistic is made of, and how many independent ones they are worth.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct SampleSize {
     /// Values.
     pub values: u64,
@@ -110,20 +111,15 @@ impl<T: Serialize> Serialize for PerState<T> {
     }
 }
 
-impl<'de, T: Deserialize<'de> + Copy> Deserialize<'de> for PerState<T> {
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for PerState<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let by_name = HashMap::<String, T>::deserialize(deserializer)?;
-        let value = |name: &&'static str| {
-            by_name
-                .get(*name)
-                .copied()
-                .ok_or_else(|| D::Error::missing_field(name))
-        };
-        let values = REPORTED_NAMES
+        let mut by_name = HashMap::<String, T>::deserialize(deserializer)?;
+        let values: Vec<T> = REPORTED_NAMES
             .iter()
-            .map(value)
-            .collect::<Result<Vec<T>, _>>()?;
-        Ok(Self(std::array::from_fn(|i| values[i])))
+            .filter_map(|name| by_name.remove(*name))
+            .collect();
+        let values = values.try_into().map(Self);
+        values.map_err(|_| D::Error::custom("a value of each reported state is needed"))
     }
 }
 
@@ -259,7 +255,7 @@ const MEAN_STEPS: i32 = 144;
 const MEAN_STEP: f64 = 0.25;
 
 /// Q = c + Σ w (z + d)², z independent standard normal variables.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct QuadraticForm {
     /// The part without scatter, c ≥ 0.
     certain: f64,
@@ -271,20 +267,6 @@ pub struct QuadraticForm {
 const ROUNDING: f64 = 1e-14;
 
 impl QuadraticForm {
-    /// From weights and shifts; weights that are not above zero (beside the largest: rounding) are left out.
-    pub fn new(terms: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        let terms: Vec<(f64, f64)> = terms.into_iter().collect();
-        let largest = terms.iter().map(|t| t.0).fold(0.0, f64::max);
-        let terms = terms
-            .into_iter()
-            .filter(|(w, _)| *w > ROUNDING * largest)
-            .collect();
-        Self {
-            certain: 0.0,
-            terms,
-        }
-    }
-
     /// eᵀ e for an error e of this covariance and mean.
     pub(crate) fn of_square(covariance: &DMatrix<f64>, mean: &[f64]) -> Self {
         let eigen = covariance.clone().symmetric_eigen();
@@ -324,12 +306,12 @@ impl QuadraticForm {
 
     /// Expectation, c + Σ w (1 + d²).
     fn mean(&self) -> f64 {
-        self.certain
-            + self
-                .terms
-                .iter()
-                .map(|(w, d)| w * (1.0 + d * d))
-                .sum::<f64>()
+        self.certain + self.sum(|w, d| w * (1.0 + d * d))
+    }
+
+    /// The sum of a function of weights and shifts.
+    fn sum<T: Sum>(&self, of: impl Fn(f64, f64) -> T) -> T {
+        self.terms.iter().map(|(w, d)| of(*w, *d)).sum()
     }
 
     /// P(Q ≤ x): the inversion of [Imhof](crate::bibliography::Imhof61).
@@ -338,7 +320,7 @@ impl QuadraticForm {
         if x <= 0.0 || self.terms.is_empty() {
             return f64::from(u8::from(x >= 0.0 && self.terms.is_empty()));
         }
-        let far = self.terms.iter().map(|(_, d)| d * d).sum::<f64>() > FAR;
+        let far = self.sum(|_, d| d * d) > FAR;
         let probability = if far {
             self.along_line(x)
         } else {
@@ -393,11 +375,11 @@ impl QuadraticForm {
     /// The least of e^{px} φ(p)/p for p > 0, and the width of the integrand across it. The logarithm is convex there.
     fn saddle(&self, x: f64) -> (f64, f64) {
         let slope = |p: f64| {
-            let term = |(w, d): &(f64, f64)| {
+            let sum = self.sum(|w, d| {
                 let base = 1.0 + 2.0 * w * p;
                 w / base + w * d * d / (base * base)
-            };
-            x - self.terms.iter().map(term).sum::<f64>() - 1.0 / p
+            });
+            x - sum - 1.0 / p
         };
         // At p = 1/x the slope is −Σ … < 0: the least lies above.
         let (mut low, mut high) = (0.0, 1.0 / x);
@@ -414,16 +396,11 @@ impl QuadraticForm {
             }
         }
         let p = 0.5 * (low + high);
-        let term = |(w, d): &(f64, f64)| {
+        let curvature = self.sum(|w, d| {
             let base = 1.0 + 2.0 * w * p;
             2.0 * w * w / (base * base) + 4.0 * w * w * d * d / (base * base * base)
-        };
-        (
-            p,
-            (1.0 / (p * p) + self.terms.iter().map(term).sum::<f64>())
-                .sqrt()
-                .recip(),
-        )
+        });
+        (p, (1.0 / (p * p) + curvature).sqrt().recip())
     }
 
     /// The x with P(Q ≤ x) = `probability`, to 1e-12 of itself.
@@ -470,20 +447,19 @@ impl QuadraticForm {
 
     /// ln E e^(−pQ) for p ≥ 0.
     fn ln_transform(&self, p: f64) -> f64 {
-        let term = |(w, d): &(f64, f64)| {
+        let sum = self.sum(|w, d| {
             let q = 2.0 * w * p;
             -0.5 * (q.ln_1p() + d * d * q / (1.0 + q))
-        };
-        self.terms.iter().map(term).sum::<f64>() - self.certain * p
+        });
+        sum - self.certain * p
     }
 
     /// ln E e^(−p(Q − c)) for a complex p on the right.
     fn ln_transform_at(&self, p: Complex<f64>) -> Complex<f64> {
-        let term = |(w, d): &(f64, f64)| {
+        self.sum(|w, d| {
             let q = p * (2.0 * w);
             ((1.0 + q).ln() + q / (1.0 + q) * (d * d)) * -0.5
-        };
-        self.terms.iter().map(term).sum()
+        })
     }
 
     /// E e^(−p(Q − c)).
@@ -638,10 +614,18 @@ mod quadratic_form_tests {
     use rand_distr::{Distribution, StandardNormal};
     use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
+    fn form_of(terms: impl IntoIterator<Item = (f64, f64)>) -> QuadraticForm {
+        let terms = terms.into_iter().collect();
+        QuadraticForm {
+            certain: 0.0,
+            terms,
+        }
+    }
+
     #[test]
     fn equal_weights_are_chi_square() {
         for dof in [1, 2, 6, 9] {
-            let form = QuadraticForm::new((0..dof).map(|_| (2.5, 0.0)));
+            let form = form_of((0..dof).map(|_| (2.5, 0.0)));
             let law = ChiSquared::new(f64::from(dof)).unwrap();
             for p in [1e-4, 0.05, 0.5, 0.95, 0.999] {
                 let x = law.inverse_cdf(p);
@@ -663,7 +647,7 @@ mod quadratic_form_tests {
     #[test]
     fn two_pairs_have_their_closed_form() {
         let (a, b) = (3.0, 0.2);
-        let form = QuadraticForm::new([(a, 0.0), (b, 0.0), (a, 0.0), (b, 0.0)]);
+        let form = form_of([(a, 0.0), (b, 0.0), (a, 0.0), (b, 0.0)]);
         for x in [1e-3, 0.1, 1.0, 10.0, 60.0] {
             let beyond = |w: f64| w * (-0.5 * x / w).exp();
             let expected = 1.0 - (beyond(a) - beyond(b)) / (a - b);
@@ -691,7 +675,7 @@ mod quadratic_form_tests {
                 let root = f64::sqrt(x);
                 let expected = normal.cdf(root - d) - normal.cdf(-root - d);
                 for w in [1.0, 1e-3] {
-                    let found = QuadraticForm::new([(w, d)]).cdf(w * x);
+                    let found = form_of([(w, d)]).cdf(w * x);
                     assert!(
                         (found - expected).abs() < 1e-10,
                         "{w} {d} {x}: {found} {expected}"
@@ -713,7 +697,7 @@ mod quadratic_form_tests {
             (2.0, 0.0),
             (0.004, 0.0),
         ];
-        let form = QuadraticForm::new(terms);
+        let form = form_of(terms);
         let mut rng = StreamKey {
             seed: 3,
             scenario: "",
@@ -755,7 +739,7 @@ mod quadratic_form_tests {
 
     #[test]
     fn what_is_certain_has_no_spread() {
-        let none = QuadraticForm::new([]);
+        let none = form_of([]);
         assert_eq!(
             (none.cdf(1.0), none.quantile(0.5), none.mean_root()),
             (1.0, 0.0, 0.0)

@@ -7,14 +7,15 @@ use super::summary::{
 };
 use super::verdict;
 use crate::ekf::Belief;
+use crate::linalg::mean;
 use crate::noise::Model;
+use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{ErrorLaw, FilterPass, Instant, Judged, Track, TruthSide};
 use crate::simulation::{
     BIASES, COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord,
 };
 use crate::units::DEG;
 use nalgebra::DMatrix;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// States of the coverage statistic among those of the filter: position, attitude.
 const COVERED: [usize; COVERAGE_DOF] = [0, 1, 2, 6, 7, 8];
@@ -24,7 +25,7 @@ const VELOCITY_DOWN: usize = 5;
 const NEARLY_ALL: f64 = 0.999;
 
 /// The law of a filter's errors as the figures of a run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Expected {
     /// Statistics of every reporting epoch, all without a Monte-Carlo error.
     pub epochs: Vec<EpochMetrics>,
@@ -46,19 +47,15 @@ impl Expected {
         let truth = TruthSide::together(&TruthSide::sources(experiment, truth));
         let filter = FilterPass::new(track, belief);
         let law = filter.errors(&truth);
-        let chi2 = ChiSquared::new(COVERAGE_DOF as f64).expect("degrees of freedom are positive");
-        // The limit that the filter itself would take for this level: it believes in a chi-square law.
-        let limit = chi2.inverse_cdf(experiment.coverage_level);
-        let reports = law.reports.iter().zip(filter.bias_sigmas());
+        let limit = experiment.coverage_quantile();
+        let reports = law.reports.iter().zip(&filter.biases);
         let epochs: Vec<EpochMetrics> = reports
             .map(|(instant, bias)| epoch(instant, *bias, limit))
             .collect::<Option<_>>()?;
         let ends = experiment.outages.iter().zip(&law.outage_ends);
-        let mut outages: Vec<OutageSummary> = ends
-            .map(|(window, end)| outage((window.start_s, window.end_s), end, &epochs))
-            .collect();
-        for outage in &mut outages {
-            let window = (outage.start_s, outage.end_s);
+        let of_outage = |(window, end): (&Outage, &Judged)| {
+            let window = (window.start_s, window.end_s);
+            let mut outage = outage(window, end, &epochs);
             // A barometer or a vehicle that measures in the outage corrects what grows upwards.
             let lasts = |rate_hz: f64| (window.1 - window.0) * rate_hz >= 1.0;
             let sees_height = experiment.baro.is_some_and(|b| lasts(b.rate_hz))
@@ -69,7 +66,9 @@ impl Expected {
                     .is_some_and(|nhc| lasts(nhc.rate_hz));
             let sigma_m_s = outage.asee_end.0[VELOCITY_DOWN];
             outage.beyond_linear = !sees_height && is_beyond_linear(window, &epochs, sigma_m_s);
-        }
+            outage
+        };
+        let outages: Vec<OutageSummary> = ends.map(of_outage).collect();
         let record = record(&epochs, &law, &outages);
         let beyond_linear = outages.iter().position(|outage| outage.beyond_linear);
         let (verdict, verdicts) = verdict::expected(&record, beyond_linear);
@@ -187,9 +186,7 @@ fn outage((start_s, end_s): (f64, f64), end: &Judged, epochs: &[EpochMetrics]) -
 
 /// The run whose squares are the expected ones.
 fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageSummary]) -> RunRecord {
-    let mean = |value: &dyn Fn(&EpochMetrics) -> f64| {
-        epochs.iter().map(value).sum::<f64>() / epochs.len() as f64
-    };
+    let mean = |value: &dyn Fn(&EpochMetrics) -> f64| mean(epochs.iter().map(value));
     let of_outage = |o: &OutageSummary| OutageRecord {
         see_mean: o.asee_mean.0,
         see_end: o.asee_end.0,

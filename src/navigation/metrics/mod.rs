@@ -24,6 +24,7 @@ pub use estimate::{Band, Estimate, PerState, QuadraticForm, SampleSize, chi_squa
 pub use expected::{Expected, horizontal_quantiles};
 pub use outage::{Budget, EpochMetrics, epochs};
 pub use ratio::{EpochRow, Measured, OutageComparison, StateRatio, compare};
+pub(crate) use summary::name_and_limit;
 pub use summary::{
     AccuracySummary, Consistency, Coverage, Met, Nis, OutageSummary, Recovery, ReductionQuality,
     Requirement, Spread, Summary, TOLERANCE,

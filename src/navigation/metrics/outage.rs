@@ -2,6 +2,7 @@
 
 use super::estimate::{Estimate, PerState, SampleSize, quantile_interval, sample_quantile};
 use super::summary::{AccuracySummary, OutageSummary, Recovery, Spread};
+use crate::linalg::mean;
 use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{FilterPass, Judged, NamedSource};
 use crate::simulation::{BIASES, EpochSums, OutageRecord, REPORTED, RunResult};
@@ -106,7 +107,7 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
 // Statistics at one reporting epoch.
 
 /// What the runs say at one epoch (m, m/s, degrees).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct EpochMetrics {
     /// Time on the trajectory (s).
     pub t_s: f64,
@@ -167,11 +168,9 @@ impl AccuracySummary {
     /// Over some epochs. The standard errors are upper bounds, the mean of those of the epochs: epochs of a run are strongly
     /// correlated.
     pub(super) fn over<'a>(epochs: impl Iterator<Item = &'a EpochMetrics> + Clone) -> Self {
-        let n = epochs.clone().count() as f64;
         let mean = |of: &dyn Fn(&EpochMetrics, usize) -> f64| {
-            PerState(std::array::from_fn(|i| {
-                epochs.clone().map(|e| of(e, i)).sum::<f64>() / n
-            }))
+            let of_state = |i| mean(epochs.clone().map(|e| of(e, i)));
+            PerState(std::array::from_fn(of_state))
         };
         Self {
             asee_mean: mean(&|e, i| e.asee.0[i].value),
@@ -185,7 +184,7 @@ impl AccuracySummary {
 
 /// Shares of independent sources in the mean square of each reported state; of a state they sum to 1. In files an
 /// object with the names of the sources as keys.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Budget {
     /// Every source with its shares.
     pub shares: Vec<(String, PerState<f64>)>,
@@ -196,43 +195,24 @@ pub struct Budget {
 impl Budget {
     /// Just before the first fix after each outage: every source goes alone through the gains of one filter.
     pub fn at_outage_ends(filter: &FilterPass<'_>, sources: &[NamedSource]) -> Vec<Self> {
-        let squares = |source: &NamedSource| -> Vec<[f64; REPORTED]> {
+        let squares = |source: &NamedSource| -> (String, Vec<[f64; REPORTED]>) {
             // Mean squares, not variances: a deterministic source (drift) has a mean and no variance.
             let squares = |end: &Judged| end.errors.variances(&end.errors.moments());
-            filter
-                .errors_at_ends(&source.side)
-                .iter()
-                .map(squares)
-                .collect()
+            let ends = filter.errors_at_ends(&source.side);
+            (source.name.clone(), ends.iter().map(squares).collect())
         };
-        let of_source: Vec<Vec<[f64; REPORTED]>> = sources.par_iter().map(squares).collect();
-        let is_there =
-            |ends: &[[f64; REPORTED]]| ends.iter().flatten().any(|square| *square != 0.0);
-        let (sources, of_source): (Vec<&NamedSource>, Vec<_>) = sources
-            .iter()
-            .zip(of_source)
-            .filter(|(_, ends)| is_there(ends))
-            .unzip();
-        let outages = of_source.first().map_or(0, Vec::len);
+        let mut all: Vec<(String, Vec<[f64; REPORTED]>)> =
+            sources.par_iter().map(squares).collect();
+        all.retain(|(_, ends)| ends.iter().flatten().any(|square| *square != 0.0));
+        let outages = all.first().map_or(0, |(_, ends)| ends.len());
         let budget = |k: usize| {
-            let mut total = [0.0; REPORTED];
-            for ends in &of_source {
-                total
-                    .iter_mut()
-                    .zip(&ends[k])
-                    .for_each(|(sum, square)| *sum += square);
-            }
-            let share = |ends: &Vec<[f64; REPORTED]>| {
-                PerState(std::array::from_fn(|i| ends[k][i] / total[i]))
+            let total = std::array::from_fn(|i| all.iter().map(|(_, ends)| ends[k][i]).sum());
+            let share = |(name, ends): &(String, Vec<[f64; REPORTED]>)| {
+                let shares = std::array::from_fn(|i| ends[k][i] / total[i]);
+                (name.clone(), PerState(shares))
             };
-            let shares = sources
-                .iter()
-                .zip(&of_source)
-                .map(|(source, ends)| (source.name.clone(), share(ends)));
-            Self {
-                shares: shares.collect(),
-                total,
-            }
+            let shares = all.iter().map(share).collect();
+            Self { shares, total }
         };
         (0..outages).map(budget).collect()
     }

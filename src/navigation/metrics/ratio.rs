@@ -2,13 +2,14 @@
 //! believes, relative to the other ([Minaretzis et al.](crate::bibliography::Minaretzis24), Table I).
 
 use super::estimate::{Estimate, PerState, SampleSize};
+use crate::linalg::mean;
 use crate::sensors::outage::Outage;
 use crate::simulation::{OutageRecord, REPORTED, RunRecord};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// The statistics of one epoch that ratios are made of.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct EpochRow {
     /// Time on the trajectory (s).
     pub t_s: f64,
@@ -21,7 +22,7 @@ pub struct EpochRow {
 }
 
 /// The results of an experiment, as far as ratios need them.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Measured {
     /// Epochs in time order.
     pub epochs: Vec<EpochRow>,
@@ -97,9 +98,9 @@ pub fn compare(
     }
     // To the last bit: epochs of the same schedule are equal, and ratios of unequal epochs would mean
     // nothing.
-    let times =
-        |e: &Measured| -> Vec<u64> { e.epochs.iter().map(|row| row.t_s.to_bits()).collect() };
-    if times(candidate) != times(reference) {
+    let time = |row: &EpochRow| row.t_s.to_bits();
+    let times = candidate.epochs.iter().map(time);
+    if times.ne(reference.epochs.iter().map(time)) {
         return Err(differ("reporting epochs", &|e| {
             let ends = [e.epochs.first(), e.epochs.last()];
             let [first, last] = ends.map(|row| row.map_or(f64::NAN, |row| row.t_s));
@@ -124,7 +125,7 @@ fn outage(
         let within = e.epochs.iter().filter(|row| outage.withholds(row.t_s));
         within.collect::<Vec<_>>()
     });
-    let (of_candidate, of_reference) = records(candidate, reference, index, paired);
+    let sides = records(candidate, reference, index, paired);
     let windows = [candidate.independent_windows, reference.independent_windows]
         .into_iter()
         .flatten();
@@ -134,8 +135,8 @@ fn outage(
         is_expected: [candidate.is_expected, reference.is_expected],
     };
     let mean_ratio = |value: &dyn Fn(&OutageRecord) -> f64| {
-        let [a, b] = [&of_candidate, &of_reference]
-            .map(|side| side.iter().map(|o| value(o)).collect::<Vec<_>>());
+        let [a, b] = [&sides.0, &sides.1].map(|side| side.iter().map(|o| value(o)).collect());
+        let [a, b]: [Vec<f64>; 2] = [a, b];
         pairing.mean_ratio(&a, &b)
     };
     let state = |i: usize| {
@@ -280,11 +281,6 @@ impl Pairing {
             .std_error
             .powi(2)
     }
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (n, sum) = values.fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + v));
-    sum / n
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use super::estimate::{Band, PerState, SampleSize, chi_square_band, coverage_band};
 use super::outage::{Budget, EpochMetrics, outages};
 use super::verdict::{OutageVerdict, Verdict, VerdictKind, judged};
+use crate::linalg::{by_value, mean};
 use crate::simulation::lincov::{self, Assessment};
 use crate::simulation::{NEES_DOF, REPORTED, REPORTED_NAMES, RunResult};
 use serde::Serialize;
@@ -11,7 +12,7 @@ use std::fmt;
 use std::str::FromStr;
 
 /// What the user reads first.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct Summary {
     /// Layout version.
     pub schema_version: u32,
@@ -64,7 +65,7 @@ fn is_zero(value: &f64) -> bool {
 }
 
 /// ASEE and RMSE as means over epochs.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct AccuracySummary {
     /// Mean over the epochs of the ASEE.
     pub asee_mean: PerState<f64>,
@@ -75,7 +76,7 @@ pub struct AccuracySummary {
 }
 
 /// One outage.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct OutageSummary {
     /// First instant without a fix (s).
     pub start_s: f64,
@@ -128,7 +129,7 @@ pub struct OutageSummary {
 
 /// Quantiles of a distribution over runs, with distribution-free 95 % intervals (null: too few runs); of a covariance
 /// analysis with the intervals that the calibration of what makes the errors leaves (null: its draws are not there).
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Spread {
     /// Median.
     pub p50: f64,
@@ -145,7 +146,7 @@ pub struct Spread {
 }
 
 /// Quantiles over the runs that recover, and how many do not.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Recovery {
     /// Median.
     pub p50: f64,
@@ -156,7 +157,7 @@ pub struct Recovery {
 }
 
 /// Whether a chi-square statistic is where a correct filter puts it.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Consistency {
     /// Degrees of freedom: what a correct filter's mean is.
     pub dof: usize,
@@ -171,7 +172,7 @@ pub struct Consistency {
 }
 
 /// Normalised innovation squared, all fixes of all runs together (independent for a correct filter).
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Nis {
     /// Degrees of freedom of one fix.
     pub dof: usize,
@@ -186,7 +187,7 @@ pub struct Nis {
 }
 
 /// Empirical coverage.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Coverage {
     /// Nominal level.
     pub level: f64,
@@ -201,11 +202,6 @@ pub struct Coverage {
 }
 
 impl Summary {
-    /// Whether its figures are those of a covariance analysis, or stand beside them.
-    pub const fn is_analysed(&self) -> bool {
-        self.runs == 0 || self.lincov.is_some()
-    }
-
     /// The summary of a Monte-Carlo experiment.
     pub fn of(result: &RunResult, epochs: &[EpochMetrics], seed: u64) -> Self {
         let windows = result.independent_windows;
@@ -292,7 +288,7 @@ fn over_epochs(
 ) -> [f64; 4] {
     let n = epochs.len() as f64;
     let inside = epochs.iter().filter(|e| band.contains(value(e))).count();
-    let mean = epochs.iter().map(&value).sum::<f64>() / n;
+    let mean = mean(epochs.iter().map(&value));
     let share = if band.lower.is_finite() {
         inside as f64 / n
     } else {
@@ -359,20 +355,19 @@ impl Summary {
             distance(v.nees, v.nees_std_error, expected.nees.mean),
             distance(v.coverage, v.coverage_std_error, expected.coverage.mean),
         ];
+        type States = PerState<f64>;
+        let distances = |value: &States, error: &States, expected: &States| -> [f64; REPORTED] {
+            std::array::from_fn(|i| distance(value.0[i], error.0[i], expected.0[i]))
+        };
         let (a, e) = (&self.accuracy, &expected.accuracy);
-        let means = a.rmse_mean.0.iter().zip(&a.rmse_mean_std_error.0);
-        all.extend(
-            means
-                .zip(&e.rmse_mean.0)
-                .map(|((value, error), e)| distance(*value, *error, *e)),
-        );
+        all.extend(distances(
+            &a.rmse_mean,
+            &a.rmse_mean_std_error,
+            &e.rmse_mean,
+        ));
         for (o, e) in self.outages.iter().zip(&expected.outages) {
             all.push(distance(o.nees_end, o.nees_end_std_error, e.nees_end));
-            let ends = o.rmse_end.0.iter().zip(&o.rmse_end_std_error.0);
-            all.extend(
-                ends.zip(&e.rmse_end.0)
-                    .map(|((value, error), e)| distance(*value, *error, *e)),
-            );
+            all.extend(distances(&o.rmse_end, &o.rmse_end_std_error, &e.rmse_end));
         }
         // coverage that is 1 in every run has no error of its own, and tells nothing
         all.retain(|z| z.is_finite());
@@ -391,7 +386,7 @@ impl Summary {
 pub const TOLERANCE: f64 = 0.1;
 
 /// What the covariance analysis says of the reduced filter where the model is true.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct ReductionQuality {
     /// True RMSE over the filter's own standard deviation at the end of each outage: above 1 it is
     /// overconfident, below 1 overcautious.
@@ -410,9 +405,7 @@ impl ReductionQuality {
         // At the start the errors are those that the filter believes in, or none: that says nothing of it.
         let later: Vec<&lincov::Consistency> =
             reduced.reports.iter().filter(|r| r.after_s > 0.0).collect();
-        let n = later.len() as f64;
         let ratios: Vec<[f64; REPORTED]> = later.iter().map(|r| r.ratio()).collect();
-        let mean = |i: usize| ratios.iter().map(|r| r[i]).sum::<f64>() / n;
         let over = |(a, b): (&lincov::Consistency, &lincov::Consistency)| {
             PerState(std::array::from_fn(|i| a.rmse[i] / b.rmse[i]))
         };
@@ -422,8 +415,8 @@ impl ReductionQuality {
                 .iter()
                 .map(|e| PerState(e.ratio()))
                 .collect(),
-            mean: PerState(std::array::from_fn(mean)),
-            nees: later.iter().map(|r| r.nees).sum::<f64>() / n,
+            mean: PerState(std::array::from_fn(|i| mean(ratios.iter().map(|r| r[i])))),
+            nees: mean(later.iter().map(|r| r.nees)),
             rmse_over_full: full.map(|f| {
                 reduced
                     .outage_ends
@@ -450,7 +443,7 @@ impl ReductionQuality {
     pub fn cost(&self) -> Option<(f64, (usize, f64))> {
         let ends = || self.rmse_over_full.iter().flatten();
         let most = |state: usize| (state, ends().map(|end| end.0[state]).fold(0.0, f64::max));
-        let worst = (0..REPORTED).map(most).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let worst = (0..REPORTED).map(most).max_by(by_value)?;
         (worst.1 > 0.0).then_some((most(0).1.max(most(1).1), worst))
     }
 }
@@ -472,7 +465,7 @@ enum Figure {
 
 /// A figure and the most it may be, at the end of every outage: `p95_m<=5`, `rmse_pos_e_m<=2`, `yaw_deg<=1`; or
 /// `consistent`, a verdict.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Requirement {
     figure: Figure,
     limit: f64,
@@ -482,7 +475,7 @@ pub struct Requirement {
 const DOWN: [usize; 2] = [2, 5];
 
 /// Whether a requirement is met, and by how much.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Met {
     /// The figure.
     pub name: String,
@@ -499,6 +492,13 @@ pub struct Met {
     pub beyond_linear: Option<usize>,
 }
 
+/// NAME<=LIMIT with a positive limit.
+pub(crate) fn name_and_limit(text: &str) -> Option<(&str, f64)> {
+    let (name, limit) = text.split_once("<=").or_else(|| text.split_once('<'))?;
+    let limit: f64 = limit.trim().parse().ok()?;
+    (limit > 0.0 && limit.is_finite()).then_some((name.trim(), limit))
+}
+
 impl FromStr for Requirement {
     type Err = &'static str;
 
@@ -510,16 +510,14 @@ impl FromStr for Requirement {
             });
         }
         let read = || {
-            let (name, limit) = text.split_once("<=").or_else(|| text.split_once('<'))?;
-            let limit: f64 = limit.trim().parse().ok()?;
-            let name = name.trim();
+            let (name, limit) = name_and_limit(text)?;
             let state = name.strip_prefix("rmse_").unwrap_or(name);
             let figure = match name {
                 "p50_m" => Figure::P50,
                 "p95_m" => Figure::P95,
                 _ => Figure::Rmse(REPORTED_NAMES.iter().position(|known| *known == state)?),
             };
-            (limit > 0.0 && limit.is_finite()).then_some(Self { figure, limit })
+            Some(Self { figure, limit })
         };
         read().ok_or(
             "expected \"consistent\" or NAME<=LIMIT with a positive limit, NAME one of p50_m, p95_m, rmse_pos_e_m, yaw_deg and the other states",

@@ -10,8 +10,8 @@
 //! A filter that does not alarm is consistent only where the runs would have found errors that matter: 25 % above the
 //! filter's standard deviations in all states together, 50 % in one of them. Fewer runs leave it undecided.
 
-use super::estimate::{Estimate, chi_square_interval};
-use crate::simulation::{NEES_DOF, OutageRecord, REPORTED, REPORTED_NAMES, RunRecord, TOLERANCE};
+use super::estimate::{Estimate, SampleSize, chi_square_interval};
+use crate::simulation::{NEES_DOF, REPORTED, REPORTED_NAMES, RunRecord, TOLERANCE};
 use serde::Serialize;
 
 /// Probability at which a right filter is called wrong, all statistics together.
@@ -59,7 +59,7 @@ pub type StateName = &'static str;
 pub const ALL_STATES: StateName = "all";
 
 /// The verdict on the filter of an experiment.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Verdict {
     /// In one word.
     pub kind: VerdictKind,
@@ -98,7 +98,7 @@ pub struct Verdict {
 }
 
 /// The verdict on the filter at the end of one outage.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct OutageVerdict {
     /// In one word.
     pub kind: VerdictKind,
@@ -118,22 +118,13 @@ pub(super) fn judged(
     windows: Option<f64>,
 ) -> (Verdict, Vec<OutageVerdict>) {
     let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
-    let evidence = Evidence {
-        runs: &kept,
-        windows,
-    };
-    let statistics = evidence.statistics(outages);
-    let independent_runs = evidence.independent_runs();
+    let independent_runs = SampleSize::of(kept.len() as u64, windows).independent;
+    let statistics = statistics(&kept, outages, windows);
     let judge = Judge::new(independent_runs, statistics.len());
-    let is_diverged = kept.len() < runs.len();
-    let kind = match is_diverged {
-        true => VerdictKind::Diverged,
-        false => judge.kind(&statistics),
-    };
-    (
-        Verdict::by(&judge, kind, &evidence, &statistics, independent_runs),
-        judge.outages(&statistics, outages, is_diverged),
-    )
+    let lost = (kept.len() < runs.len()).then_some(VerdictKind::Diverged);
+    let kind = lost.unwrap_or_else(|| judge.kind(&statistics));
+    let verdict = judge.verdict(kind, &statistics, (&kept, windows), independent_runs);
+    (verdict, judge.outages(&statistics, outages, lost))
 }
 
 /// The same from the run whose squares are the expected ones: nothing is left to chance, and what is off by more than
@@ -142,23 +133,17 @@ pub(super) fn expected(
     record: &RunRecord,
     beyond_linear: Option<usize>,
 ) -> (Verdict, Vec<OutageVerdict>) {
-    let evidence = Evidence {
-        runs: &[record],
-        windows: None,
-    };
-    let statistics = evidence.statistics(record.outages.len());
-    let kind = match Judge::EXACT.kind(&statistics) {
+    let (judge, outages) = (Judge::EXACT, record.outages.len());
+    let statistics = statistics(&[record], outages, None);
+    let kind = match judge.kind(&statistics) {
         VerdictKind::Consistent if beyond_linear.is_some() => VerdictKind::Doubtful,
         kind => kind,
     };
-    let verdict = Verdict::by(&Judge::EXACT, kind, &evidence, &statistics, f64::INFINITY);
-    (
-        Verdict {
-            beyond_linear,
-            ..verdict
-        },
-        Judge::EXACT.outages(&statistics, record.outages.len(), false),
-    )
+    let verdict = Verdict {
+        beyond_linear,
+        ..judge.verdict(kind, &statistics, (&[record], None), f64::INFINITY)
+    };
+    (verdict, judge.outages(&statistics, outages, None))
 }
 
 impl Verdict {
@@ -166,39 +151,6 @@ impl Verdict {
     /// `independent_windows` as in [`RunResult`](crate::simulation::RunResult).
     pub fn of(runs: &[RunRecord], outages: usize, independent_windows: Option<f64>) -> Self {
         judged(runs, outages, independent_windows).0
-    }
-
-    fn by(
-        judge: &Judge,
-        kind: VerdictKind,
-        evidence: &Evidence<'_>,
-        statistics: &[Statistic],
-        independent_runs: f64,
-    ) -> Self {
-        let worst = judge.worst(statistics, kind);
-        let nees = evidence.mean(&|r| r.nees_mean);
-        let coverage = evidence.mean(&|r| r.covered);
-        let [detectable_ratio, detectable_state_ratio] = judge.detectable();
-        let is_undecided = kind == VerdictKind::Undecided;
-        Self {
-            kind,
-            nees: nees.value,
-            nees_std_error: nees.std_error,
-            coverage: coverage.value,
-            coverage_std_error: coverage.std_error,
-            worst_state: worst.name(),
-            worst_outage: worst.outage,
-            ratio: worst.ratio.value,
-            ratio_std_error: worst.ratio.std_error,
-            by_covariance_analysis: None,
-            beyond_linear: None,
-            independent_runs,
-            detectable_ratio,
-            detectable_state_ratio,
-            runs_to_decide: is_undecided.then(|| Judge::runs_to_decide(statistics.len())),
-            level: LEVEL,
-            tolerance: TOLERANCE,
-        }
     }
 
     /// Whether it rests on covariance analysis, not on runs.
@@ -213,7 +165,7 @@ impl Verdict {
 }
 
 /// A root mean square of normalised errors.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 struct Statistic {
     /// Reported state; none: all of them, by the NEES.
     state: Option<usize>,
@@ -229,63 +181,27 @@ impl Statistic {
     }
 }
 
-/// The runs that count.
-struct Evidence<'a> {
-    runs: &'a [&'a RunRecord],
-    windows: Option<f64>,
-}
-
-impl Evidence<'_> {
-    fn independent_runs(&self) -> f64 {
-        self.windows
-            .unwrap_or(f64::INFINITY)
-            .min(self.runs.len() as f64)
-    }
-
-    fn mean(&self, value: &dyn Fn(&RunRecord) -> f64) -> Estimate {
-        Estimate::mean_of(self.runs.iter().map(|r| value(r)), self.windows)
-    }
-
-    fn statistics(&self, outages: usize) -> Vec<Statistic> {
-        let ratio = |value: &dyn Fn(&RunRecord) -> f64| self.mean(value).root();
-        let mut all = Vec::new();
-        let all_states = |r: &RunRecord| r.nees_mean / NEES_DOF as f64;
-        all.push(Statistic {
-            state: None,
-            outage: None,
-            ratio: ratio(&all_states),
-        });
-        for i in 0..REPORTED {
-            all.push(Statistic {
-                state: Some(i),
-                outage: None,
-                ratio: ratio(&|r| r.normalised_sq[i]),
-            });
-        }
-        for k in 0..outages {
-            let end = |value: &dyn Fn(&OutageRecord) -> f64| {
-                // A record that is missing makes the statistic NaN, and NaN alarms in neither direction.
-                ratio(&|r: &RunRecord| r.outages.get(k).map_or(f64::NAN, value))
-            };
-            let nees = end(&|o| o.nees_end / NEES_DOF as f64);
-            all.push(Statistic {
-                state: None,
-                outage: Some(k),
-                ratio: nees,
-            });
-            for i in 0..REPORTED {
-                // Normalised run by run with the run's own deviation: to first order it is the same in all of
-                // them.
-                let one = end(&|o| (o.error_end[i] / o.see_end[i]).powi(2));
-                all.push(Statistic {
-                    state: Some(i),
-                    outage: Some(k),
-                    ratio: one,
-                });
-            }
-        }
-        all
-    }
+/// All states together and each of them, over the whole run and at the end of each outage.
+fn statistics(runs: &[&RunRecord], outages: usize, windows: Option<f64>) -> Vec<Statistic> {
+    let square = |run: &RunRecord, outage: Option<usize>, state: Option<usize>| match outage {
+        None => state.map_or(run.nees_mean / NEES_DOF as f64, |i| run.normalised_sq[i]),
+        // A record that is missing makes the statistic NaN, and NaN alarms in neither direction.
+        Some(k) => run.outages.get(k).map_or(f64::NAN, |end| {
+            // Normalised run by run with the run's own deviation: to first order it is the same in all of them.
+            let of_state = |i: usize| (end.error_end[i] / end.see_end[i]).powi(2);
+            state.map_or(end.nees_end / NEES_DOF as f64, of_state)
+        }),
+    };
+    let statistic = |outage, state| Statistic {
+        state,
+        outage,
+        ratio: Estimate::mean_of(runs.iter().map(|r| square(r, outage, state)), windows).root(),
+    };
+    let some_and_each = |n: usize| std::iter::once(None).chain((0..n).map(Some));
+    some_and_each(outages)
+        .flat_map(|outage| some_and_each(REPORTED).map(move |state| (outage, state)))
+        .map(|(outage, state)| statistic(outage, state))
+        .collect()
 }
 
 /// The limits between which the ratios of a right filter lie.
@@ -312,16 +228,48 @@ impl Judge {
         Self { limits }
     }
 
-    /// Errors over standard deviations from which on it alarms: of all states together, of one state.
-    fn detectable(&self) -> [f64; 2] {
-        self.limits.map(|(_, upper)| upper.max(1.0 + TOLERANCE))
+    /// The verdict on runs of these statistics.
+    fn verdict(
+        &self,
+        kind: VerdictKind,
+        statistics: &[Statistic],
+        (runs, windows): (&[&RunRecord], Option<f64>),
+        independent_runs: f64,
+    ) -> Verdict {
+        let worst = self.worst(statistics, kind);
+        let mean =
+            |of: fn(&RunRecord) -> f64| Estimate::mean_of(runs.iter().map(|r| of(r)), windows);
+        let (nees, coverage) = (mean(|r| r.nees_mean), mean(|r| r.covered));
+        // Errors over standard deviations from which on it alarms: of all states together, of one state.
+        let [detectable_ratio, detectable_state_ratio] =
+            self.limits.map(|(_, upper)| upper.max(1.0 + TOLERANCE));
+        Verdict {
+            kind,
+            nees: nees.value,
+            nees_std_error: nees.std_error,
+            coverage: coverage.value,
+            coverage_std_error: coverage.std_error,
+            worst_state: worst.name(),
+            worst_outage: worst.outage,
+            ratio: worst.ratio.value,
+            ratio_std_error: worst.ratio.std_error,
+            by_covariance_analysis: None,
+            beyond_linear: None,
+            independent_runs,
+            detectable_ratio,
+            detectable_state_ratio,
+            runs_to_decide: (kind == VerdictKind::Undecided)
+                .then(|| Self::runs_to_decide(statistics.len())),
+            level: LEVEL,
+            tolerance: TOLERANCE,
+        }
     }
 
     /// Whether it finds errors that matter.
     fn is_decisive(&self) -> bool {
-        self.limits
-            .iter()
-            .zip(DECISIVE)
+        let limits = self.limits.iter().zip(DECISIVE);
+        limits
+            .into_iter()
             .all(|((_, upper), limit)| *upper <= limit)
     }
 
@@ -360,30 +308,24 @@ impl Judge {
 
     /// Too much confidence anywhere is the graver fault.
     fn kind(&self, all: &[Statistic]) -> VerdictKind {
-        let without_fault = if self.is_decisive() {
-            VerdictKind::Consistent
-        } else {
-            VerdictKind::Undecided
-        };
-        all.iter()
-            .filter_map(|s| self.fault(s))
-            .max()
-            .unwrap_or(without_fault)
+        let found = all.iter().filter_map(|s| self.fault(s)).max();
+        found.unwrap_or(match self.is_decisive() {
+            true => VerdictKind::Consistent,
+            false => VerdictKind::Undecided,
+        })
     }
 
     /// The verdicts on outages, from the statistics at their ends.
-    fn outages(&self, all: &[Statistic], outages: usize, diverged: bool) -> Vec<OutageVerdict> {
+    fn outages(
+        &self,
+        all: &[Statistic],
+        outages: usize,
+        lost: Option<VerdictKind>,
+    ) -> Vec<OutageVerdict> {
         let verdict_of_outage = |outage: usize| {
-            let own: Vec<Statistic> = all
-                .iter()
-                .filter(|s| s.outage == Some(outage))
-                .copied()
-                .collect();
-            let kind = if diverged {
-                VerdictKind::Diverged
-            } else {
-                self.kind(&own)
-            };
+            let own = all.iter().filter(|s| s.outage == Some(outage));
+            let own: Vec<Statistic> = own.copied().collect();
+            let kind = lost.unwrap_or_else(|| self.kind(&own));
             let worst = self.worst(&own, kind);
             OutageVerdict {
                 kind,
@@ -403,14 +345,13 @@ impl Judge {
             VerdictKind::Overconfident => s.ratio.value.ln(),
             _ => s.ratio.value.ln().abs(),
         };
-        let alarms = |s: &&Statistic| self.fault(s) == Some(kind);
-        let key = |s: &&Statistic| (alarms(s), distance(s));
-        let alone = all.iter().filter(alarms).any(|s| s.state.is_some());
-        let together = !alone && all.iter().filter(alarms).any(|s| s.state.is_none());
+        let alarms = |s: &Statistic| self.fault(s) == Some(kind);
+        let alarmed = |alone: bool| all.iter().any(|s| s.state.is_some() == alone && alarms(s));
+        let together = alarmed(false) && !alarmed(true);
         let states = all.iter().filter(|s| s.state.is_none() == together);
         let farther = |a: &&Statistic, b: &&Statistic| {
-            let (a, b) = (key(a), key(b));
-            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+            let by_distance = distance(a).total_cmp(&distance(b));
+            alarms(a).cmp(&alarms(b)).then(by_distance)
         };
         states.max_by(farther).copied().unwrap_or(all[0])
     }

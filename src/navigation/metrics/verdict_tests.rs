@@ -1,5 +1,6 @@
 use super::*;
 use crate::rng::StreamKey;
+use crate::simulation::OutageRecord;
 use rand_distr::{Distribution, StandardNormal};
 
 /// Runs of one outage whose errors are `scale` times what the filter believes in each state; `epochs`

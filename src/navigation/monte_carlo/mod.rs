@@ -29,6 +29,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+use crate::ekf::Belief;
 use crate::lanes::LANES;
 use crate::simulation::{
     EpochSums, Experiment, ExperimentError, Plan, REPORTED, RunRecord, RunResult, run_batch,
@@ -45,12 +46,8 @@ pub fn run(
     runs: u64,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Vec<RunResult>, ExperimentError> {
-    Ok(run_plan(&Plan::new(experiment)?, runs, progress))
-}
-
-/// The same of a planned experiment.
-pub fn run_plan(plan: &Plan<'_>, runs: u64, progress: &(dyn Fn(u64) + Sync)) -> Vec<RunResult> {
-    run_range(plan, 0, runs, &|| true, progress).expect("nothing stops it")
+    let results = run_range(&Plan::new(experiment)?, 0, runs, &|| true, progress);
+    Ok(results.expect("nothing stops it"))
 }
 
 /// Runs `first..first + runs` of a planned experiment; `None` if `go_on`, asked before each batch of eight,
@@ -62,8 +59,17 @@ pub fn run_range(
     go_on: &(dyn Fn() -> bool + Sync),
     progress: &(dyn Fn(u64) + Sync),
 ) -> Option<Vec<RunResult>> {
-    let beliefs = plan.experiment().beliefs.iter();
-    let mut results: Vec<RunResult> = beliefs.map(|b| empty(plan, b.states)).collect();
+    let experiment = plan.experiment;
+    let windows = experiment.outages.iter().map(|o| (o.start_s, o.end_s));
+    let empty = |belief: &Belief| RunResult {
+        outages: windows.clone().collect(),
+        filter_states: belief.states,
+        fix_components: experiment.gnss.components(),
+        coverage_level: experiment.coverage_level,
+        independent_windows: experiment.truth.independent_windows(plan.samples()),
+        ..RunResult::default()
+    };
+    let mut results: Vec<RunResult> = experiment.beliefs.iter().map(empty).collect();
     let all: Vec<u64> = (0..runs).step_by(LANES).collect();
     for together in all.chunks(TOGETHER) {
         let batch = |done: &u64| {
@@ -85,22 +91,6 @@ pub fn run_range(
 
 /// Batches that wait to be added: memory is bounded, and no thread waits long for the last of them.
 const TOGETHER: usize = 64;
-
-fn empty(plan: &Plan<'_>, filter_states: usize) -> RunResult {
-    let experiment = plan.experiment();
-    RunResult {
-        outages: experiment
-            .outages
-            .iter()
-            .map(|o| (o.start_s, o.end_s))
-            .collect(),
-        filter_states,
-        fix_components: experiment.gnss.components(),
-        coverage_level: experiment.coverage_level,
-        independent_windows: experiment.truth.independent_windows(plan.samples()),
-        ..RunResult::default()
-    }
-}
 
 impl RunResult {
     fn add(&mut self, epochs: Vec<EpochSums>, runs: Vec<RunRecord>) {

@@ -7,10 +7,10 @@
 //! [Groves](crate::bibliography::Groves13), sec. 15.3 (constraints) and 16.3 (odometers).
 
 use super::gnss::MAX_LEVER_ARM_M;
+use super::normal;
 use crate::rng::{Generator, StreamKey};
 use crate::units::{DEG, NonNegative, Positive, exactly};
 use glam::DVec3;
-use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -36,16 +36,42 @@ impl AidingSettings {
 
     /// Those that are there, and their rates (Hz).
     pub fn rates(&self) -> impl Iterator<Item = (Aid, f64)> {
-        let rates = [
-            self.nhc.as_ref().map(|s| s.rate_hz),
-            self.odometer.as_ref().map(|s| s.rate_hz),
-            self.zupt.as_ref().map(|s| s.rate_hz),
-            self.heading.as_ref().map(|s| s.rate_hz),
-        ];
-        Aid::ALL
-            .into_iter()
-            .zip(rates)
-            .filter_map(|(aid, rate)| rate.map(|rate| (aid, rate)))
+        let rate = |aid| Some((aid, self.common(aid)?.0));
+        Aid::ALL.into_iter().filter_map(rate)
+    }
+
+    /// Of an aid that is there: rate (Hz), white noise of a measurement as the filter believes and in truth (m/s or rad), and
+    /// the point whose velocity it measures, from the IMU, in b (m).
+    fn common(&self, aid: Aid) -> Option<(f64, f64, Option<f64>, [f64; 3])> {
+        Some(match aid {
+            Aid::Nhc => {
+                let s = self.nhc.as_ref()?;
+                (
+                    s.rate_hz,
+                    s.sigma_m_s,
+                    s.truth.noise_sigma_m_s,
+                    s.lever_arm_m,
+                )
+            }
+            Aid::Odometer => {
+                let s = self.odometer.as_ref()?;
+                (
+                    s.rate_hz,
+                    s.sigma_m_s,
+                    s.truth.noise_sigma_m_s,
+                    s.lever_arm_m,
+                )
+            }
+            Aid::Zupt => {
+                let s = self.zupt.as_ref()?;
+                (s.rate_hz, s.sigma_m_s, s.truth.noise_sigma_m_s, [0.0; 3])
+            }
+            Aid::Heading => {
+                let s = self.heading.as_ref()?;
+                let noise = s.truth.noise_sigma_deg.map(|n| n * DEG);
+                (s.rate_hz, s.sigma_deg * DEG, noise, [0.0; 3])
+            }
+        })
     }
 
     /// Whether an aid is part of the receiver: it measures nothing in outages.
@@ -56,37 +82,12 @@ impl AidingSettings {
 
     /// The point of which an aid measures the velocity, with respect to the IMU, in b (m).
     pub(crate) fn lever_arm_b(&self, aid: Aid) -> DVec3 {
-        let arm = match aid {
-            Aid::Nhc => self.nhc.as_ref().map(|s| s.lever_arm_m),
-            Aid::Odometer => self.odometer.as_ref().map(|s| s.lever_arm_m),
-            Aid::Zupt | Aid::Heading => None,
-        };
-        arm.map_or(DVec3::ZERO, DVec3::from)
+        self.common(aid).map_or(DVec3::ZERO, |(.., arm)| arm.into())
     }
 
     /// Standard deviations of one measurement's white noise, as the filter believes and in truth (m/s or rad).
     pub fn sigmas(&self, aid: Aid) -> [f64; 2] {
-        let (sigma, noise) = match aid {
-            Aid::Nhc => self
-                .nhc
-                .as_ref()
-                .map(|s| (s.sigma_m_s, s.truth.noise_sigma_m_s)),
-            Aid::Odometer => self
-                .odometer
-                .as_ref()
-                .map(|s| (s.sigma_m_s, s.truth.noise_sigma_m_s)),
-            Aid::Zupt => self
-                .zupt
-                .as_ref()
-                .map(|s| (s.sigma_m_s, s.truth.noise_sigma_m_s)),
-            Aid::Heading => {
-                let radians = |s: &HeadingSettings| {
-                    (s.sigma_deg * DEG, s.truth.noise_sigma_deg.map(|n| n * DEG))
-                };
-                self.heading.as_ref().map(radians)
-            }
-        }
-        .unwrap_or_default();
+        let (_, sigma, noise, _) = self.common(aid).unwrap_or_default();
         [sigma, noise.unwrap_or(sigma)]
     }
 
@@ -164,16 +165,6 @@ impl Aid {
         ["nhc", "odometer", "zupt", "heading"][self as usize]
     }
 
-    /// Its white noise in a budget, and the key that makes a filter expect it.
-    const fn noise(self) -> (&'static str, &'static str) {
-        match self {
-            Self::Nhc => ("aiding.nhc", "aiding.nhc.sigma_m_s"),
-            Self::Odometer => ("aiding.odometer", "aiding.odometer.sigma_m_s"),
-            Self::Zupt => ("aiding.zupt", "aiding.zupt.sigma_m_s"),
-            Self::Heading => ("aiding.heading", "aiding.heading.sigma_deg"),
-        }
-    }
-
     /// The axes of the vehicle along which it measures the velocity; none of a heading.
     pub(crate) const fn axes(self) -> &'static [usize] {
         match self {
@@ -195,16 +186,23 @@ const LASTING_FIXES: f64 = 10.0;
 impl AidingSettings {
     /// Sources of error that a filter feels and does not expect: their names in a budget, and the key that makes it expect
     /// them.
-    pub(crate) fn unexpected(&self) -> Vec<(&'static str, &'static str)> {
+    pub(crate) fn unexpected(&self) -> Vec<(String, String)> {
         let is_noisier = |(aid, _): &(Aid, f64)| {
             let [believed, true_sigma] = self.sigmas(*aid);
             true_sigma > believed
         };
-        let noise = self.rates().filter(is_noisier).map(|(aid, _)| aid.noise());
+        let noise = self.rates().filter(is_noisier).map(|(aid, _)| {
+            let name = aid.name();
+            let unit = if aid == Aid::Heading { "deg" } else { "m_s" };
+            (
+                format!("aiding.{name}"),
+                format!("aiding.{name}.sigma_{unit}"),
+            )
+        });
         let lasting = self.errors().into_iter().filter(|error| error.is_felt);
-        let mut found: Vec<_> = noise
-            .chain(lasting.map(|error| error.part.names()))
-            .collect();
+        let lasting = lasting.map(|error| error.part.names());
+        let lasting = lasting.map(|(name, key)| (name.to_owned(), key.to_owned()));
+        let mut found: Vec<_> = noise.chain(lasting).collect();
         // Two parts of one name stand together.
         found.dedup();
         found
@@ -410,12 +408,7 @@ impl AidNoise {
         let walk = |error: AidError| {
             let (aid, _, process, _) = error.part.row();
             let source = aid.name();
-            let mut stream = StreamKey {
-                source,
-                process,
-                ..key
-            }
-            .generator();
+            let mut stream = key.stream(source, process);
             let value = match error.law {
                 Law::Known(value) => value,
                 // a Gauss-Markov process is stationary from the start
@@ -433,14 +426,7 @@ impl AidNoise {
             )
         };
         let white = Aid::ALL.map(|aid| {
-            let stream = |process| {
-                StreamKey {
-                    source: aid.name(),
-                    process,
-                    ..key
-                }
-                .generator()
-            };
+            let stream = |process| key.stream(aid.name(), process);
             (
                 settings.sigmas(aid)[1],
                 ["white_x", "white_y", "white_z"].map(stream),
@@ -488,10 +474,6 @@ impl Walk {
         }
         self.value
     }
-}
-
-fn normal(generator: &mut Generator) -> f64 {
-    StandardNormal.sample(generator)
 }
 
 // The settings of each kind of aiding: what a filter believes, and what is true.

@@ -1,10 +1,10 @@
 //! What is wrong with the true IMU beside its noise. The filter knows nothing of it but what `[initial]` lets it expect.
 
+use super::normal;
 use crate::imu::{ImuSample, MAX_RATE_HZ, Sensor};
 use crate::rng::StreamKey;
 use crate::units::{NonNegative, Positive, SettingError, exactly};
 use glam::{DMat3, DVec3};
-use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -97,14 +97,24 @@ impl ImuSettings {
         [self.turn_on_bias_accel_m_s2, self.turn_on_bias_gyro_rad_s][sensor as usize]
     }
 
+    /// Standard deviation of what the accelerometers rectify (s²/m).
+    pub(crate) fn rectification_s2_m(&self) -> f64 {
+        let vibration = self.vibration.as_ref();
+        vibration.map_or(0.0, |v| v.rectification_s2_m)
+    }
+
+    /// Standard deviation of what a degree does to a sensor's bias (m/s² or rad/s per K).
+    pub(crate) fn per_kelvin(&self, sensor: Sensor) -> f64 {
+        let temperature = self.temperature.as_ref();
+        temperature.map_or(0.0, |t| [t.accel_m_s2_k, t.gyro_rad_s_k][sensor as usize])
+    }
+
     /// Its errors of which no filter has states: the sensor if it is one alone, key, standard deviation, and unit of that.
     pub fn without_states(
         &self,
     ) -> impl Iterator<Item = (Option<Sensor>, &'static str, f64, &'static str)> + use<> {
-        let vibration = self.vibration.as_ref();
-        let rectification = vibration.map_or(0.0, |v| v.rectification_s2_m);
-        let [accel_k, gyro_k] =
-            Sensor::ALL.map(|s| self.temperature.as_ref().map_or(0.0, |t| t.sigma(s)));
+        let rectification = self.rectification_s2_m();
+        let [accel_k, gyro_k] = Sensor::ALL.map(|sensor| self.per_kelvin(sensor));
         let (accel, gyro) = (Some(Sensor::Accel), Some(Sensor::Gyro));
         let sensitivity = self.g_sensitivity_rad_s_per_m_s2;
         let all = [
@@ -157,15 +167,8 @@ impl Defects {
         // A stream for each defect, drawn whether its deviation is zero or not: one setting changes no other number.
         let normals = |sensor: Sensor, process: &'static str, n: usize| -> Vec<f64> {
             let source = format!("{}.defects", sensor.name());
-            let mut generator = StreamKey {
-                source: &source,
-                process,
-                ..key
-            }
-            .generator();
-            (0..n)
-                .map(|_| StandardNormal.sample(&mut generator))
-                .collect()
+            let mut generator = key.stream(&source, process);
+            (0..n).map(|_| normal(&mut generator)).collect()
         };
         let triad = |sensor: Sensor, process| DVec3::from_slice(&normals(sensor, process, 3));
         let matrix = |sensor: Sensor| {
@@ -180,23 +183,13 @@ impl Defects {
             }
             matrix
         };
-        let rectification = settings
-            .vibration
-            .as_ref()
-            .map_or(0.0, |v| v.rectification_s2_m);
-        let per_kelvin = |sensor| {
-            settings
-                .temperature
-                .as_ref()
-                .map_or(0.0, |t| t.sigma(sensor))
-        };
         let sensitivity = DMat3::from_cols_slice(&normals(Sensor::Gyro, "g_sensitivity", 9));
         Self {
             bias: Sensor::ALL.map(|s| triad(s, "turn_on_bias") * settings.deviations(s).0),
             matrix: Sensor::ALL.map(matrix),
             g_sensitivity: sensitivity * settings.g_sensitivity_rad_s_per_m_s2,
-            rectification: triad(Sensor::Accel, "rectification") * rectification,
-            per_kelvin: Sensor::ALL.map(|s| triad(s, "temperature") * per_kelvin(s)),
+            rectification: triad(Sensor::Accel, "rectification") * settings.rectification_s2_m(),
+            per_kelvin: Sensor::ALL.map(|s| triad(s, "temperature") * settings.per_kelvin(s)),
         }
     }
 
@@ -286,11 +279,6 @@ impl Temperature {
             )),
             None => Ok(()),
         }
-    }
-
-    /// Standard deviation of what a degree does to a sensor's bias (m/s² or rad/s per K).
-    pub(crate) const fn sigma(&self, sensor: Sensor) -> f64 {
-        [self.accel_m_s2_k, self.gyro_rad_s_k][sensor as usize]
     }
 
     /// An IMU that feels temperature so many times as much.

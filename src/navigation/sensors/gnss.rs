@@ -1,9 +1,9 @@
 //! The GNSS receiver: what it measures, how often and how well.
 
+use super::normal;
 use crate::rng::{Generator, StreamKey};
-use crate::units::{NonNegative, Positive, SettingError, exactly};
+use crate::units::{NonNegative, Positive, exactly};
 use glam::DVec3;
-use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -58,14 +58,6 @@ impl Default for GnssSettings {
 }
 
 impl GnssSettings {
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key whose value is refused.
-    pub fn validate(&self) -> Result<(), SettingError> {
-        super::check_bounds(self)
-    }
-
     /// Components of one fix: 3 (position) or 6 (and velocity).
     pub(crate) const fn components(&self) -> usize {
         if self.vel_sigma_m_s.is_some() { 6 } else { 3 }
@@ -109,14 +101,7 @@ impl GnssNoise {
     /// The noise of run `key.run`.
     pub(crate) fn new(settings: &GnssSettings, key: StreamKey<'_>) -> Self {
         const COMPONENTS: [&str; 6] = ["pos_n", "pos_e", "pos_d", "vel_n", "vel_e", "vel_d"];
-        let streams = COMPONENTS.map(|process| {
-            StreamKey {
-                source: "gnss",
-                process,
-                ..key
-            }
-            .generator()
-        });
+        let streams = COMPONENTS.map(|process| key.stream("gnss", process));
         let velocity = settings.vel_sigma_m_s.unwrap_or([0.0; 3]);
         let sigma = std::array::from_fn(|i| {
             if i < 3 {
@@ -129,12 +114,7 @@ impl GnssNoise {
         let phi = (-1.0 / (settings.rate_hz * settings.correlation_time_s)).exp();
         let correlated = std::array::from_fn(|i| {
             let process = ["correlated_n", "correlated_e", "correlated_d"][i];
-            let stream = StreamKey {
-                source: "gnss",
-                process,
-                ..key
-            }
-            .generator();
+            let stream = key.stream("gnss", process);
             Correlated {
                 stream,
                 phi,
@@ -159,10 +139,6 @@ impl GnssNoise {
             DVec3::new(e[3], e[4], e[5]),
         )
     }
-}
-
-fn normal(generator: &mut Generator) -> f64 {
-    StandardNormal.sample(generator)
 }
 
 fn sigmas_or_none<S: Serializer>(
@@ -212,37 +188,10 @@ pub struct BaroSettings {
     pub sigma_m: f64,
 }
 
-/// The noise of the altimeter in one run.
-pub(crate) struct BaroNoise {
-    stream: Generator,
-    sigma_m: f64,
-}
-
-impl BaroNoise {
-    /// The noise of run `key.run`.
-    pub(crate) fn new(settings: &BaroSettings, key: StreamKey<'_>) -> Self {
-        let stream = StreamKey {
-            source: "baro",
-            process: "height",
-            ..key
-        }
-        .generator();
-        Self {
-            stream,
-            sigma_m: settings.sigma_m,
-        }
-    }
-
-    /// The error of the next height (m).
-    pub(crate) fn draw(&mut self) -> f64 {
-        let normal: f64 = StandardNormal.sample(&mut self.stream);
-        self.sigma_m * normal
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sensors::check_bounds;
 
     #[test]
     fn velocity_may_be_none_and_survives_a_round_trip() {
@@ -318,8 +267,8 @@ mod tests {
         ];
         let keys = ["rate_hz", "pos_sigma_m", "vel_sigma_m_s", "lever_arm_m"];
         for (settings, key) in cases.iter().zip(keys) {
-            assert_eq!(settings.validate().unwrap_err().key, key);
+            assert_eq!(check_bounds(&settings).unwrap_err().key, key);
         }
-        assert_eq!(GnssSettings::default().validate(), Ok(()));
+        assert_eq!(check_bounds(&GnssSettings::default()), Ok(()));
     }
 }

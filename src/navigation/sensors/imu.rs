@@ -17,12 +17,12 @@ pub enum Truth<'a> {
     /// Synthesised from a model of each run's own: parameters that differ from one switching-on to the next.
     Drawn(&'a [Model]),
     /// A window of a static recording for each run, all axes together, so that correlation between axes
-    /// survives; windows are spread evenly, and each starts from the level best known there (`Windows`).
+    /// survives; windows are spread evenly, and each starts from the level best known there ([`best_spans`]).
     Static(&'a [Recording]),
 }
 
 /// The truth cannot make the errors of a run.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 pub enum TruthError {
     /// No model or recording, a channel too few, a model of another rate.
     #[error(transparent)]
@@ -53,42 +53,12 @@ fn refused<T>(message: impl Into<String>) -> Result<T, TruthError> {
     Err(Refused(message.into()).into())
 }
 
-/// What makes the errors, ready to be drawn from.
-#[derive(Debug, Clone)]
-pub enum ErrorSource<'a> {
-    /// Synthesised from a model.
-    Model(&'a Model),
-    /// Synthesised from a model of each run's own.
-    Drawn(&'a [Model]),
-    /// Windows of recordings.
-    Windows(Windows<'a>),
-}
-
-impl<'a> Truth<'a> {
-    /// Prepares errors of `samples` samples at `imu_hz`.
-    ///
-    /// # Errors
-    /// As [`check`](Self::check).
-    pub(crate) fn source(
-        &self,
-        imu_hz: f64,
-        samples: usize,
-    ) -> Result<ErrorSource<'a>, TruthError> {
-        self.check(imu_hz, samples)?;
-        Ok(match self {
-            Self::Model(model) => ErrorSource::Model(model),
-            Self::Drawn(models) => ErrorSource::Drawn(models),
-            Self::Static(recordings) => ErrorSource::Windows(Windows::new(recordings)),
-        })
-    }
-}
-
 impl Truth<'_> {
     /// Checks that `samples` samples at `imu_hz` can be had.
     ///
     /// # Errors
     /// What is missing, and by how much.
-    fn check(&self, imu_hz: f64, samples: usize) -> Result<(), TruthError> {
+    pub(crate) fn check(&self, imu_hz: f64, samples: usize) -> Result<(), TruthError> {
         let check_model = |model: &Model| match same_rate(model.rate_hz, imu_hz) {
             true => Ok(()),
             false => refused(format!(
@@ -106,9 +76,7 @@ impl Truth<'_> {
                 .try_for_each(|r| check_recording(r, imu_hz, samples)),
         }
     }
-}
 
-impl Truth<'_> {
     /// How many windows of `samples` samples the recordings hold side by side: runs beyond these share noise
     /// with others. None for a model, which gives every run noise of its own.
     pub(crate) fn independent_windows(&self, samples: usize) -> Option<f64> {
@@ -156,7 +124,7 @@ fn check_recording(recording: &Recording, imu_hz: f64, needs: usize) -> Result<(
 /// The errors of the six channels of one run, as streams of samples.
 #[derive(Debug, Clone)]
 pub struct ImuErrors<'a> {
-    channels: Vec<ChannelErrors<'a>>,
+    channels: [ChannelErrors<'a>; 6],
 }
 
 #[derive(Debug, Clone)]
@@ -167,8 +135,14 @@ enum ChannelErrors<'a> {
 }
 
 impl<'a> ImuErrors<'a> {
-    /// The errors of run `key.run` over `samples` samples, as many as the source was made for.
-    pub fn new(errors: &ErrorSource<'a>, key: StreamKey<'_>, samples: usize) -> Self {
+    /// The errors of run `key.run` over `samples` samples, which the truth must have; of recordings with their
+    /// [`best_spans`].
+    pub fn new(
+        truth: &Truth<'a>,
+        spans: &[[usize; 6]],
+        key: StreamKey<'_>,
+        samples: usize,
+    ) -> Self {
         let synthesised = |model: &Model| {
             Channel::ALL.map(|channel| {
                 let source = channel.to_string();
@@ -182,19 +156,21 @@ impl<'a> ImuErrors<'a> {
                 ChannelErrors::Synthesised(Box::new(synthesizer))
             })
         };
-        let channels = match errors {
-            ErrorSource::Model(model) => synthesised(model),
+        let channels = match truth {
+            Truth::Model(model) => synthesised(model),
             // Of fewer models than runs each is taken again.
-            ErrorSource::Drawn(models) => {
-                synthesised(&models[(key.run % models.len() as u64) as usize])
+            Truth::Drawn(models) => synthesised(&models[(key.run % models.len() as u64) as usize]),
+            Truth::Static(recordings) => {
+                let (index, start) = place(recordings, key, samples);
+                Channel::ALL.map(|channel| {
+                    let signal = recordings[index].signal(channel);
+                    let all = signal.map_or(&[][..], |s| &s.samples);
+                    let level = level_at(all, start, spans[index][channel.index()]);
+                    ChannelErrors::Recorded(&all[start..start + samples], level)
+                })
             }
-            ErrorSource::Windows(windows) => windows
-                .of_run(key, samples)
-                .map(|(window, level)| ChannelErrors::Recorded(window, level)),
         };
-        Self {
-            channels: channels.into(),
-        }
+        Self { channels }
     }
 
     /// Overwrites `out` with the next samples of a channel (m/s² or rad/s).
@@ -264,74 +240,46 @@ impl<'a> LaneErrors<'a> {
 // before a window begins, while a filter starts it at zero: each window starts from the level that is best
 // known there, as a vehicle does whose biases were taken off before it left.
 
-/// Recordings, and the averaging times that tell their levels best.
-#[derive(Debug, Clone)]
-pub struct Windows<'a> {
-    recordings: &'a [Recording],
-    /// For each recording and channel: samples over which a mean knows the level best; 0 where the record is
-    /// too short to tell.
-    spans: Vec<[usize; 6]>,
+/// For each recording of a truth and each channel: samples over which a mean knows the level best; 0 where the record is too
+/// short to tell.
+pub fn best_spans(truth: &Truth<'_>) -> Vec<[usize; 6]> {
+    let Truth::Static(recordings) = truth else {
+        return Vec::new();
+    };
+    let span = |r: &Recording, channel| r.signal(channel).map_or(0, |s| best_span(&s.samples));
+    let spans_of = |recording| Channel::ALL.map(|channel| span(recording, channel));
+    recordings.iter().map(spans_of).collect()
 }
 
-impl<'a> Windows<'a> {
-    /// The windows of recordings that have all six channels.
-    fn new(recordings: &'a [Recording]) -> Self {
-        let spans_of = |recording: &Recording| {
-            Channel::ALL.map(|channel| {
-                recording
-                    .signal(channel)
-                    .map_or(0, |s| best_span(&s.samples))
-            })
-        };
-        Self {
-            recordings,
-            spans: recordings.iter().map(spans_of).collect(),
-        }
+/// Recording and first sample of a run's window: run k stands at the fraction u + k·(√5 − 1)/2 (modulo 1) of
+/// all samples, u drawn by the seed. No sequence spreads its first n points more evenly for all n, and none
+/// of them depends on how many there are.
+fn place(recordings: &[Recording], key: StreamKey<'_>, samples: usize) -> (usize, usize) {
+    const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15; // (√5 − 1)/2 in units of 2⁻⁶⁴
+    let shift: u64 = StreamKey {
+        run: 0,
+        source: "imu",
+        process: "window",
+        ..key
     }
-
-    /// The window of a run: for each channel its samples and the level they start from.
-    fn of_run(&self, key: StreamKey<'_>, samples: usize) -> [(&'a [f64], f64); 6] {
-        let (index, start) = self.place(key, samples);
-        let recording = &self.recordings[index];
-        Channel::ALL.map(|channel| {
-            let all = recording.signal(channel).map_or(&[][..], |s| &s.samples);
-            let level = level_at(all, start, self.spans[index][channel.index()]);
-            (&all[start..start + samples], level)
-        })
+    .generator()
+    .random();
+    // Integers wrap as fractions do modulo 1, without the rounding that k·(√5 − 1)/2 has for large k.
+    let point = shift.wrapping_add(key.run.wrapping_mul(GOLDEN));
+    let total: f64 = recordings.iter().map(|r| r.len() as f64).sum();
+    // The upper 53 bits: as many as a double holds, so that the fraction stays below 1.
+    let mut at = (point >> 11) as f64 / (1_u64 << 53) as f64 * total;
+    let length = |index: usize| recordings[index].len();
+    let mut index = 0;
+    // The last recording has what rounding leaves over.
+    while index + 1 < recordings.len() && at >= length(index) as f64 {
+        at -= length(index) as f64;
+        index += 1;
     }
-
-    /// Recording and first sample of a run's window: run k stands at the fraction u + k·(√5 − 1)/2 (modulo 1) of
-    /// all samples, u drawn by the seed. No sequence spreads its first n points more evenly for all n, and none
-    /// of them depends on how many there are.
-    fn place(&self, key: StreamKey<'_>, samples: usize) -> (usize, usize) {
-        const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15; // (√5 − 1)/2 in units of 2⁻⁶⁴
-        let shift: u64 = StreamKey {
-            run: 0,
-            source: "imu",
-            process: "window",
-            ..key
-        }
-        .generator()
-        .random();
-        // Integers wrap as fractions do modulo 1, without the rounding that k·(√5 − 1)/2 has for large k.
-        let point = shift.wrapping_add(key.run.wrapping_mul(GOLDEN));
-        let total: f64 = self.recordings.iter().map(|r| r.len() as f64).sum();
-        // The upper 53 bits: as many as a double holds, so that the fraction stays below 1.
-        let mut at = (point >> 11) as f64 / (1_u64 << 53) as f64 * total;
-        let length = |index: usize| self.recordings[index].len();
-        let mut index = 0;
-        // The last recording has what rounding leaves over.
-        while index + 1 < self.recordings.len() && at >= length(index) as f64 {
-            at -= length(index) as f64;
-            index += 1;
-        }
-        // Scaled to the possible starts rather than refused: a window never runs over the end of its recording.
-        let starts = length(index) - samples + 1;
-        (
-            index,
-            ((at / length(index) as f64 * starts as f64) as usize).min(starts - 1),
-        )
-    }
+    // Scaled to the possible starts rather than refused: a window never runs over the end of its recording.
+    let starts = length(index) - samples + 1;
+    let start = (at / length(index) as f64 * starts as f64) as usize;
+    (index, start.min(starts - 1))
 }
 
 /// The averaging time (samples) at which the Allan variance is least: beyond it the level has moved on, below
@@ -390,9 +338,11 @@ mod tests {
     fn windows_keep_the_axes_together_and_reach_both_ends() {
         let recordings = [recording(100.0, 12)];
         let mut starts = std::collections::BTreeSet::new();
-        let source = Truth::Static(&recordings).source(100.0, 10).unwrap();
+        let truth = Truth::Static(&recordings);
+        truth.check(100.0, 10).unwrap();
+        let spans = best_spans(&truth);
         for run in 0..200 {
-            let mut errors = ImuErrors::new(&source, StreamKey { run, ..KEY }, 10);
+            let mut errors = ImuErrors::new(&truth, &spans, StreamKey { run, ..KEY }, 10);
             let mut first = [[0.0; 4]; 6];
             for (channel, out) in Channel::ALL.into_iter().zip(&mut first) {
                 errors.fill(channel, out);
@@ -484,11 +434,10 @@ mod windows_tests {
     #[test]
     fn windows_are_spread_evenly() {
         let recordings = [recording(&vec![0.0; 6000]), recording(&vec![0.0; 4000])];
-        let windows = Windows::new(&recordings);
         for seed in 0..20 {
             let mut held = [0_u32; 20];
             for run in 0..100 {
-                let (index, start) = windows.place(StreamKey { seed, run, ..KEY }, 1000);
+                let (index, start) = place(&recordings, StreamKey { seed, run, ..KEY }, 1000);
                 let share = start as f64 / (recordings[index].len() - 999) as f64;
                 held[12 * index + (share * [12.0, 8.0][index]) as usize] += 1;
             }
@@ -511,9 +460,13 @@ mod windows_tests {
     #[test]
     fn a_random_walk_starts_at_zero() {
         let recordings = [recording(&walk(0.0, 5000))];
-        let windows = Windows::new(&recordings);
+        let truth = Truth::Static(&recordings);
         for run in 0..20 {
-            for (samples, level) in windows.of_run(StreamKey { run, ..KEY }, 1000) {
+            let key = StreamKey { run, ..KEY };
+            for errors in ImuErrors::new(&truth, &best_spans(&truth), key, 1000).channels {
+                let ChannelErrors::Recorded(samples, level) = errors else {
+                    panic!("not of a recording");
+                };
                 assert_eq!((samples[0], samples.len()), (level, 1000));
             }
         }

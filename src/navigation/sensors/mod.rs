@@ -7,10 +7,17 @@ pub mod ideal_imu;
 pub mod imu;
 pub mod outage;
 
+use crate::rng::Generator;
 use crate::units::SettingError;
+use rand_distr::{Distribution, StandardNormal};
 use schemars::{JsonSchema, schema_for};
 use serde::Serialize;
 use serde_json::Value as Schema;
+
+/// A standard normal number.
+pub(crate) fn normal(generator: &mut Generator) -> f64 {
+    StandardNormal.sample(generator)
+}
 
 /// Checks every number of settings against the bounds that their schema states.
 ///

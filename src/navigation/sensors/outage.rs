@@ -43,6 +43,11 @@ impl Outage {
         self.start_s <= t_s + SLACK_S && !self.is_over(t_s)
     }
 
+    /// Whether a fix at `t_s` is missing by any of some outages.
+    pub fn any_withholds(outages: &[Self], t_s: f64) -> bool {
+        outages.iter().any(|outage| outage.withholds(t_s))
+    }
+
     /// Whether a fix at `t_s` comes after it.
     pub(crate) fn is_over(&self, t_s: f64) -> bool {
         self.end_s <= t_s + SLACK_S
@@ -95,7 +100,7 @@ impl FromStr for Outage {
 // The data that outages are placed on, and what becomes of them there.
 
 /// When fixes come.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Fixes<'a> {
     /// At whole intervals after the start of the data.
     Every {
@@ -107,7 +112,7 @@ pub enum Fixes<'a> {
 }
 
 /// The data that outages are placed on: the one rule of runs, studies and fusions.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct FixedData<'a> {
     /// From when to when they last (s).
     pub span_s: (f64, f64),
@@ -133,14 +138,10 @@ impl<'a> FixedData<'a> {
     fn has_fix_in(&self, outage: &Outage) -> bool {
         match self.fixes {
             Fixes::Every { interval_s } => {
-                // The last fix before the outage and the first after its start, which rounding may exchange; at the
-                // earliest one interval after the start of the data: there is no fix at the start itself.
-                let last = ((outage.start_s - self.span_s.0) / interval_s)
-                    .floor()
-                    .max(1.0);
-                [last, last + 1.0]
-                    .iter()
-                    .any(|k| outage.withholds(self.span_s.0 + k * interval_s))
+                // there is no fix at the start itself
+                let fixes = (1_u32..).map(|k| self.span_s.0 + f64::from(k) * interval_s);
+                let mut until = fixes.take_while(|t_s| !outage.is_over(*t_s));
+                until.any(|t_s| outage.withholds(t_s))
             }
             Fixes::At(times_s) => times_s.iter().any(|t_s| outage.withholds(*t_s)),
         }
@@ -211,7 +212,7 @@ impl OutageError {
 }
 
 /// Outages as they are on data.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct PlacedOutages {
     /// In time order, apart from one another.
     pub windows: Vec<Outage>,
@@ -289,19 +290,8 @@ impl RandomOutages {
     /// One a second.
     pub const MOST_PER_HOUR: f64 = 3600.0;
 
-    fn windows(
-        &self,
-        (start_s, end_s): (f64, f64),
-        seed: u64,
-    ) -> Result<Vec<Outage>, SettingError> {
-        let refused = |_| {
-            SettingError::new(
-                "rate_per_hour",
-                self.rate_per_hour,
-                "it must be a number > 0",
-            )
-        };
-        let waiting = Exp::new(self.rate_per_hour / 3600.0).map_err(refused)?;
+    fn windows(&self, (start_s, end_s): (f64, f64), seed: u64) -> Vec<Outage> {
+        let waiting = Exp::new(self.rate_per_hour / 3600.0).expect("a rate > 0");
         let key = StreamKey {
             seed,
             scenario: "",
@@ -321,14 +311,14 @@ impl RandomOutages {
             // overlap.
             t += self.duration_s + waiting.sample(&mut generator);
         }
-        Ok(windows)
+        windows
     }
 }
 
 // What outages are asked for, and the one rule of runs, studies and fusions that places them on data.
 
 /// What is asked for: the union of all kinds.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub struct OutagePlan {
     /// Windows asked for by their times: they must lie on the data.
     pub fixed: Vec<Outage>,
@@ -396,7 +386,7 @@ impl OutagePlan {
                 });
             }
         }
-        let windows = self.windows(data.span_s, seed)?;
+        let windows = self.windows(data.span_s, seed);
         // Every fixed window lies on the data by now: fewer windows than were asked for can only come of a
         // union.
         if self.fixed.len() > windows.len() {
@@ -428,21 +418,11 @@ impl OutagePlan {
 
     /// The windows on data that last from `span_s.0` to `span_s.1`: in time order, those that overlap or touch
     /// made one, cut at the ends, those outside left out.
-    fn windows(&self, span_s: (f64, f64), seed: u64) -> Result<Vec<Outage>, SettingError> {
-        let mut all: Vec<Outage> = self.fixed.iter().chain(&self.default).copied().collect();
-        all.extend(
-            self.periodic
-                .iter()
-                .flat_map(|periodic| periodic.windows(span_s)),
-        );
-        if let Some(random) = &self.random {
-            all.extend(
-                random
-                    .windows(span_s, seed)
-                    .map_err(|e| e.in_section("outage_random"))?,
-            );
-        }
-        Ok(united(all, span_s))
+    fn windows(&self, span_s: (f64, f64), seed: u64) -> Vec<Outage> {
+        let fixed = self.fixed.iter().chain(&self.default).copied();
+        let periodic = self.periodic.iter().flat_map(|p| p.windows(span_s));
+        let random = self.random.iter().flat_map(|r| r.windows(span_s, seed));
+        united(fixed.chain(periodic).chain(random).collect(), span_s)
     }
 }
 

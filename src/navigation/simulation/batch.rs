@@ -11,6 +11,7 @@ use crate::ekf::{
 use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::Sensor;
 use crate::lanes::{LANES, Lanes, Real, Vec3};
+use crate::linalg::mean;
 use crate::sensors::aiding::Aid;
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
@@ -43,7 +44,7 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
         let fix = event.gnss_epoch.then(|| source.fix(plan, event));
         let measured = Measured {
             fix: fix.filter(|_| event.fix),
-            height: source.height(event),
+            height: source.height(plan, event),
             aids: source.aids(event),
         };
         // Drawn once for all candidates: their errors are paired, and ratios between them scatter far less
@@ -195,10 +196,7 @@ impl Candidate {
         });
         let kept: Vec<usize> = (0..self.live).filter(|lane| !diverged[*lane]).collect();
         let epochs = self.trace.iter().map(|e| e.sum(&kept)).collect();
-        let reports = self.trace.len() as f64;
-        let mean = |value: &dyn Fn(&EpochLanes) -> f64| {
-            self.trace.iter().map(value).sum::<f64>() / reports
-        };
+        let mean = |value: &dyn Fn(&EpochLanes) -> f64| mean(self.trace.iter().map(value));
         let record = |lane: usize| RunRecord {
             run: first + lane as u64,
             diverged: diverged[lane],
@@ -274,17 +272,12 @@ impl Assessment {
             nees: Lanes::ZERO,
         };
         for lane in 0..live {
-            let error = reported_error(&ekf.nominal.lane(lane), reference);
+            let (values, psi_n) = reported_error(&ekf.nominal.lane(lane), reference);
             for i in 0..REPORTED {
-                found.error[i][lane] = error.values[i];
+                found.error[i][lane] = values[i];
+                found.navigation[i][lane] = if i < 6 { values[i] } else { psi_n[i - 6] };
             }
-            for i in 0..6 {
-                found.navigation[i][lane] = error.values[i];
-            }
-            for i in 0..3 {
-                found.navigation[6 + i][lane] = error.psi_n[i];
-            }
-            found.att_error_deg[lane] = error.psi_n.length() / DEG;
+            found.att_error_deg[lane] = psi_n.length() / DEG;
         }
         // With psi_n (rad), not with roll, pitch, yaw: NEES is invariant under the Jacobian, which is
         // singular at pitch ±90°.
@@ -373,13 +366,8 @@ impl EpochLanes {
 }
 
 /// Errors of a run in the reported states (m, m/s, degrees) and the attitude error vector (rad).
-pub(crate) struct ReportedError {
-    pub values: [f64; REPORTED],
-    pub psi_n: DVec3,
-}
-
-pub(crate) fn reported_error(estimate: &NavState, truth: &NavState) -> ReportedError {
-    let r = ned_difference(truth, estimate.lat, estimate.lon, estimate.h);
+pub(crate) fn reported_error(estimate: &NavState, truth: &NavState) -> ([f64; REPORTED], DVec3) {
+    let r = ned_difference(truth.place(), estimate.place());
     let v = estimate.v_n - truth.v_n;
     // C_est = (I + [psi×]) C_true, hence the estimate on the left: the same error vector as the filter's PSI
     // block.
@@ -388,12 +376,8 @@ pub(crate) fn reported_error(estimate: &NavState, truth: &NavState) -> ReportedE
     // Through the Jacobian, not as a difference of Euler angles: linear as the filter's own deviation is, and
     // no angle wraps at ±180°.
     let angles = jacobian.map(|row| row.dot(psi_n) / DEG);
-    ReportedError {
-        values: [
-            r.x, r.y, r.z, v.x, v.y, v.z, angles[0], angles[1], angles[2],
-        ],
-        psi_n,
-    }
+    let of = [r.to_array(), v.to_array(), angles];
+    (std::array::from_fn(|i| of[i / 3][i % 3]), psi_n)
 }
 
 /// The rotation vector of a rotation (rad), the logarithm, exact for small ones too.

@@ -5,8 +5,8 @@ pub mod lincov;
 mod plan;
 mod source;
 
+pub(crate) use batch::reported_error;
 pub use batch::{Batch, run_batch};
-pub(crate) use batch::{ReportedError, reported_error};
 pub(crate) use plan::samples_per;
 pub use plan::{Experiment, ExperimentError, Plan};
 pub use source::{Recording, record};
@@ -83,7 +83,7 @@ pub struct EpochSums {
 }
 
 /// What is kept of one run in one outage.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct OutageRecord {
     /// Mean over the outage's reporting epochs (start ≤ t < end) of the SEE of each reported state.
     pub see_mean: [f64; REPORTED],
@@ -104,7 +104,7 @@ pub struct OutageRecord {
 }
 
 /// What is kept of one run.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct RunRecord {
     /// Run, counted from 0: with the seed it names every random number of the run.
     pub run: u64,
@@ -123,7 +123,7 @@ pub struct RunRecord {
 }
 
 /// All runs of one experiment, reduced in run order.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct RunResult {
     /// Reporting epochs in time order.
     pub epochs: Vec<EpochSums>,

@@ -9,7 +9,7 @@ use crate::sensors::aiding::{Aid, AidingSettings};
 use crate::sensors::defects::{ImuSettings, Surroundings};
 use crate::sensors::gnss::{BaroSettings, GnssSettings};
 use crate::sensors::ideal_imu::ideal_imu;
-use crate::sensors::imu::{ErrorSource, Truth, TruthError};
+use crate::sensors::imu::{Truth, TruthError, best_spans};
 use crate::sensors::outage::Outage;
 use crate::strapdown::MAX_ROTATION;
 use crate::trajectory::Trajectory;
@@ -52,6 +52,15 @@ pub struct Experiment<'a> {
     pub coverage_level: f64,
 }
 
+impl Experiment<'_> {
+    /// The quantile of the coverage statistic: a filter believes in a chi-square law.
+    pub(crate) fn coverage_quantile(&self) -> f64 {
+        let chi2 = ChiSquared::new(super::COVERAGE_DOF as f64);
+        let chi2 = chi2.expect("degrees of freedom are positive");
+        chi2.inverse_cdf(self.coverage_level)
+    }
+}
+
 /// Why an experiment cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum ExperimentError {
@@ -80,7 +89,7 @@ pub(super) struct Event {
     /// Reference state.
     pub reference: NavState,
     /// Reference position and velocity of the antenna: lat, lon (rad), h (m), v_n (m/s).
-    pub antenna: (DVec3, DVec3),
+    pub antenna: ([f64; 3], DVec3),
     /// Whether the receiver has an epoch here.
     pub gnss_epoch: bool,
     /// Whether its fix is used.
@@ -96,10 +105,10 @@ pub(super) struct Event {
 /// The shared part of all runs.
 #[derive(Debug)]
 pub struct Plan<'a> {
-    pub(super) experiment: &'a Experiment<'a>,
+    pub(crate) experiment: &'a Experiment<'a>,
     pub(super) ideal: Vec<ImuSample>,
-    /// What makes the inertial errors.
-    pub(super) errors: ErrorSource<'a>,
+    /// Averaging times of recordings that make the inertial errors.
+    pub(super) spans: Vec<[usize; 6]>,
     pub(super) start: NavState,
     pub(super) events: Vec<Event>,
     /// For each outage: how many reports fall into it, and the event of the first fix after it (or the
@@ -124,29 +133,19 @@ impl<'a> Plan<'a> {
                 ));
             }
         }
-        Self::with_source(experiment, |samples| {
-            experiment.truth.source(rate_hz, samples)
+        let plan = Self::reference(experiment)?;
+        experiment.truth.check(rate_hz, plan.samples())?;
+        Ok(Self {
+            spans: best_spans(&experiment.truth),
+            ..plan
         })
     }
 
-    /// The same for a covariance analysis, which draws no error: a model that is the truth may belong to another
-    /// rate.
+    /// The same for a covariance analysis, which draws no error: models may belong to another rate.
     ///
     /// # Errors
     /// What does not fit, with values.
     pub(super) fn reference(experiment: &'a Experiment<'a>) -> Result<Self, ExperimentError> {
-        Self::with_source(experiment, |samples| match experiment.truth {
-            Truth::Model(model) => Ok(ErrorSource::Model(model)),
-            Truth::Drawn(_) | Truth::Static(_) => {
-                experiment.truth.source(experiment.rate_hz, samples)
-            }
-        })
-    }
-
-    fn with_source(
-        experiment: &'a Experiment<'a>,
-        source: impl FnOnce(usize) -> Result<ErrorSource<'a>, TruthError>,
-    ) -> Result<Self, ExperimentError> {
         let Experiment {
             trajectory,
             rate_hz,
@@ -154,12 +153,8 @@ impl<'a> Plan<'a> {
             ..
         } = *experiment;
         let ideal = ideal_imu(trajectory, rate_hz, gravity)?;
-        let errors = source(ideal.len())?;
         check_rotation(&ideal, trajectory.start_s(), rate_hz)?;
         let events = schedule(experiment, ideal.len())?;
-        let chi2 =
-            ChiSquared::new(super::COVERAGE_DOF as f64).expect("degrees of freedom are positive");
-        let coverage_quantile = chi2.inverse_cdf(experiment.coverage_level);
         let start = trajectory.state(trajectory.start_s());
         let outages = experiment
             .outages
@@ -169,17 +164,12 @@ impl<'a> Plan<'a> {
         Ok(Self {
             experiment,
             ideal,
-            errors,
+            spans: Vec::new(),
             start,
             events,
             outages,
-            coverage_quantile,
+            coverage_quantile: experiment.coverage_quantile(),
         })
-    }
-
-    /// What was planned.
-    pub(crate) const fn experiment(&self) -> &'a Experiment<'a> {
-        self.experiment
     }
 
     /// What the IMU feels over a sample, as it is in its middle.
@@ -210,12 +200,14 @@ fn effects(outage: &Outage, events: &[Event]) -> (f64, usize) {
 }
 
 fn check_rotation(ideal: &[ImuSample], start_s: f64, rate_hz: f64) -> Result<(), ExperimentError> {
-    let too_fast = ideal
+    let mut angles = ideal
         .iter()
-        .position(|s| s.omega_ib_b.length() / rate_hz > MAX_ROTATION);
-    too_fast.map_or(Ok(()), |k| {
+        .map(|s| s.omega_ib_b.length() / rate_hz)
+        .enumerate();
+    let too_fast = angles.find(|(_, angle)| *angle > MAX_ROTATION);
+    too_fast.map_or(Ok(()), |(k, angle)| {
         let (t_s, most) = (start_s + k as f64 / rate_hz, MAX_ROTATION / DEG);
-        let angle = ideal[k].omega_ib_b.length() / rate_hz / DEG;
+        let angle = angle / DEG;
         refused(format!(
             "the vehicle turns {angle:.1}° within one IMU sample at {t_s} s; at most {most:.1}° can be followed at {rate_hz} Hz"
         ))
@@ -253,15 +245,9 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
     let reports = (0_u32..).map(|s| (f64::from(s) * rate_hz).round() as usize);
     let reports: Vec<usize> = reports.take_while(|k| *k <= samples).collect();
     let mut all = reports.clone();
-    all.extend((per_fix..=samples).step_by(per_fix));
-    all.extend(
-        baro.iter()
-            .flat_map(|step| (*step..=samples).step_by(*step)),
-    );
-    all.extend(
-        aids.iter()
-            .flat_map(|(_, step)| (*step..=samples).step_by(*step)),
-    );
+    let steps = [Some(per_fix), baro].into_iter().flatten();
+    let steps = steps.chain(aids.iter().map(|(_, step)| *step));
+    all.extend(steps.flat_map(|step| (step..=samples).step_by(step)));
     // The last sample is an event, so that an outage that lasts to the end has an end.
     all.push(samples);
     all.sort_unstable();
@@ -277,8 +263,9 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
         }
         // None at the very start: the initial deviations are those of a vehicle that GNSS has helped to align
         // already.
-        let gnss_epoch = sample > 0 && sample.is_multiple_of(per_fix);
-        let withheld = experiment.outages.iter().any(|o| o.withholds(t_s));
+        let is_due = |step: usize| sample > 0 && sample.is_multiple_of(step);
+        let gnss_epoch = is_due(per_fix);
+        let withheld = Outage::any_withholds(experiment.outages, t_s);
         Ok(Event {
             sample,
             t_s,
@@ -286,12 +273,11 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
             antenna: antenna(experiment, t_s, &reference),
             gnss_epoch,
             fix: gnss_epoch && !withheld,
-            baro: baro.is_some_and(|step| sample > 0 && sample.is_multiple_of(step)),
+            baro: baro.is_some_and(is_due),
             aids: aided(
                 experiment,
                 t_s,
-                aids.iter()
-                    .filter(|(_, step)| sample > 0 && sample.is_multiple_of(*step)),
+                aids.iter().filter(|(_, step)| is_due(*step)),
             ),
             report: reports.binary_search(&sample).is_ok(),
         })
@@ -312,11 +298,10 @@ pub(crate) fn samples_per(imu_hz: f64, fix_hz: f64) -> Option<usize> {
 }
 
 /// Position (lat, lon, h) and velocity in n of the antenna.
-fn antenna(experiment: &Experiment<'_>, t_s: f64, reference: &NavState) -> (DVec3, DVec3) {
+fn antenna(experiment: &Experiment<'_>, t_s: f64, reference: &NavState) -> ([f64; 3], DVec3) {
     let arm_b = DVec3::from(experiment.gnss.lever_arm_m);
-    let imu = DVec3::new(reference.lat, reference.lon, reference.h);
     if arm_b == DVec3::ZERO {
-        return (imu, reference.v_n);
+        return (reference.place(), reference.v_n);
     }
     let k = experiment.trajectory.kinematics(t_s);
     let arm_e = k.q_b_e * arm_b;
@@ -324,7 +309,7 @@ fn antenna(experiment: &Experiment<'_>, t_s: f64, reference: &NavState) -> (DVec
     // the truth.
     let (lat, lon, h) = crate::earth::ecef_to_geodetic(k.r_e + arm_e);
     let swing_n = reference.q_b_n * k.omega_eb_b.cross(arm_b);
-    (DVec3::new(lat, lon, h), reference.v_n + swing_n)
+    ([lat, lon, h], reference.v_n + swing_n)
 }
 
 // What a vehicle measures of itself along its reference, before any error.
@@ -360,10 +345,7 @@ fn aided<'a>(
     if aids.peek().is_none() {
         return Vec::new();
     }
-    let in_outage = experiment
-        .outages
-        .iter()
-        .any(|outage| outage.withholds(t_s));
+    let in_outage = Outage::any_withholds(experiment.outages, t_s);
     let k = experiment.trajectory.kinematics(t_s);
     let to_b = k.q_b_e.inverse();
     let (v_b, a_b) = (to_b * k.v_e, to_b * k.a_e);

@@ -1,22 +1,22 @@
 //! What is random of eight runs: starts, inertial errors, fixes, heights, what a vehicle measures of itself.
 
 use super::plan::{Aided, Event, Plan};
-use crate::earth::radii;
+use crate::earth::moved;
 use crate::ekf::Fix;
 use crate::ekf::belief::psi_of_angles;
 use crate::frames::{NavState, RollPitchYaw};
 use crate::gnss::{GnssFix, GnssVelocity};
 use crate::imu::{ImuIncrement, Sensor};
 use crate::lanes::{Lanes, Vec3};
-use crate::linalg;
-use crate::rng::StreamKey;
+use crate::linalg::to_nalgebra;
+use crate::rng::{Generator, StreamKey};
 use crate::sensors::aiding::{Aid, AidNoise};
 use crate::sensors::defects::Defects;
-use crate::sensors::gnss::{BaroNoise, GnssNoise};
+use crate::sensors::gnss::GnssNoise;
 use crate::sensors::imu::{ImuErrors, LaneErrors};
+use crate::sensors::normal;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
-use rand_distr::{Distribution, StandardNormal};
 use std::ops::Range;
 
 /// What eight runs measure at an instant.
@@ -33,7 +33,8 @@ pub(super) struct Source<'a> {
     rate_hz: f64,
     imu: LaneErrors<'a>,
     gnss: Vec<GnssNoise>,
-    baro: Vec<BaroNoise>,
+    /// Those of the heights; empty without a barometer.
+    baro: Vec<Generator>,
     aiding: Vec<AidNoise>,
     /// Empty for an IMU without defects.
     defects: Vec<Defects>,
@@ -53,16 +54,14 @@ impl<'a> Source<'a> {
         let keys: Vec<_> = (first..first + live as u64).map(key).collect();
         let imu = keys
             .iter()
-            .map(|k| ImuErrors::new(&plan.errors, *k, plan.samples()));
+            .map(|k| ImuErrors::new(&experiment.truth, &plan.spans, *k, plan.samples()));
         let gnss = keys
             .iter()
             .map(|k| GnssNoise::new(experiment.gnss, *k))
             .collect();
-        let baro = experiment
-            .baro
-            .iter()
-            .flat_map(|b| keys.iter().map(|k| BaroNoise::new(b, *k)))
-            .collect();
+        let height = |key: &StreamKey<'a>| key.stream("baro", "height");
+        let baro = experiment.baro.iter();
+        let baro = baro.flat_map(|_| keys.iter().map(height)).collect();
         let aiding = keys
             .iter()
             .map(|k| AidNoise::new(experiment.aiding, *k))
@@ -108,12 +107,13 @@ impl<'a> Source<'a> {
     }
 
     /// The heights of this epoch, if the barometer has one.
-    pub(super) fn height(&mut self, event: &Event) -> Option<Lanes> {
+    pub(super) fn height(&mut self, plan: &Plan<'_>, event: &Event) -> Option<Lanes> {
+        let baro = plan.experiment.baro.filter(|_| event.baro)?;
         let mut h = Lanes::splat(event.reference.h);
-        for (lane, noise) in self.baro.iter_mut().enumerate().filter(|_| event.baro) {
-            h[lane] += noise.draw();
+        for (lane, stream) in self.baro.iter_mut().enumerate() {
+            h[lane] += baro.sigma_m * normal(stream);
         }
-        event.baro.then_some(h)
+        Some(h)
     }
 
     /// What the vehicle measures of itself at this epoch.
@@ -143,11 +143,10 @@ impl<'a> Source<'a> {
     /// The fixes of this epoch.
     pub(super) fn fix(&mut self, plan: &Plan<'_>, event: &Event) -> Fix {
         let (gnss, (antenna, velocity)) = (plan.experiment.gnss, event.antenna);
-        let r = radii(antenna.x.sin());
         let mut fix = Fix {
-            lat: Lanes::splat(antenna.x),
-            lon: Lanes::splat(antenna.y),
-            h: Lanes::splat(antenna.z),
+            lat: Lanes::splat(antenna[0]),
+            lon: Lanes::splat(antenna[1]),
+            h: Lanes::splat(antenna[2]),
             v_n: gnss.vel_sigma_m_s.map(|_| Vec3::splat(velocity)),
             pos_sigma_m: gnss.pos_sigma_m.into(),
             vel_sigma_m_s: gnss.vel_sigma_m_s.unwrap_or_default().into(),
@@ -155,11 +154,7 @@ impl<'a> Source<'a> {
         };
         for (lane, noise) in self.gnss.iter_mut().enumerate() {
             let (position, speed) = noise.draw();
-            // Metres to angles at the antenna: the white error is small enough for one set of radii.
-            fix.lat[lane] += position.x / (r.meridian + antenna.z);
-            fix.lon[lane] += position.y / ((r.transverse + antenna.z) * antenna.x.cos());
-            // The error is down, the height up.
-            fix.h[lane] -= position.z;
+            [fix.lat[lane], fix.lon[lane], fix.h[lane]] = moved(antenna, position);
             if let Some(v_n) = &mut fix.v_n {
                 v_n.set_lane(lane, velocity + speed);
             }
@@ -174,32 +169,22 @@ fn nominal_start(plan: &Plan<'_>, key: StreamKey<'_>) -> NavState {
         return truth;
     }
     let draw = |process: &'static str, sigma: [f64; 3]| {
-        let mut generator = StreamKey {
-            source: "initial",
-            process,
-            ..key
-        }
-        .generator();
-        let mut normal = || -> f64 { StandardNormal.sample(&mut generator) };
-        DVec3::new(
-            sigma[0] * normal(),
-            sigma[1] * normal(),
-            sigma[2] * normal(),
-        )
+        let mut generator = key.stream("initial", process);
+        DVec3::from(sigma.map(|sigma| sigma * normal(&mut generator)))
     };
     let dr = draw("position", initial.pos_sigma_m);
     let dv = draw("velocity", initial.vel_sigma_m_s);
     let angles = draw("attitude", initial.att_sigma_deg.map(|s| s * DEG));
     // Drawn as roll, pitch, yaw and brought to psi_n by the map that makes the filter's covariance: the NEES
     // at the start is a χ² of nine degrees of freedom, to first order.
-    let psi = linalg::to_glam(&(psi_of_angles(truth.q_b_n) * linalg::to_nalgebra(angles)));
-    let r = radii(truth.lat.sin());
+    let psi = psi_of_angles(truth.q_b_n) * to_nalgebra(angles);
+    let [lat, lon, h] = moved(truth.place(), dr);
     NavState {
-        lat: truth.lat + dr.x / (r.meridian + truth.h),
-        lon: truth.lon + dr.y / ((r.transverse + truth.h) * truth.lat.cos()),
-        h: truth.h - dr.z,
+        lat,
+        lon,
+        h,
         v_n: truth.v_n + dv,
-        q_b_n: DQuat::from_scaled_axis(psi) * truth.q_b_n,
+        q_b_n: DQuat::from_scaled_axis(DVec3::from_slice(psi.as_slice())) * truth.q_b_n,
     }
 }
 

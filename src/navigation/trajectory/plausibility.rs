@@ -2,7 +2,7 @@
 //! velocities that agree with positions.
 
 use super::Trajectory;
-use crate::linalg::larger;
+use crate::linalg::{by_value, larger};
 use crate::units::DEG;
 use glam::DVec3;
 use std::fmt;
@@ -25,7 +25,7 @@ const QUANTITIES: [(&str, &str); 4] = [
 pub const LIMITS: [f64; 4] = [350.0, 30.0, 35.0, 200.0];
 
 /// A stretch beyond a limit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Excess {
     /// The quantity and its unit.
     pub quantity: (&'static str, &'static str),
@@ -120,7 +120,7 @@ fn magnitudes(trajectory: &Trajectory, t_s: f64) -> [f64; 4] {
 }
 
 /// Difference of given velocities from those of the positions.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct VelocityMisfit {
     /// Root mean square of the difference vector (m/s).
     pub rms: f64,
@@ -140,7 +140,7 @@ impl VelocityMisfit {
             .iter()
             .map(|(t_s, v)| (*t_s, (*v - found(*t_s)).length()))
             .collect();
-        let (worst_s, worst) = off.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (worst_s, worst) = off.iter().copied().max_by(by_value)?;
         let rms = |squares: f64| (squares / off.len() as f64).sqrt();
         let speed = velocities
             .iter()

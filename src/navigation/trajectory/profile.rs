@@ -18,12 +18,13 @@
 //! ```
 
 use super::{Trajectory, TrajectorySample};
-use crate::earth::radii;
+use crate::earth::{moved, radii};
 use crate::frames::{RollPitchYaw, wrap_angle};
 use crate::units::{DEG, STANDARD_GRAVITY};
+use glam::DVec3;
 
 /// A motion profile.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Profile {
     /// Where and how it starts.
     pub start: Start,
@@ -37,7 +38,7 @@ pub struct Profile {
 }
 
 /// The start of a profile.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Start {
     /// Time (s).
     pub t_s: f64,
@@ -54,7 +55,7 @@ pub struct Start {
 }
 
 /// Roll in turns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 pub enum Bank {
     /// Stays level across, as a land vehicle.
     #[default]
@@ -65,7 +66,7 @@ pub enum Bank {
 }
 
 /// One segment.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Segment {
     /// What happens.
     pub kind: Kind,
@@ -76,7 +77,7 @@ pub struct Segment {
 }
 
 /// What happens in a segment.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub enum Kind {
     /// Constant speed and heading; at speed zero, standing.
     Straight(Length),
@@ -111,7 +112,7 @@ pub enum Kind {
 }
 
 /// How long a straight is.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Length {
     /// In time (s).
     Duration(f64),
@@ -120,7 +121,7 @@ pub enum Length {
 }
 
 /// How fast speed changes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Acceleration {
     /// Within a time (s).
     Duration(f64),
@@ -129,7 +130,7 @@ pub enum Acceleration {
 }
 
 /// How fast heading changes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Turning {
     /// Within a time (s).
     Duration(f64),
@@ -506,7 +507,7 @@ impl Shape {
     }
 
     /// The change so far: the integral of the rate.
-    pub(in crate::trajectory) fn value(self, x: f64) -> f64 {
+    fn value(self, x: f64) -> f64 {
         if x > 0.5 {
             // The rate is symmetric about the middle: one formula for both ramps, and exactly 1 at the end.
             return 1.0 - self.value(1.0 - x);
@@ -597,7 +598,7 @@ impl Piece {
 const MAX_CORNER: f64 = 150.0 * DEG;
 
 /// A point to pass.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Waypoint {
     /// Where.
     pub place: Place,
@@ -606,7 +607,7 @@ pub struct Waypoint {
 }
 
 /// A horizontal position.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Place {
     /// Latitude and longitude (rad).
     Geodetic {
@@ -622,14 +623,6 @@ pub enum Place {
         /// East (m).
         east: f64,
     },
-}
-
-/// The geometry of a turn that cuts a corner.
-struct Corner {
-    /// Length of the straight line from its begin to its end (m), in the direction of half the turn.
-    chord: f64,
-    /// From its begin to the corner it cuts, and from there to its end (m).
-    lead: f64,
 }
 
 impl Path<'_> {
@@ -675,13 +668,12 @@ impl Path<'_> {
     /// Latitude and longitude of a waypoint (rad).
     fn target(&self, point: &Waypoint) -> Result<[f64; 2], Problem> {
         let start = &self.profile.start;
-        let r = radii(start.lat.sin());
-        let [lat, lon] = match point.place {
-            Place::Geodetic { lat, lon } => [lat, lon],
-            Place::Local { north, east } => [
-                start.lat + north / (r.meridian + start.h),
-                start.lon + east / ((r.transverse + start.h) * start.lat.cos()),
-            ],
+        let [lat, lon, _] = match point.place {
+            Place::Geodetic { lat, lon } => [lat, lon, start.h],
+            Place::Local { north, east } => {
+                let by_n = DVec3::new(north, east, 0.0);
+                moved([start.lat, start.lon, start.h], by_n)
+            }
         };
         let finite = lon.is_finite() && point.h.is_none_or(f64::is_finite);
         domain(
@@ -722,7 +714,9 @@ impl Path<'_> {
         length
     }
 
-    fn corner(&self, angle: f64, by: Turning, ramp_s: f64) -> Result<Corner, Problem> {
+    /// A turn that cuts a corner: length of the straight line from its begin to its end, which goes in the direction of half
+    /// the turn, and length from its begin to the corner and from there to its end (m).
+    fn corner(&self, angle: f64, by: Turning, ramp_s: f64) -> Result<[f64; 2], Problem> {
         let duration = self.turn_duration(angle, by, ramp_s)?;
         let piece = self.piece([duration, ramp_s], 0.0, angle, 0.0);
         let half = self.heading + 0.5 * angle;
@@ -730,10 +724,7 @@ impl Path<'_> {
         // velocity along it counts.
         let chord = self.speed * duration * mean(|x| (piece.at(x).heading - half).cos());
         // Chord and both leads are an isosceles triangle with the angle of the turn outside at the corner.
-        Ok(Corner {
-            chord,
-            lead: 0.5 * chord / (0.5 * angle).cos(),
-        })
+        Ok([chord, 0.5 * chord / (0.5 * angle).cos()])
     }
 
     /// Distance before the corner at `target` at which the turn to `next` begins (m).
@@ -755,7 +746,7 @@ impl Path<'_> {
         if angle.abs() < 1e-9 {
             Ok(0.0)
         } else {
-            Ok(self.corner(angle, by, ramp_s)?.lead)
+            Ok(self.corner(angle, by, ramp_s)?[1])
         }
     }
 
@@ -791,18 +782,14 @@ impl Path<'_> {
 
     /// What is left to turn (rad) to the target after a turn by an angle.
     fn miss(&self, angle: f64, target: [f64; 2], by: Turning, ramp_s: f64) -> Result<f64, Problem> {
-        let corner = self.corner(angle, by, ramp_s)?;
-        let r = radii(self.lat.sin());
+        let [chord, _] = self.corner(angle, by, ramp_s)?;
         let (sin_psi, cos_psi) = (self.heading + 0.5 * angle).sin_cos();
         // Flat over the chord of a turn: hundreds of metres over the radius of the Earth, second order 1e-8
         // of it.
-        let after = [
-            self.lat + corner.chord * cos_psi / (r.meridian + self.h),
-            self.lon + corner.chord * sin_psi / ((r.transverse + self.h) * self.lat.cos()),
-        ];
-        Ok(wrap_angle(
-            self.course(after, target).0 - self.heading - angle,
-        ))
+        let by_n = DVec3::new(chord * cos_psi, chord * sin_psi, 0.0);
+        let [lat, lon, _] = moved([self.lat, self.lon, self.h], by_n);
+        let course = self.course([lat, lon], target).0;
+        Ok(wrap_angle(course - self.heading - angle))
     }
 }
 

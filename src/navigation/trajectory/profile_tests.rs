@@ -73,7 +73,7 @@ fn a_straight_covers_its_distance_in_its_direction() {
         .unwrap();
     assert_eq!((t.start_s(), t.end_s()), (10.0, 60.0));
     let (start, end) = (t.state(10.0), t.state(60.0));
-    let moved = ned_difference(&start, end.lat, end.lon, end.h);
+    let moved = ned_difference(start.place(), end.place());
     // Loxodrome against radii at its start: 1000² tan(lat)/(2 R) = 0.08 m.
     assert!(
         (moved - DVec3::new(30.0_f64.to_radians().cos(), 0.5, 0.0) * 1000.0).length() < 0.15,

@@ -45,25 +45,20 @@ struct Stretch {
 }
 
 impl From<Trajectory> for Reference {
-    fn from(whole: Trajectory) -> Self {
-        Self {
-            stretches: vec![whole.into()],
-        }
-    }
-}
-
-impl From<Trajectory> for Stretch {
     fn from(curve: Trajectory) -> Self {
         let velocity_sigma = velocity_sigma(&curve);
-        Self {
+        let whole = Stretch {
             curve,
             velocity_sigma,
+        };
+        Self {
+            stretches: vec![whole],
         }
     }
 }
 
 /// Why samples are left out.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub enum Fault {
     /// No samples for so long (s).
     Gap(f64),
@@ -87,7 +82,7 @@ impl fmt::Display for Fault {
 }
 
 /// The fault that ends a stretch: between sample `index − 1` and `index`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Break {
     /// The sample after it.
     pub index: usize,
@@ -98,8 +93,11 @@ pub struct Break {
 impl Reference {
     /// The reference of stretches in order of time; none without any.
     pub fn of_stretches(stretches: Vec<Trajectory>) -> Option<Self> {
-        let stretches: Vec<Stretch> = stretches.into_iter().map(Into::into).collect();
-        (!stretches.is_empty()).then_some(Self { stretches })
+        let all = stretches.into_iter().map(Self::from);
+        all.reduce(|mut all, more| {
+            all.stretches.extend(more.stretches);
+            all
+        })
     }
 
     /// Position, velocity and attitude at an instant; none where nothing is known.

@@ -30,7 +30,7 @@ fn a_profile_of_every_kind_of_segment() {
         h: 410.0,
         ..end
     };
-    let past = nav_sim_navigation::earth::ned_difference(&last, end.lat, end.lon, end.h);
+    let past = nav_sim_navigation::earth::ned_difference(last.place(), end.place());
     assert!(
         (past.length() - 82.5).abs() < 0.01 && past.z.abs() < 1e-6,
         "{past}"

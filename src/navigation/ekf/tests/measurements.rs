@@ -19,7 +19,7 @@ fn lever_arm_rows_agree_with_central_differences() {
         ekf.omega_ib_b = Vec3::splat(omega);
         // antenna position (relative, m) and velocity for a state and a gyroscope bias error
         let antenna = |s: &NavState, bias: DVec3| {
-            let r = earth::ned_difference(&state, s.lat, s.lon, s.h) + s.q_b_n * arm;
+            let r = earth::ned_difference(state.place(), s.place()) + s.q_b_n * arm;
             let omega_eb_b = omega - bias - s.q_b_n.inverse() * earth::omega_ie_n(state.lat);
             (r, s.v_n + s.q_b_n * omega_eb_b.cross(arm))
         };

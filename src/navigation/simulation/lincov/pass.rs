@@ -4,6 +4,7 @@ use super::track::{Mark, NAV, Nav, Row, SIGNALS, Sides, Sources, Step, StepOfSou
 use super::truth::{TrueErrors, TruthSide};
 use crate::ekf::Belief;
 use crate::ekf::covariance::PSI;
+use crate::linalg::mean;
 use crate::noise::Model;
 use crate::sensors::outage::Outage;
 use crate::simulation::{BIASES, REPORTED};
@@ -18,7 +19,7 @@ use std::ops::Range;
 const STEEP: f64 = 5.76;
 
 /// How a filter's covariance stands to that of its true errors, at one instant.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Consistency {
     /// Time from the start (s).
     pub after_s: f64,
@@ -45,7 +46,7 @@ impl Consistency {
 }
 
 /// What a pass finds.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Assessment {
     /// At every report (1 Hz), after the measurements.
     pub reports: Vec<Consistency>,
@@ -57,9 +58,8 @@ impl Assessment {
     /// True RMSE over stated standard deviation over the whole run, as verdicts have it: the root mean square over the
     /// reports.
     pub fn ratio_over_run(&self) -> [f64; REPORTED] {
-        let count = self.reports.len() as f64;
         let ratios: Vec<[f64; REPORTED]> = self.reports.iter().map(Consistency::ratio).collect();
-        std::array::from_fn(|i| (ratios.iter().map(|r| r[i].powi(2)).sum::<f64>() / count).sqrt())
+        std::array::from_fn(|i| mean(ratios.iter().map(|r| r[i].powi(2))).sqrt())
     }
 }
 
@@ -90,7 +90,7 @@ pub fn strapdown_over_sigma(track: &Track, belief: &Belief) -> f64 {
 
 /// The law of a filter's true errors at one instant: normal, with this mean and covariance, in the filter's navigation states
 /// (position m, velocity m/s, attitude rad, in n).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Instant {
     /// Time from the start (s).
     pub after_s: f64,
@@ -108,7 +108,7 @@ pub struct Instant {
 }
 
 /// A filter's errors at one instant, and what it states of them.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Judged {
     /// The law of the true errors.
     pub errors: Instant,
@@ -117,7 +117,7 @@ pub struct Judged {
 }
 
 /// The law of a filter's errors along a track.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub struct ErrorLaw {
     /// At every report (1 Hz), after the measurements.
     pub reports: Vec<Judged>,
@@ -136,8 +136,8 @@ pub struct FilterPass<'a> {
     /// The gain of every scalar measurement, in sequence, and the variance that the filter states for its innovation.
     gains: Vec<(Column, f64)>,
     reports: Vec<[Nav; NAV]>,
-    /// Standard deviations that the filter states of the biases, at every report.
-    biases: Vec<[f64; BIASES]>,
+    /// Standard deviations that the filter states of the sensors' biases (m/s², rad/s), at every report.
+    pub biases: Vec<[f64; BIASES]>,
     /// The covariance that the filter states at the end of each outage.
     ends: Vec<[Nav; NAV]>,
 }
@@ -172,23 +172,18 @@ impl<'a> FilterPass<'a> {
         }
     }
 
-    /// Standard deviations that the filter states of the sensors' biases (m/s², rad/s), at every report.
-    pub fn bias_sigmas(&self) -> &[[f64; BIASES]] {
-        &self.biases
+    /// The reports, and what the filter states there.
+    fn stated(&self) -> impl Iterator<Item = (&Mark, &[Nav; NAV])> {
+        let marks = self.track.marks.iter();
+        marks.filter(|mark| mark.report).zip(&self.reports)
     }
 
     /// Times from the start (s) of the reports at which something is measured, and the standard deviations of yaw there (degrees).
     pub fn yaw_while_measured(&self) -> Vec<(f64, f64)> {
-        let reports = self
-            .track
-            .marks
-            .iter()
-            .filter(|mark| mark.report)
-            .zip(&self.reports);
         // Near the vertical roll and yaw are no separate angles: yaw is uncertain there however well the attitude is known.
         let is_separate = |mark: &Mark| mark.jacobian[2].length() < STEEP;
-        let measured = reports.filter(|(mark, _)| !mark.rows.is_empty() && is_separate(mark));
-        measured
+        self.stated()
+            .filter(|(mark, _)| !mark.rows.is_empty() && is_separate(mark))
             .map(|(mark, p)| (mark.after_s, deviations(&mark.jacobian, p)[REPORTED - 1]))
             .collect()
     }
@@ -207,21 +202,14 @@ impl<'a> FilterPass<'a> {
 
     /// Their means over the reports within each of some outages.
     pub fn sigma_means(&self, outages: &[Outage]) -> Vec<[f64; REPORTED]> {
-        let reports = self
-            .track
-            .marks
-            .iter()
-            .filter(|mark| mark.report)
-            .zip(&self.reports);
-        let sigmas: Vec<(f64, [f64; REPORTED])> = reports
-            .map(|(mark, believed)| (mark.t_s, deviations(&mark.jacobian, believed)))
-            .collect();
-        let mean = |outage: &Outage| {
-            let within = || sigmas.iter().filter(|(t_s, _)| outage.withholds(*t_s));
-            let count = within().count() as f64;
-            std::array::from_fn(|i| within().map(|(_, sigma)| sigma[i]).sum::<f64>() / count)
+        let of_outage = |outage: &Outage| {
+            let within = self.stated().filter(|(mark, _)| outage.withholds(mark.t_s));
+            let sigmas: Vec<[f64; REPORTED]> = within
+                .map(|(mark, believed)| deviations(&mark.jacobian, believed))
+                .collect();
+            std::array::from_fn(|i| mean(sigmas.iter().map(|sigma| sigma[i])))
         };
-        outages.iter().map(mean).collect()
+        outages.iter().map(of_outage).collect()
     }
 
     /// As [`assess`], of the filter's own belief, where settings state more of the true errors than a noise model.
@@ -265,7 +253,7 @@ impl<'a> FilterPass<'a> {
             law.nis.1 += u64::from(mark.fix);
             for (row, (gain, believed)) in mark.rows.iter().zip(&mut gains) {
                 let square = errors.measure(row, gain);
-                if row.what.kind() == 0 {
+                if row.what.is_of_fix() {
                     // The gate and the NIS of runs are of fixes alone.
                     law.nis.0 += square / believed;
                 }
@@ -300,25 +288,13 @@ impl Instant {
     /// The reported states (m, m/s, degrees) of a vector of the filter's states.
     pub(crate) fn reported(&self, x: &Nav) -> [f64; REPORTED] {
         let psi = DVec3::new(x[3 * PSI], x[3 * PSI + 1], x[3 * PSI + 2]);
-        std::array::from_fn(|i| {
-            if i < 6 {
-                x[i]
-            } else {
-                self.jacobian[i - 6].dot(psi) / DEG
-            }
-        })
+        let angles = self.jacobian.map(|row| row.dot(psi) / DEG);
+        std::array::from_fn(|i| if i < 6 { x[i] } else { angles[i - 6] })
     }
 
     /// Variances of the reported states (m², (m/s)², degrees²) of a covariance of the filter's states.
     pub(crate) fn variances(&self, p: &[Nav; NAV]) -> [f64; REPORTED] {
-        let squares = squares(&self.jacobian, p);
-        std::array::from_fn(|i| {
-            if i < 6 {
-                squares[i]
-            } else {
-                squares[i] / (DEG * DEG)
-            }
-        })
+        in_degrees(squares(&self.jacobian, p), DEG * DEG)
     }
 
     /// Root mean squares of the true errors of the reported states.
@@ -327,6 +303,9 @@ impl Instant {
     }
 }
 
+/// A matrix of the filter's navigation states.
+type Square = SMatrix<f64, NAV, NAV>;
+
 impl Judged {
     /// Standard deviations that the filter states of the reported states.
     pub fn sigma(&self) -> [f64; REPORTED] {
@@ -334,12 +313,11 @@ impl Judged {
     }
 
     /// L⁻¹ P_true L⁻ᵀ with P = L Lᵀ: the identity where the filter is right; NaN where P is not positive definite.
-    pub(super) fn whitened(&self) -> SMatrix<f64, NAV, NAV> {
+    pub(super) fn whitened(&self) -> Square {
         let moments = self.errors.moments();
-        let p = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| self.believed[j][i]);
-        let mut m = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| moments[j][i]);
-        let Some(l) = p.cholesky().map(|p| p.l()) else {
-            return SMatrix::repeat(f64::NAN);
+        let mut m = Square::from(moments);
+        let Some(l) = Square::from(self.believed).cholesky().map(|p| p.l()) else {
+            return Square::repeat(f64::NAN);
         };
         for _ in 0..2 {
             l.solve_lower_triangular_mut(&mut m);
@@ -351,9 +329,8 @@ impl Judged {
     /// How the filter's covariance stands to that of its true errors.
     pub fn consistency(&self) -> Consistency {
         let moments = self.errors.moments();
-        let p = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| self.believed[j][i]);
-        let t = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| moments[j][i]);
-        let log_det = |l: SMatrix<f64, NAV, NAV>| 2.0 * l.diagonal().map(f64::ln).sum();
+        let [p, t] = [self.believed, moments].map(Square::from);
+        let log_det = |l: Square| 2.0 * l.diagonal().map(f64::ln).sum();
         // One source alone need not move all nine states: P_true is then singular, its NEES finite, the
         // divergence infinite.
         let (nees, believed, real) = match (p.cholesky(), t.cholesky()) {
@@ -392,8 +369,12 @@ fn squares(jacobian: &[DVec3; 3], p: &[Nav; NAV]) -> [f64; REPORTED] {
 
 /// Standard deviations of the reported states (m, m/s, degrees).
 fn deviations(jacobian: &[DVec3; 3], p: &[Nav; NAV]) -> [f64; REPORTED] {
-    let roots = squares(jacobian, p).map(f64::sqrt);
-    std::array::from_fn(|i| if i < 6 { roots[i] } else { roots[i] / DEG })
+    in_degrees(squares(jacobian, p).map(f64::sqrt), DEG)
+}
+
+/// Divides what is of angles.
+fn in_degrees(all: [f64; REPORTED], unit: f64) -> [f64; REPORTED] {
+    std::array::from_fn(|i| if i < 6 { all[i] } else { all[i] / unit })
 }
 
 // One outage at many places of a track, each alone: a pass with all fixes, from which each outage branches off.
@@ -430,8 +411,12 @@ pub(crate) fn errors_in_outages(
     let believed = Sources::of_belief(belief);
     let sides = Sides::of_errors(&believed, &truth.inertial, track);
     let own = Sides::of_filter(believed, track);
-    let mut pass = Pass::new(track, &own, &sides, truth);
-    let goes_on = |row: &Row| !row.of_gnss;
+    let mut filter = Joint::new(track.start, &own);
+    let mut errors = Errors::at_start(track, &sides, truth);
+    let measure = |filter: &mut Joint<'_>, errors: &mut Errors<'_>, row: &Row| {
+        errors.measure(row, &filter.measure(row).0);
+    };
+    let goes_on = |row: &&Row| !row.of_gnss;
     let mut found = vec![Vec::new(); ways.len()];
     let mut at = 0;
     for together in order.chunks(TOGETHER) {
@@ -439,32 +424,32 @@ pub(crate) fn errors_in_outages(
         for place in together {
             let way = &ways[*place];
             for (steps, mark) in track.legs(at..way.start) {
-                pass.follow(steps, mark);
-                pass.measure(mark, |_| true);
+                steps.iter().for_each(|step| filter.step(step));
+                errors.follow(steps, mark);
+                let rows = mark.rows.iter();
+                rows.for_each(|row| measure(&mut filter, &mut errors, row));
             }
             at = at.max(way.start);
-            begun.push((*place, pass.clone()));
+            begun.push((*place, filter.clone(), errors.clone()));
         }
-        let branch = |(place, mut pass): (usize, Pass<'_>)| {
+        let branch = |(place, mut filter, mut errors): (usize, Joint<'_>, Errors<'_>)| {
             let (way, mut instants) = (&ways[place], Vec::new());
             // Without a measurement nobody asks for a gain: of the filter's own covariance nothing is needed then.
             let is_blind = !track.marks[way.clone()]
                 .iter()
                 .flat_map(|mark| &mark.rows)
-                .any(goes_on);
+                .any(|row| goes_on(&row));
             for (index, (steps, mark)) in way.clone().zip(track.legs(way.clone())) {
-                if is_blind {
-                    pass.errors.follow(steps, mark);
-                } else {
-                    pass.follow(steps, mark);
+                if !is_blind {
+                    steps.iter().for_each(|step| filter.step(step));
                 }
+                errors.follow(steps, mark);
                 // Before the measurements, as the end of an outage in the runs: each report could be one.
                 let is_end = index + 1 == way.end;
                 let is_looked_at = is_end || moments == Moments::Reports && mark.report;
-                instants.extend(is_looked_at.then(|| pass.errors.instant(mark)));
-                if !is_end {
-                    pass.measure(mark, goes_on);
-                }
+                instants.extend(is_looked_at.then(|| errors.instant(mark)));
+                let rows = mark.rows.iter().filter(|_| !is_end).filter(goes_on);
+                rows.for_each(|row| measure(&mut filter, &mut errors, row));
             }
             (place, instants)
         };
@@ -486,37 +471,6 @@ impl Track {
         let end = fix_where(&|t_s| outage.is_over(t_s)).unwrap_or(self.marks.len() - 1);
         // An outage between two fixes withholds none.
         fix_where(&|t_s| outage.withholds(t_s)).unwrap_or(end)..end + 1
-    }
-}
-
-/// A filter's own covariance and its true errors, side by side.
-#[derive(Clone)]
-struct Pass<'a> {
-    filter: Joint<'a>,
-    errors: Errors<'a>,
-}
-
-impl<'a> Pass<'a> {
-    /// At the start of a track, of a filter's own states and those of its true errors.
-    fn new(track: &Track, own: &'a Sides, sides: &'a Sides, truth: &'a TruthSide) -> Self {
-        Self {
-            filter: Joint::new(track.start, own),
-            errors: Errors::at_start(track, sides, truth),
-        }
-    }
-
-    /// Over the steps that lead to a mark.
-    fn follow(&mut self, steps: &[Step], mark: &Mark) {
-        steps.iter().for_each(|step| self.filter.step(step));
-        self.errors.follow(steps, mark);
-    }
-
-    /// The measurements of a mark that are wanted.
-    fn measure(&mut self, mark: &Mark, is_wanted: impl Fn(&Row) -> bool) {
-        for row in mark.rows.iter().filter(|row| is_wanted(row)) {
-            let (gain, _) = self.filter.measure(row);
-            self.errors.measure(row, &gain);
-        }
     }
 }
 
@@ -694,36 +648,36 @@ impl<'a> Joint<'a> {
         }
     }
 
-    /// A measurement with white noise of variance `r`.
-    fn innovation(&self, measured: &Column, r: f64) -> Innovation {
+    /// Covariances with the innovation of a measurement with white noise of variance `r`, and its variance.
+    fn innovation(&self, measured: &Column, r: f64) -> (Column, f64) {
         let with = self.covariance_with(measured);
         // hᵀ P h + r
         let s = r + measured.dot(&with);
-        Innovation { with, s }
+        (with, s)
     }
 
     /// Corrects by a measurement as the filter does whose own covariance this is; returns its gain, and the variance that it
     /// states for the innovation.
     fn measure(&mut self, row: &Row) -> (Column, f64) {
-        let y = self.innovation(&self.measured(row), row.r);
+        let (with, s) = self.innovation(&self.measured(row), row.r);
         // the gain that is best where the covariance is right
-        let own = y.with.s.iter().take(self.sides.estimated);
+        let own = with.s.iter().take(self.sides.estimated);
         let gain = Column {
-            x: y.with.x.map(|c| c / y.s),
-            s: own.map(|c| c / y.s).collect(),
+            x: with.x.map(|c| c / s),
+            s: own.map(|c| c / s).collect(),
         };
-        corrected(self, &y, &gain);
-        (gain, y.s)
+        corrected(self, (&with, s), &gain);
+        (gain, s)
     }
 
     /// z ← z − k y for an innovation y; the gain belongs to a filter that need not be right.
     #[inline(always)]
-    fn update(&mut self, y: &Innovation, gain: &Column) {
-        let (n, nb, with) = (self.xs.len(), self.sides.estimated, &y.with);
+    fn update(&mut self, (with, variance): (&Column, f64), gain: &Column) {
+        let (n, nb) = (self.xs.len(), self.sides.estimated);
         // P − k cᵀ − c kᵀ + k s kᵀ, by (s k − c) kᵀ − k cᵀ
         // With the optimal gain s k = c and the first term is zero. Here c is of the truth and k of the
         // filter.
-        let rest_x: Nav = std::array::from_fn(|i| y.s * gain.x[i] - with.x[i]);
+        let rest_x: Nav = std::array::from_fn(|i| variance * gain.x[i] - with.x[i]);
         for j in 0..NAV {
             add_scaled(&mut self.xx[j], gain.x[j], &rest_x);
             add_scaled(&mut self.xx[j], -with.x[j], &gain.x);
@@ -735,7 +689,7 @@ impl<'a> Joint<'a> {
             add_scaled(x, -c, &gain.x);
         }
         for (i, (k, c)) in gain.s.iter().zip(&with.s).enumerate() {
-            let rest = y.s * k - c;
+            let rest = variance * k - c;
             let (own, truth) = self.bs[i * n..][..n].split_at_mut(nb);
             for (p, (other, with)) in own.iter_mut().zip(gain.s.iter().zip(&with.s)) {
                 *p += rest * other - k * with;
@@ -768,13 +722,6 @@ impl<'a> Joint<'a> {
     }
 }
 
-/// Covariances with an innovation, and its variance.
-struct Innovation {
-    with: Column,
-    /// Its variance.
-    s: f64,
-}
-
 impl Step {
     #[inline(always)]
     pub(super) fn map(&self, x: &Nav, e: &[f64]) -> Nav {
@@ -796,8 +743,8 @@ fn over(joint: &mut Joint<'_>, step: &Step) {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2"))]
-fn corrected(joint: &mut Joint<'_>, y: &Innovation, gain: &Column) {
-    joint.update(y, gain);
+fn corrected(joint: &mut Joint<'_>, innovation: (&Column, f64), gain: &Column) {
+    joint.update(innovation, gain);
 }
 
 #[inline(always)]
@@ -862,24 +809,21 @@ impl<'a> Errors<'a> {
     /// Over the steps that lead to a mark.
     fn follow(&mut self, steps: &[Step], mark: &Mark) {
         for step in steps {
-            self.step_mean(step);
+            if let Some(mean) = &mut self.mean {
+                let (inputs, elapsed) = (self.joint.sides.over(step), self.joint.elapsed);
+                let mut error = [0.0; SIGNALS];
+                for (state, s) in mean.s.iter_mut().zip(&inputs.sources) {
+                    // With the state at the beginning of the step, as in the covariance; it decays afterwards.
+                    error[s.signal] += (s.mean + s.ramp * elapsed) * *state;
+                    *state *= s.decay;
+                }
+                mean.x = step.map(&mean.x, &error);
+            }
             self.joint.step(step);
         }
         if let Some(mean) = self.mean.as_mut().filter(|_| self.truth.integrates) {
             add_scaled(&mut mean.x, 1.0, &mark.closure);
         }
-    }
-
-    fn step_mean(&mut self, step: &Step) {
-        let Some(mean) = &mut self.mean else { return };
-        let (inputs, elapsed) = (self.joint.sides.over(step), self.joint.elapsed);
-        let mut error = [0.0; SIGNALS];
-        for (state, s) in mean.s.iter_mut().zip(&inputs.sources) {
-            // With the state at the beginning of the step, as in the covariance; it decays afterwards.
-            error[s.signal] += (s.mean + s.ramp * elapsed) * *state;
-            *state *= s.decay;
-        }
-        mean.x = step.map(&mean.x, &error);
     }
 
     /// Corrects by a measurement with the filter's gain; returns the expected square of the innovation.
@@ -892,15 +836,15 @@ impl<'a> Errors<'a> {
         } else {
             0.0
         };
-        let y = self.joint.innovation(&measured, noise);
+        let (with, variance) = self.joint.innovation(&measured, noise);
         let mean = self.mean.as_ref().map_or(0.0, |mean| measured.dot(mean));
-        corrected(&mut self.joint, &y, gain);
+        corrected(&mut self.joint, (&with, variance), gain);
         if let Some(Column { x, s }) = &mut self.mean {
             let states = x.iter_mut().chain(s);
             let gains = gain.x.iter().chain(&gain.s);
             states.zip(gains).for_each(|(state, k)| *state -= k * mean);
         }
-        y.s + mean * mean
+        variance + mean * mean
     }
 
     fn judged(&self, mark: &Mark, believed: &[Nav; NAV]) -> Judged {

@@ -11,6 +11,7 @@ use super::track::{NAV, Track};
 use crate::earth::GravityModel;
 use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings};
 use crate::imu::{Axis, Channel};
+use crate::linalg::mean;
 use crate::noise::{Model, Process, reduction};
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::defects::ImuSettings;
@@ -131,18 +132,9 @@ impl Search<'_> {
             .into_iter()
             .chain(self.lost(&assessment))
             .collect();
-        let ridge = RIDGE * ln.iter().map(|x| x * x).sum::<f64>();
-        let cost =
-            divergence(&assessment, |_| 0.0) + steep.iter().map(Steep::cost).sum::<f64>() + ridge;
-        let bent = |x: &f64| Part {
-            value: *x,
-            curvature: 2.0 * RIDGE,
-        };
-        let parts = shape(&law)
-            .chain(steep.iter().map(Steep::part))
-            .chain(ln.iter().map(bent))
-            .collect();
-        Value { cost, parts }
+        let cost = divergence(&assessment, |_| 0.0) + steep.iter().map(Steep::cost).sum::<f64>();
+        let parts = shape(&law).chain(steep.iter().map(Steep::part)).collect();
+        Value { cost, parts }.with_ridge(RIDGE, ln)
     }
 
     /// What the horizontal position at the outage ends loses to the filter with all states counts where it is a fiftieth, steeply.
@@ -248,9 +240,7 @@ fn steep(assessment: &Assessment) -> Vec<Steep> {
     if reports.is_empty() {
         return all;
     }
-    let mean = |of: &dyn Fn(&Consistency) -> f64| {
-        reports.iter().map(of).sum::<f64>() / reports.len() as f64
-    };
+    let mean = |of: &dyn Fn(&Consistency) -> f64| mean(reports.iter().map(of));
     // Root mean square over the way, so that one bad minute is not hidden by an hour that is good.
     let over_way = |i: usize| 0.5 * mean(&|c| c.ratio()[i].powi(2)).ln();
     all.extend((0..REPORTED).map(|i| Steep {
@@ -299,18 +289,15 @@ fn shape(law: &ErrorLaw) -> impl Iterator<Item = Part> {
 
 /// The divergence on the average and at the outage ends, where `beside` is added to it.
 pub(super) fn divergence(assessment: &Assessment, beside: impl Fn(&Consistency) -> f64) -> f64 {
-    let mean = |c: &[Consistency], f: &dyn Fn(&Consistency) -> f64| {
-        c.iter().map(f).sum::<f64>() / c.len() as f64
-    };
     // The first instant is the initial state, which no belief about the IMU changes. A trajectory of a few
     // seconds has no other: the mean of none is NaN, and a search ends where it starts.
-    let all = mean(assessment.reports.get(1..).unwrap_or_default(), &|c| {
-        c.divergence
-    });
+    let reports = assessment.reports.get(1..).unwrap_or_default();
+    let all = mean(reports.iter().map(|c| c.divergence));
     if assessment.outage_ends.is_empty() {
         return all;
     }
-    let ends = mean(&assessment.outage_ends, &|c| c.divergence + beside(c));
+    let ends = &assessment.outage_ends;
+    let ends = mean(ends.iter().map(|c| c.divergence + beside(c)));
     ENDS * ends + (1.0 - ENDS) * all
 }
 
@@ -449,6 +436,17 @@ pub(super) struct Value {
     pub parts: Vec<Part>,
 }
 
+impl Value {
+    /// With a cost of the squares of the variables.
+    pub(super) fn with_ridge(mut self, ridge: f64, x: &[f64]) -> Self {
+        self.cost += ridge * x.iter().map(|x| x * x).sum::<f64>();
+        let curvature = 2.0 * ridge;
+        let part = |&value: &f64| Part { value, curvature };
+        self.parts.extend(x.iter().map(part));
+        self
+    }
+}
+
 /// A number that the variables change, and the second derivative of the cost with respect to it.
 #[derive(Clone, Copy)]
 pub(super) struct Part {
@@ -477,10 +475,7 @@ impl Damped<'_> {
             return None;
         }
         for _ in 0..self.iterations {
-            let Some(model) = self.quadratic(&x, &value) else {
-                break;
-            };
-            let Some((next, next_value)) = self.descend(&x, &value, &model, &mut damping) else {
+            let Some((next, next_value)) = self.descend(&x, &value, &mut damping) else {
                 break;
             };
             let gain = value.cost - next_value.cost;
@@ -492,7 +487,8 @@ impl Damped<'_> {
         Some(x.as_slice().to_vec())
     }
 
-    fn quadratic(&self, x: &DVector<f64>, here: &Value) -> Option<Quadratic> {
+    /// What the cost is near a point: its gradient and Gauss and Newton's Hessian Σ c ∂f ∂fᵀ of its parts f.
+    fn quadratic(&self, x: &DVector<f64>, here: &Value) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let beside = |i: usize| {
             let mut beside = x.clone();
             beside[i] += DIFFERENCE;
@@ -514,19 +510,28 @@ impl Damped<'_> {
         let gradient = DVector::from_fn(x.len(), |i, _| {
             (beside[i].cost - here.cost) / DIFFERENCE - 0.5 * DIFFERENCE * hessian[(i, i)]
         });
-        Some(Quadratic { gradient, hessian })
+        Some((gradient, hessian))
     }
 
-    /// The step that gains, damped until it does; none where it has nothing to gain.
+    /// The step that gains, damped until it does and is short; none where it has nothing to gain.
     fn descend(
         &self,
         x: &DVector<f64>,
         value: &Value,
-        model: &Quadratic,
         damping: &mut f64,
     ) -> Option<(DVector<f64>, Value)> {
+        let (gradient, hessian) = self.quadratic(x, value)?;
         for _ in 0..TRIALS {
-            let (step, expected) = model.step(damping)?;
+            let step = loop {
+                let damped = &hessian + DMatrix::identity(x.len(), x.len()) * *damping;
+                let step = -damped.cholesky()?.solve(&gradient);
+                if step.amax() <= MAX_STEP {
+                    break step;
+                }
+                *damping *= MORE;
+            };
+            // by how much the cost should fall
+            let expected = -(gradient.dot(&step) + 0.5 * step.dot(&(&hessian * &step)));
             if expected < self.enough {
                 return None;
             }
@@ -542,29 +547,6 @@ impl Damped<'_> {
             *damping *= MORE;
         }
         None
-    }
-}
-
-/// What the cost is near a point: its gradient and Gauss and Newton's Hessian Σ c ∂f ∂fᵀ of its parts f.
-struct Quadratic {
-    gradient: DVector<f64>,
-    hessian: DMatrix<f64>,
-}
-
-impl Quadratic {
-    /// The step of this damping, or of the least above it that keeps the step short, and by how much the cost should fall.
-    fn step(&self, damping: &mut f64) -> Option<(DVector<f64>, f64)> {
-        loop {
-            let n = self.gradient.len();
-            let damped = &self.hessian + DMatrix::identity(n, n) * *damping;
-            let step = -damped.cholesky()?.solve(&self.gradient);
-            if step.amax() <= MAX_STEP {
-                let expected =
-                    -(self.gradient.dot(&step) + 0.5 * step.dot(&(&self.hessian * &step)));
-                return Some((step, expected));
-            }
-            *damping *= MORE;
-        }
     }
 }
 

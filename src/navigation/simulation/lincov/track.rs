@@ -56,16 +56,21 @@ pub(super) enum Measured {
 }
 
 impl Measured {
-    /// Kinds: fixes, heights, each aid.
-    pub(super) const KINDS: usize = 2 + Aid::ALL.len();
+    /// Kinds: positions and velocities of fixes, heights, each aid.
+    pub(super) const KINDS: usize = 3 + Aid::ALL.len();
 
     /// Which of them.
     pub(super) const fn kind(self) -> usize {
         match self {
-            Self::Position(_) | Self::Velocity => 0,
-            Self::Height => 1,
-            Self::Aid(aid, _) => 2 + aid as usize,
+            Self::Position(_) => 0,
+            Self::Velocity => 1,
+            Self::Height => 2,
+            Self::Aid(aid, _) => 3 + aid as usize,
         }
+    }
+
+    pub(super) const fn is_of_fix(self) -> bool {
+        self.kind() < 2
     }
 }
 
@@ -89,7 +94,6 @@ pub(super) struct Row {
 impl Row {
     /// A measurement whose true noise is as the filter believes.
     fn new(h: [f64; NAV + 3], felt: Surroundings, r: f64, what: Measured) -> Self {
-        let of_gnss = matches!(what, Measured::Position(_) | Measured::Velocity);
         Self {
             h,
             felt,
@@ -97,7 +101,7 @@ impl Row {
             noise: r,
             what,
             motion: [DVec3::ZERO; 2],
-            of_gnss,
+            of_gnss: what.is_of_fix(),
         }
     }
 
@@ -288,7 +292,7 @@ impl Linearisation {
             b: vec![[0.0; NAV]; self.signals],
             white: Vec::new(),
         };
-        let mut age = 0.0;
+        let (mut age, last) = (0.0, samples.end - 1);
         for index in samples {
             let sample = &plan.ideal[index];
             self.felt = plan.felt(index);
@@ -296,27 +300,16 @@ impl Linearisation {
             let trace = self.ins.step(Vec3::splat(dtheta), Vec3::splat(dv), self.dt);
             step.apply(&Sample::new(&trace, self.dt), &self.felt);
             age += self.dt;
-            if age + 0.5 * self.dt > EARTH_STEP_S {
-                step.apply(
-                    &EarthStep {
-                        terms: EarthTerms::at(&self.ins),
-                        dt: age,
-                    },
-                    &self.felt,
-                );
-                age = 0.0;
-            }
-        }
-        // A measurement meets a covariance that has all of the Earth's terms, as `settle` gives it in the
-        // filter.
-        if age > 0.0 {
-            step.apply(
-                &EarthStep {
+            // A measurement meets a covariance that has all of the Earth's terms, as `settle` gives it in the
+            // filter.
+            if index == last || age + 0.5 * self.dt > EARTH_STEP_S {
+                let earth = EarthStep {
                     terms: EarthTerms::at(&self.ins),
                     dt: age,
-                },
-                &self.felt,
-            );
+                };
+                step.apply(&earth, &self.felt);
+                age = 0.0;
+            }
         }
         step
     }
@@ -324,7 +317,7 @@ impl Linearisation {
     /// Error of the strapdown since the reference was met last (m, m/s, rad), estimate less truth; it goes on from the reference.
     fn close(&mut self, reference: &NavState) -> Nav {
         let ins = &mut self.ins;
-        let r = ned_difference(reference, ins.lat, ins.lon, ins.h);
+        let r = ned_difference(reference.place(), [ins.lat, ins.lon, ins.h]);
         let v: [f64; 3] = std::array::from_fn(|i| ins.v_n[i] - reference.v_n[i]);
         let q = &ins.q_b_n;
         let found = DQuat::from_xyzw(q.v[0], q.v[1], q.v[2], q.w).normalize();
@@ -367,9 +360,7 @@ impl Linearisation {
         }
         rows
     }
-}
 
-impl Linearisation {
     /// The rows of what the vehicle measures of itself.
     fn aid(&self, experiment: &Experiment<'_>, aided: &Aided, rows: &mut Vec<Row>) {
         let Aided { aid, v_b, a_b, .. } = *aided;
@@ -507,29 +498,48 @@ impl Track {
     /// mean at the last of them.
     pub(super) fn outline(&self) -> Self {
         let last_fixes = self.last_fixes();
-        let (mut steps, mut marks, mut block) = (Vec::new(), Vec::new(), Block::default());
-        let mut report_s = f64::NEG_INFINITY;
+        let (mut steps, mut marks) = (Vec::new(), Vec::new());
+        let (mut report_s, mut begin_s, mut before_s) = (f64::NEG_INFINITY, 0.0, 0.0);
+        // What becomes one step, and one measurement of each kind: the last of so many, with the mean of their noise.
+        let mut step: Option<Step> = None;
+        let mut measured: [(Vec<Row>, f64); Measured::KINDS] = Default::default();
         for (i, (leg, mark)) in self.legs(0..self.marks.len()).enumerate() {
-            block.add(
-                leg,
-                mark,
-                i.checked_sub(1)
-                    .map_or(0.0, |before| self.marks[before].after_s),
-            );
+            if step.is_none() {
+                begin_s = before_s;
+            }
+            before_s = mark.after_s;
+            let all = step.into_iter().chain(leg.iter().cloned());
+            step = all.reduce(|a, b| a.of_means(&b));
+            for (kind, (rows, count)) in measured.iter_mut().enumerate() {
+                let own = mark.rows.iter().filter(|row| row.what.kind() == kind);
+                let own: Vec<Row> = own.copied().collect();
+                if !own.is_empty() {
+                    (*rows, *count) = (own, *count + 1.0);
+                }
+            }
+            let longest_s = OUTLINE_STEP_S[usize::from(measured[0].1 == 0.0)] + SLACK_S;
             let next = self.marks.get(i + 1).filter(|next| next.outages.is_empty());
             // An outage begins with its first missing fix and ends with the first fix after it, no step later.
             let is_bound = !mark.outages.is_empty() || last_fixes.contains(&i);
-            if !is_bound && next.is_some_and(|next| block.has_room_until(next.after_s)) {
+            if !is_bound && next.is_some_and(|next| next.after_s - begin_s <= longest_s) {
                 continue;
             }
-            let Block { step, measured, .. } = std::mem::take(&mut block);
-            steps.extend(step);
+            steps.extend(step.take());
             let report = mark.after_s - report_s >= REPORT_S - SLACK_S;
             report_s = if report { mark.after_s } else { report_s };
-            let rows = measured.into_iter().flat_map(Together::mean).collect();
+            let mean = |(rows, count): (Vec<Row>, f64)| {
+                rows.into_iter().map(move |row| Row {
+                    r: row.r / count,
+                    noise: row.noise / count,
+                    ..row
+                })
+            };
             marks.push(Mark {
                 steps: steps.len(),
-                rows,
+                rows: std::mem::take(&mut measured)
+                    .into_iter()
+                    .flat_map(mean)
+                    .collect(),
                 report,
                 ..mark.clone()
             });
@@ -558,68 +568,6 @@ impl Track {
 
 /// Times of marks are sums of samples: this much apart they are the same (s).
 const SLACK_S: f64 = 1e-6;
-
-/// Steps and measurements that become one of each.
-#[derive(Default)]
-struct Block {
-    begin_s: f64,
-    step: Option<Step>,
-    /// By kind, fixes first.
-    measured: [Together; Measured::KINDS],
-}
-
-impl Block {
-    /// Adds a mark with the steps that lead to it from `before_s`.
-    fn add(&mut self, leg: &[Step], mark: &Mark, before_s: f64) {
-        if self.step.is_none() {
-            self.begin_s = before_s;
-        }
-        self.step = self
-            .step
-            .take()
-            .into_iter()
-            .chain(leg.iter().cloned())
-            .reduce(|a, b| a.of_means(&b));
-        for (kind, together) in self.measured.iter_mut().enumerate() {
-            together.add(
-                mark.rows
-                    .iter()
-                    .filter(|row| row.what.kind() == kind)
-                    .copied()
-                    .collect(),
-            );
-        }
-    }
-
-    fn has_room_until(&self, after_s: f64) -> bool {
-        after_s - self.begin_s <= OUTLINE_STEP_S[usize::from(self.measured[0].count == 0)] + SLACK_S
-    }
-}
-
-/// Measurements of one kind, taken at the last of them.
-#[derive(Default)]
-struct Together {
-    rows: Vec<Row>,
-    count: u32,
-}
-
-impl Together {
-    fn add(&mut self, rows: Vec<Row>) {
-        if !rows.is_empty() {
-            (self.rows, self.count) = (rows, self.count + 1);
-        }
-    }
-
-    /// One measurement of the mean of their noise.
-    fn mean(self) -> impl Iterator<Item = Row> {
-        let count = f64::from(self.count);
-        self.rows.into_iter().map(move |row| Row {
-            r: row.r / count,
-            noise: row.noise / count,
-            ..row
-        })
-    }
-}
 
 impl Step {
     /// This step and then another, as one.
@@ -727,13 +675,10 @@ const fn place(signal: usize) -> (usize, usize, Felt) {
     }
 }
 
-/// All kinds of unknowns.
-const UNKNOWNS: [UnknownKind; 2] = [UnknownKind::Drift, UnknownKind::ScaleFactor];
-
 /// A state behind one signal, in the form that every process of the catalogue has at the sample rate:
 /// the error of a sample is `before`·s + `after`·s⁺ + `fresh`·w, and s⁺ = `decay`·s + `drive`·w with w white
 /// of variance 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Source {
     /// Which signal it is part of.
     pub signal: usize,
@@ -930,7 +875,7 @@ impl Source {
 }
 
 /// The errors of an IMU: sources, and white noise of a sample on each signal.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(super) struct Sources {
     pub states: Vec<Source>,
     pub white: [f64; BIASES],
@@ -965,21 +910,16 @@ impl Sources {
 
     /// Those a filter believes in: one for each bias state.
     pub(super) fn of_belief(belief: &Belief) -> Self {
-        let mut states = Vec::new();
-        for sensor in Sensor::ALL {
-            states.extend(
-                belief.groups[sensor as usize]
-                    .iter()
-                    .flat_map(|g| Self::of_group(sensor, g)),
-            );
+        let of_sensor = |sensor: Sensor| {
+            let groups = belief.groups[sensor as usize].iter();
+            groups.flat_map(move |group| Self::of_group(sensor, group))
+        };
+        let states = Sensor::ALL.into_iter().flat_map(of_sensor);
+        let states = states.chain(Self::multiplied(belief));
+        Self {
+            states: states.chain(Self::of_vehicle(belief)).collect(),
+            white: std::array::from_fn(|i| belief.white[i / 3][i % 3]),
         }
-        let [accel, gyro] = belief.white.map(|w| w.to_array());
-        let mut white = [0.0; BIASES];
-        white[..3].copy_from_slice(&accel);
-        white[3..].copy_from_slice(&gyro);
-        states.extend(Self::multiplied(belief, &UNKNOWNS));
-        states.extend(Self::of_vehicle(belief));
-        Self { states, white }
     }
 
     /// The bias states of a group.
@@ -993,18 +933,14 @@ impl Sources {
     }
 
     /// Unknown constants of a belief that are multiplied.
-    fn multiplied(belief: &Belief, kinds: &[UnknownKind]) -> Vec<Source> {
+    fn multiplied(belief: &Belief) -> Vec<Source> {
         let mut states = Vec::new();
         for (sensor, axis) in Sensor::ALL
             .into_iter()
             .flat_map(|s| (0..3).map(move |i| (s, i)))
         {
             let signal = 3 * sensor as usize + axis;
-            for unknown in belief
-                .unknowns(sensor)
-                .iter()
-                .filter(|u| kinds.contains(&u.kind))
-            {
+            for unknown in belief.unknowns(sensor) {
                 let sigma = unknown.sigma[axis];
                 states.extend((sigma > 0.0).then(|| match unknown.kind {
                     UnknownKind::Drift => Source::ramp(signal, sigma),
@@ -1033,7 +969,9 @@ impl Sources {
 
     /// What a belief expects beside its noise model, as it expects it: turn-on biases and scale factors.
     pub(super) fn beside_model(belief: &Belief) -> Vec<Source> {
-        let mut states = Self::multiplied(belief, &[UnknownKind::ScaleFactor]);
+        // drifts are of the noise model
+        let mut states = Self::multiplied(belief);
+        states.retain(|source| source.ramp == 0.0);
         states.extend(Self::of_vehicle(belief));
         for sensor in Sensor::ALL {
             for group in belief.groups[sensor as usize]

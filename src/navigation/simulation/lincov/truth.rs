@@ -3,31 +3,29 @@
 use super::track::{CROSSED, Measured, Outer, PUSHED, RECTIFIED, SCALED, Source, Sources, WARMED};
 use crate::ekf::Belief;
 use crate::imu::{Axis, Channel, Sensor};
+use crate::linalg::by_value;
 use crate::noise::{Kind, Model};
-use crate::sensors::aiding::{AidError, AidingSettings};
+use crate::sensors::aiding::{Aid, AidError, AidingSettings};
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::simulation::plan::Experiment;
 use std::ops::Range;
 
-/// Kinds of white noise of measurements: positions and velocities of fixes apart.
-const NOISES: usize = Measured::KINDS + 1;
-
 /// What makes the true errors along a track, whatever the filter believes.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub struct TruthSide {
     pub(super) inertial: Sources,
     /// Whether the start is off, as the filter believes it to be.
     pub(super) starts_off: bool,
     /// Whether the white noise of positions, velocities, heights and each aid is there.
-    noise: [bool; NOISES],
+    noise: [bool; Measured::KINDS],
     /// Whether the strapdown integrates the samples with the error that it has at the IMU's rate.
     pub(super) integrates: bool,
 }
 
 /// What may be true of an IMU and its receiver: a noise model at the IMU's rate, and what is wrong beside it. Where
 /// these settings are silent, errors are as the filter expects them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct TrueErrors {
     /// What makes the inertial errors.
     pub model: Model,
@@ -56,7 +54,7 @@ impl From<Model> for TrueErrors {
 }
 
 /// One source of errors.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct NamedSource {
     /// `accel.AR1_1`, `gyro.turn_on_bias`, `gnss.position`, `initial` …
     pub name: String,
@@ -131,7 +129,7 @@ impl TruthSide {
         Self {
             inertial,
             starts_off,
-            noise: [true; NOISES],
+            noise: [true; Measured::KINDS],
             integrates: false,
         }
     }
@@ -178,12 +176,7 @@ impl TruthSide {
 
     /// Whether a measurement has its white noise.
     pub(super) const fn has_noise(&self, measured: Measured) -> bool {
-        match measured {
-            Measured::Position(_) => self.noise[0],
-            Measured::Velocity => self.noise[1],
-            Measured::Height => self.noise[2],
-            Measured::Aid(aid, _) => self.noise[3 + aid as usize],
-        }
+        self.noise[measured.kind()]
     }
 }
 
@@ -198,29 +191,17 @@ fn beside_the_imu(experiment: &Experiment<'_>) -> Vec<NamedSource> {
         starts_off: true,
         ..TruthSide::default()
     };
+    let has_velocity = experiment.gnss.vel_sigma_m_s.is_some();
     let all = [
-        ("initial".to_owned(), start, !experiment.initial.perfect),
-        ("gnss.position".to_owned(), noise(0), true),
-        (
-            "gnss.velocity".to_owned(),
-            noise(1),
-            experiment.gnss.vel_sigma_m_s.is_some(),
-        ),
-        ("baro".to_owned(), noise(2), experiment.baro.is_some()),
+        (!experiment.initial.perfect).then(|| NamedSource::new("initial", start)),
+        Some(NamedSource::new("gnss.position", noise(0))),
+        has_velocity.then(|| NamedSource::new("gnss.velocity", noise(1))),
+        experiment.baro.map(|_| NamedSource::new("baro", noise(2))),
     ];
+    let of_aid = |aid: Aid| format!("aiding.{}", aid.name());
     let aids = experiment.aiding.rates();
-    let aids = aids.map(|(aid, _)| {
-        (
-            format!("aiding.{}", aid.name()),
-            noise(3 + aid as usize),
-            true,
-        )
-    });
-    all.into_iter()
-        .chain(aids)
-        .filter(|(_, _, is_there)| *is_there)
-        .map(|(name, side, _)| NamedSource::new(name, side))
-        .collect()
+    let aids = aids.map(|(aid, _)| NamedSource::new(of_aid(aid), noise(3 + aid as usize)));
+    all.into_iter().flatten().chain(aids).collect()
 }
 
 /// A source of states alone; none where there are none.
@@ -246,20 +227,10 @@ fn processes(model: &Model, sensor: Sensor, drifts: &mut Vec<Source>) -> Vec<Nam
                 drifts.push(Source::drift(channel.index(), process.amplitude()));
                 continue;
             }
-            let name = format!("{}.{label}", sensor.name());
-            let at = found
-                .iter()
-                .position(|known| known.name == name)
-                .unwrap_or_else(|| {
-                    let process = Some((sensor, process.kind()));
-                    found.push(NamedSource {
-                        process,
-                        ..NamedSource::new(name, TruthSide::default())
-                    });
-                    found.len() - 1
-                });
+            let source = named(&mut found, &format!("{}.{label}", sensor.name()));
+            source.process = Some((sensor, process.kind()));
             // The axes are independent: one source with three states has the sum of their covariances.
-            found[at].side.inertial.add(channel.index(), process);
+            source.side.inertial.add(channel.index(), process);
         }
     }
     found
@@ -268,14 +239,10 @@ fn processes(model: &Model, sensor: Sensor, drifts: &mut Vec<Source>) -> Vec<Nam
 /// What is wrong with a sensor of the true IMU beside its noise.
 pub(super) fn defects(imu: &ImuSettings, sensor: Sensor) -> Vec<NamedSource> {
     let (bias, ppm) = imu.deviations(sensor);
-    let of_temperature = imu.temperature.as_ref().map_or(0.0, |t| t.sigma(sensor));
     let first = 3 * sensor as usize;
     let crossed = CROSSED + 2 * first;
     let of_force = match sensor {
-        Sensor::Accel => {
-            let sigma = imu.vibration.as_ref().map_or(0.0, |v| v.rectification_s2_m);
-            ("rectification", sigma, RECTIFIED..WARMED)
-        }
+        Sensor::Accel => ("rectification", imu.rectification_s2_m(), RECTIFIED..WARMED),
         Sensor::Gyro => (
             "g_sensitivity",
             imu.g_sensitivity_rad_s_per_m_s2,
@@ -289,7 +256,7 @@ pub(super) fn defects(imu: &ImuSettings, sensor: Sensor) -> Vec<NamedSource> {
         of_force,
         (
             "temperature",
-            of_temperature,
+            imu.per_kelvin(sensor),
             WARMED + first..WARMED + first + 3,
         ),
     ];
@@ -318,19 +285,23 @@ fn correlated(gnss: &GnssSettings, imu_hz: f64) -> Option<NamedSource> {
 
 /// What is wrong with the vehicle's own measurements beside white noise: parts of one name are one source.
 fn lasting(aiding: &AidingSettings, imu_hz: f64) -> Vec<NamedSource> {
-    let mut found: Vec<(&str, Vec<Source>)> = Vec::new();
+    let mut found = Vec::new();
     for AidError { part, law, .. } in aiding.errors() {
-        let (name, _) = part.names();
-        let source = Source::of_vehicle(part, law, imu_hz);
-        match found.last_mut() {
-            Some((known, states)) if *known == name => states.push(source),
-            _ => found.push((name, vec![source])),
-        }
+        let source = named(&mut found, part.names().0);
+        let states = &mut source.side.inertial.states;
+        states.push(Source::of_vehicle(part, law, imu_hz));
     }
-    let sources = found.into_iter();
-    sources
-        .filter_map(|(name, states)| inertial(name.to_owned(), states))
-        .collect()
+    found
+}
+
+/// The source of a name, which is added where there is none.
+fn named<'a>(all: &'a mut Vec<NamedSource>, name: &str) -> &'a mut NamedSource {
+    let known = all.iter().position(|source| source.name == name);
+    let at = known.unwrap_or_else(|| {
+        all.push(NamedSource::new(name, TruthSide::default()));
+        all.len() - 1
+    });
+    &mut all[at]
 }
 
 // Whether the motion shows the heading.
@@ -345,7 +316,7 @@ const SETTLED_S: f64 = 120.0;
 /// and the standard deviations of yaw there (degrees). The first two minutes belong to the alignment.
 pub fn weak_heading(while_fixed: impl Iterator<Item = (f64, f64)>) -> Option<String> {
     let settled = while_fixed.filter(|(after_s, _)| *after_s >= SETTLED_S);
-    let worst = settled.max_by(|a, b| a.1.total_cmp(&b.1));
+    let worst = settled.max_by(by_value);
     let (after_s, sigma_deg) = worst.filter(|(_, sigma_deg)| *sigma_deg > LARGE_DEG)?;
     // beyond half a turn a linear deviation is only a large number
     let sigma = if sigma_deg < 180.0 {

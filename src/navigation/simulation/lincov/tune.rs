@@ -11,6 +11,7 @@ use super::track::Track;
 use super::truth::TrueErrors;
 use crate::ekf::{Belief, BeliefError};
 use crate::imu::{Channel, Sensor};
+use crate::linalg::mean;
 use crate::noise::{Kind, Model, Process};
 use crate::simulation::{NEES_DOF, REPORTED};
 use rayon::prelude::*;
@@ -120,14 +121,8 @@ impl Task<'_> {
     ) -> Result<Vec<Factor>, BeliefError> {
         let track = self.track.coarse();
         let value = |ln: &[f64]| {
-            let bent = |x: &f64| Part {
-                value: *x,
-                curvature: 2.0 * RIDGE,
-            };
-            let mut value = self.value(&set(factors, ln), &track, draw_factors);
-            value.cost += RIDGE * ln.iter().map(|x| x * x).sum::<f64>();
-            value.parts.extend(ln.iter().map(bent));
-            value
+            let value = self.value(&set(factors, ln), &track, draw_factors);
+            value.with_ridge(RIDGE, ln)
         };
         let low = if self.allow_smaller { -MAX_LN } else { 0.0 };
         let descent = Damped {
@@ -139,7 +134,7 @@ impl Task<'_> {
         // From the model as it is, which keeps factors small; and from one factor on all that makes it consistent, since between
         // the two the valley may be flat. The second counts where it is better by what can be seen.
         let unchanged = vec![0.0; factors.len()];
-        let at = |ln: &[f64]| self.consistency_with(self.filter, &set(factors, ln), draw_factors);
+        let at = |ln: &[f64]| self.consistency_with(&set(factors, ln), draw_factors);
         let exact = |ln: &[f64]| self.exact(ln, low, &at);
         let alike = exact(&unchanged)?;
         let near = descent.minimum(unchanged.clone()).unwrap_or(unchanged);
@@ -207,14 +202,13 @@ impl Task<'_> {
     /// When the model has no such filter.
     fn consistency_with(
         &self,
-        filter: &Filter<'_>,
         factors: &[Factor],
         draw_factors: Option<&DrawFactors>,
     ) -> Result<FilterConsistency, BeliefError> {
         let Some(draw_factors) = draw_factors else {
-            return self.consistency(filter, factors);
+            return self.consistency(self.filter, factors);
         };
-        let belief = filter(&scaled(self.model, factors))?;
+        let belief = (self.filter)(&scaled(self.model, factors))?;
         Ok(draw_factors.consistency(&self.assessments(&belief, self.track, Some(draw_factors))))
     }
 
@@ -244,12 +238,11 @@ impl Task<'_> {
     ) -> Vec<Assessment> {
         // No truth changes the filter: its gains are found once.
         let pass = FilterPass::new(track, belief);
-        let count = if draw_factors.is_some() {
-            1
-        } else {
-            self.truths.len()
+        let truths = match draw_factors {
+            Some(_) => &self.truths[..1],
+            None => self.truths,
         };
-        self.truths[..count]
+        truths
             .par_iter()
             .map(|truth| pass.assess_stated(belief, truth))
             .collect()
@@ -281,9 +274,9 @@ impl Task<'_> {
                 .sum()
         };
         let mut assessments = self.assessments(&belief, track, draw_factors);
-        draw_factors
-            .into_iter()
-            .for_each(|draw_factors| assessments.iter_mut().for_each(|a| draw_factors.enlarge(a)));
+        if let Some(draw_factors) = draw_factors {
+            assessments.iter_mut().for_each(|a| draw_factors.enlarge(a));
+        }
         let share = 1.0 / assessments.len() as f64;
         let (mut cost, mut parts) = (0.0, Vec::new());
         for assessment in &assessments {
@@ -407,7 +400,7 @@ fn counted(ratios: &[f64], drawn: Option<&UpperEnd<'_>>) -> f64 {
 }
 
 /// Consistency of a filter with several truths.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct FilterConsistency {
     /// Expected NEES, mean over time and truths; 9 is right.
     pub nees: f64,
@@ -423,7 +416,7 @@ pub struct FilterConsistency {
 }
 
 /// An error over what the filter states of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Departure {
     /// What counts of true RMSE over stated standard deviation in the truths.
     pub ratio: f64,
@@ -439,8 +432,7 @@ impl FilterConsistency {
     /// Of one filter under several truths.
     fn of(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Self {
         let count = assessments.len() as f64;
-        let mean =
-            |a: &Assessment| a.reports.iter().map(|r| r.nees).sum::<f64>() / a.reports.len() as f64;
+        let mean_nees = |a: &Assessment| mean(a.reports.iter().map(|r| r.nees));
         let end_s: Vec<f64> = assessments[0]
             .outage_ends
             .iter()
@@ -456,13 +448,13 @@ impl FilterConsistency {
         }
         rmse_end.iter_mut().flatten().for_each(|x| *x = x.sqrt());
         let largest = Departure::largest(&departures(assessments, drawn));
-        let nees = assessments.iter().map(mean).sum::<f64>() / count;
+        let nees = mean(assessments.iter().map(mean_nees));
         let first = if drawn.is_some() {
             &assessments[..1]
         } else {
             assessments
         };
-        let nees_over_run = first.iter().map(mean).sum::<f64>() / first.len() as f64;
+        let nees_over_run = mean(first.iter().map(mean_nees));
         let at_ends = first
             .iter()
             .flat_map(|a| a.outage_ends.iter().map(|end| end.nees));
@@ -553,31 +545,28 @@ impl DrawFactors {
     fn consistency(&self, first: &[Assessment]) -> FilterConsistency {
         let mut consistency = FilterConsistency::of(first, None);
         let mut departures = departures(first, None);
-        departures
-            .iter_mut()
-            .zip(&self.ratios)
-            .for_each(|(d, margin)| d.ratio *= margin);
+        multiply(departures.iter_mut().map(|d| &mut d.ratio), &self.ratios);
         consistency.largest = Departure::largest(&departures);
         consistency.nees *= self.nees;
         let ends = consistency.rmse_end.iter_mut().flatten();
-        ends.zip(self.rmse_end.iter().flatten())
-            .for_each(|(rmse, margin)| *rmse *= margin);
+        multiply(ends, self.rmse_end.as_flattened());
         consistency
     }
 
     /// Takes the errors of the first truth to the upper ends of their intervals.
     fn enlarge(&self, first: &mut Assessment) {
         let ends = first.outage_ends.iter_mut().flat_map(|end| &mut end.rmse);
-        ends.zip(&self.ratios)
-            .for_each(|(rmse, margin)| *rmse *= margin);
+        multiply(ends, &self.ratios);
         for report in &mut first.reports {
-            report
-                .rmse
-                .iter_mut()
-                .zip(&self.over_run)
-                .for_each(|(rmse, margin)| *rmse *= margin);
+            multiply(&mut report.rmse, &self.over_run);
         }
     }
+}
+
+fn multiply<'a>(all: impl IntoIterator<Item = &'a mut f64>, factors: &[f64]) {
+    all.into_iter()
+        .zip(factors)
+        .for_each(|(x, factor)| *x *= factor);
 }
 
 /// Every state at every place where a filter is judged: at the ends of outages and then over the whole run; without outages
@@ -626,7 +615,7 @@ fn states(
 // Factors on the variances of a noise model.
 
 /// What is multiplied, and by what.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Factor {
     /// The sensor.
     pub sensor: Sensor,
