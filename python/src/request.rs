@@ -108,7 +108,7 @@ impl Answer {
 
     /// Its verdict, a line each.
     fn verdict(&self) -> Vec<String> {
-        let lines = self.answered.document.verdict.lines.iter();
+        let lines = self.answered.document.verdict.iter();
         lines.map(|line| self.shown(line)).collect()
     }
 

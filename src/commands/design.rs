@@ -422,10 +422,10 @@ impl Answer for Designs {
             document.note(Importance::Remark, text);
         }
         document.note(Importance::Remark, STATED);
-        document.lead(self.lead());
+        document.table(self.lead());
         if designs.iter().any(|d| !d.horizontal_p95.is_empty()) {
             document.section("What that is in navigation");
-            document.table(&Table::of(
+            document.table(Table::of(
                 self,
                 "/designs/*/horizontal_p95/*",
                 &[
@@ -454,7 +454,7 @@ impl Answer for Designs {
                     .iter()
                     .map(|(title, key)| (title.as_str(), key.as_str())),
             );
-            document.table(&Table::of(self, "/designs/0/parameters/*", &columns));
+            document.table(Table::of(self, "/designs/0/parameters/*", &columns));
         }
         document.checked(
             "against 150 calibrations of synthetic recordings, within four deviations of the scatter (27 %).",

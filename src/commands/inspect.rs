@@ -207,7 +207,7 @@ impl Answer for Inspection {
             ("jitter (s)", "jitter_s"),
             ("units", "units"),
         ];
-        document.lead(Table::of(self, "/channels/*", &columns));
+        document.table(Table::of(self, "/channels/*", &columns));
         if let Some(damage) = &self.damage {
             document.note(Importance::Warning, damage.as_str());
         }

@@ -506,7 +506,7 @@ impl NeededImu {
             ("if alone", "alone"),
             ("others 10 × better", "others_10_times_better"),
         ];
-        document.lead(Table::of(self, "/figures/*", &columns));
+        document.table(Table::of(self, "/figures/*", &columns));
         document.checked(CHECKED);
         document
     }
@@ -1068,10 +1068,10 @@ impl GivenImu {
                 ("limit", "limit"),
                 ("longest outage within the limits", "outage/text"),
             ];
-            document.lead(Table::of(self, "/aidings/*", &columns));
+            document.table(Table::of(self, "/aidings/*", &columns));
         }
         document.section("Error against the length of an outage");
-        document.table(&Table::of(
+        document.table(Table::of(
             self,
             "/curves/*",
             &[("limit on", "quantity"), AFTER],
@@ -1164,9 +1164,9 @@ impl Ranking {
             ("bridges", "outage/text"),
             ("{outage_s} s", "curves/0/points/*/value"),
         ];
-        document.lead(Table::of(self, "/units/*", &columns));
+        document.table(Table::of(self, "/units/*", &columns));
         document.section("Figures that are missing");
-        document.table(&Table::of(
+        document.table(Table::of(
             self,
             "/units/*",
             &[("unit", "unit"), ("not stated", "missing")],

@@ -689,7 +689,7 @@ impl Answer for TuneAnswer {
             document.note(Importance::Remark, counted);
         }
         let truths: Vec<&str> = self.truths.iter().map(String::as_str).collect();
-        document.facts(&[("truths", short_names(&truths).join(", "))]);
+        document.text(&format!("truths: {}", short_names(&truths).join(", ")));
         document.section("Filters");
         let nees = format!("NEES ({NEES_DOF})");
         let columns = [
@@ -700,7 +700,7 @@ impl Answer for TuneAnswer {
             ("in", "place"),
             ("RMSE {after_s} s (m)", "outage_end/*/horizontal_rmse_m"),
         ];
-        document.lead(Table::of(self, "/filters/*", &columns));
+        document.table(Table::of(self, "/filters/*", &columns));
         document.text("RMSE/sigma: largest error over what the filter states. RMSE: horizontal, at the end of an outage.");
         document.section("Factors");
         let columns = [
@@ -708,7 +708,7 @@ impl Answer for TuneAnswer {
             ("factor on the variance", "on_variance"),
             ("on the standard deviation", "on_sigma"),
         ];
-        document.table(&Table::of(self, "/factors/*", &columns));
+        document.table(Table::of(self, "/factors/*", &columns));
         document.checked("covariance analysis against 2000 Monte-Carlo runs: docs/validation.md.");
         document
     }
@@ -826,7 +826,7 @@ mod tests {
         tuned.after.range[0] = 0.756;
         let document = tuned.document();
         assert!(
-            document.verdict.lines[1].contains("is underconfident: errors 0.756 to"),
+            document.verdict[1].contains("is underconfident: errors 0.756 to"),
             "{document:?}"
         );
         assert!(
@@ -840,7 +840,7 @@ mod tests {
         let document = tuned.document();
         assert!(
             document.verdict.tone == Tone::Doubtful
-                && document.verdict.lines[0].starts_with("no factor is needed")
+                && document.verdict[0].starts_with("no factor is needed")
         );
     }
 

@@ -173,7 +173,7 @@ impl Answer for SignalsFile {
             tone,
             [verdict, head],
         );
-        document.lead(digest(self));
+        document.table(digest(self));
         let charts: Vec<Chart> = channels(self).map(|channel| chart(self, channel)).collect();
         document.charts(&charts, "Robust wavelet variance; dashed: classical, which outliers raise. τ is twice the averaging time.");
         document.checked(
@@ -406,15 +406,16 @@ mod tests {
     /// 1/√t at the octaves nearest to the decades: 0.01, 0.08, 1.28 and 10.24 s (81.92 s is the last).
     #[test]
     fn a_digest_has_a_row_a_channel() {
-        let text = digest(&file(3)).csv();
-        let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
-        assert_eq!(rows.len(), 2);
+        let text = digest(&file(3)).markdown();
+        let cells = |line: &'static str| line.split('|').map(str::trim).collect::<Vec<_>>();
+        let rows: Vec<Vec<&str>> = text.leak().lines().map(cells).collect();
+        assert_eq!(rows.len(), 3);
         assert_eq!(
-            rows[0][1..6],
+            rows[0][2..7],
             ["0.01 s", "0.08 s", "1.28 s", "10.2 s", "81.9 s"]
         );
-        assert_eq!(rows[1][..2], ["gyro.z (rad/s)", "1.00e1"]);
-        assert_eq!(rows[1][5..], ["1.10e-1", "1.10e-1 at 81.9 s", "0.90 *"]);
+        assert_eq!(rows[2][1..3], ["gyro.z (rad/s)", "1.00e1"]);
+        assert_eq!(rows[2][6..9], ["1.10e-1", "1.10e-1 at 81.9 s", "0.90 *"]);
     }
 
     /// 200 recordings of white noise, 4096 samples each: at most 2.5 % have a mark, four deviations of a binomial share more,

@@ -139,8 +139,6 @@ pub enum Mark {
     Line(Vec<(f64, f64)>, Stroke),
     /// The area between two curves (x, low, high).
     Band(Vec<(f64, f64, f64)>),
-    /// The same, darker, within another.
-    InnerBand(Vec<(f64, f64, f64)>),
     /// Points with error bars.
     Points(Vec<Interval>),
     /// A line at one value of y.

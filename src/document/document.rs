@@ -26,15 +26,6 @@ impl From<bool> for Tone {
     }
 }
 
-/// The answer to the question that was asked.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Banner {
-    /// Its colour.
-    pub tone: Tone,
-    /// One sentence each, of at most 120 characters, the answer first.
-    pub lines: Vec<String>,
-}
-
 /// Rank of a note among others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Importance {
@@ -64,15 +55,8 @@ pub enum Block {
     Heading(String),
     /// A paragraph.
     Text(String),
-    /// Names and what they are, line by line.
-    Facts(Vec<(String, String)>),
-    /// A table; the lead is the one that a terminal shows.
-    Table {
-        /// The table.
-        table: Table,
-        /// Whether a terminal shows it without being asked for more.
-        is_lead: bool,
-    },
+    /// A table; a terminal shows the first one.
+    Table(Table),
     /// Charts, side by side where they are small, and what is to be seen in them.
     Charts(Vec<Chart>, String),
     /// Files beside the document: relative path and what is there.
@@ -88,8 +72,10 @@ pub enum Block {
 pub struct Document {
     /// Its title.
     pub title: String,
-    /// The answer.
-    pub verdict: Banner,
+    /// Colour of the answer.
+    pub tone: Tone,
+    /// The answer: one sentence each, of at most 120 characters, the most important first.
+    pub verdict: Vec<String>,
     /// What follows the verdict.
     pub blocks: Vec<Block>,
     notes: Vec<Note>,
@@ -102,13 +88,10 @@ impl Document {
         tone: Tone,
         lines: impl IntoIterator<Item = L>,
     ) -> Self {
-        let verdict = Banner {
-            tone,
-            lines: lines.into_iter().map(Into::into).collect(),
-        };
         Self {
             title: title.to_owned(),
-            verdict,
+            tone,
+            verdict: lines.into_iter().map(Into::into).collect(),
             blocks: Vec::new(),
             notes: Vec::new(),
         }
@@ -129,28 +112,9 @@ impl Document {
         self.blocks.push(Block::Text(words.to_owned()));
     }
 
-    /// Adds names and what they are.
-    pub fn facts(&mut self, facts: &[(&str, String)]) {
-        let owned = facts
-            .iter()
-            .map(|(name, value)| ((*name).to_owned(), value.clone()));
-        self.blocks.push(Block::Facts(owned.collect()));
-    }
-
-    /// Adds the table that a terminal shows.
-    pub fn lead(&mut self, table: Table) {
-        self.blocks.push(Block::Table {
-            table,
-            is_lead: true,
-        });
-    }
-
-    /// Adds a table.
-    pub fn table(&mut self, table: &Table) {
-        self.blocks.push(Block::Table {
-            table: table.clone(),
-            is_lead: false,
-        });
+    /// Adds a table; a terminal shows the first one.
+    pub fn table(&mut self, table: Table) {
+        self.blocks.push(Block::Table(table));
     }
 
     /// Adds a chart and what is to be seen in it.
@@ -238,19 +202,16 @@ impl Document {
     /// The verdict, and as much of the lead table as a screen has room for.
     #[must_use]
     pub fn terminal(&self, width: usize) -> String {
-        let verdict = self.verdict.lines.join("\n");
-        let lead = self.blocks.iter().find_map(|block| match block {
-            Block::Table {
-                table,
-                is_lead: true,
-            } => Some(table),
+        let verdict = self.verdict.join("\n");
+        let first = self.blocks.iter().find_map(|block| match block {
+            Block::Table(table) => Some(table),
             _ => None,
         });
-        let Some(table) = lead else {
+        let Some(table) = first else {
             return verdict + "\n";
         };
         let mut shown = table.clone();
-        let room = LINES.saturating_sub(self.verdict.lines.len());
+        let room = LINES.saturating_sub(self.verdict.len());
         while shown.columns(width).lines().count() > room && shown.rows.len() > 1 {
             shown.rows.pop();
         }
@@ -266,7 +227,7 @@ impl Document {
     /// All that can be said without figures.
     #[must_use]
     pub fn verbose(&self, width: usize) -> String {
-        let mut text = self.verdict.lines.join("\n") + "\n";
+        let mut text = self.verdict.join("\n") + "\n";
         blocks(&self.blocks, width, &mut text);
         text
     }
@@ -286,13 +247,7 @@ fn blocks(all: &[Block], width: usize, text: &mut String) {
         match block {
             Block::Section(title) => *text += &format!("\n{}\n", title.to_uppercase()),
             Block::Heading(words) | Block::Text(words) => *text += &format!("\n{words}\n"),
-            Block::Facts(facts) => {
-                let lines = facts
-                    .iter()
-                    .map(|(name, value)| format!("\n  {name}: {value}"));
-                *text += &(lines.collect::<String>() + "\n");
-            }
-            Block::Table { table, .. } => *text += &format!("\n{}\n", table.columns(width)),
+            Block::Table(table) => *text += &format!("\n{}\n", table.columns(width)),
             Block::Code(code) => *text += &format!("\n{}\n", code.trim_end()),
             Block::Folded(title, inside) => {
                 *text += &format!("\n{title}\n");
@@ -316,8 +271,8 @@ mod terminal_tests {
         );
         let mut table = Table::new(["row"]);
         (0..40).for_each(|k| table.row([k.to_string().into()]));
-        document.table(&Table::new(["other"]));
-        document.lead(table);
+        document.table(Table::new(["other"]));
+        document.table(table);
         for k in 0..3 {
             document.note(Importance::Detail, format!("detail {k}"));
             document.note(Importance::Remark, format!("remark {k}"));
@@ -354,7 +309,7 @@ impl Document {
     #[must_use]
     pub fn html(&self) -> String {
         let title = escape(&self.title);
-        let tone = match self.verdict.tone {
+        let tone = match self.tone {
             Tone::Good => "good",
             Tone::Undecided => "undecided",
             Tone::Doubtful => "doubtful",
@@ -362,7 +317,6 @@ impl Document {
         };
         let verdict = self
             .verdict
-            .lines
             .iter()
             .map(|line| escape(line))
             .collect::<Vec<_>>()
@@ -411,16 +365,7 @@ fn block(block: &Block, html: &mut String) {
         Block::Section(title) => format!("<h2>{}</h2>\n", escape(title)),
         Block::Heading(title) => format!("<h3>{}</h3>\n", escape(title)),
         Block::Text(words) => format!("<p>{}</p>\n", escape(words)),
-        Block::Facts(facts) => {
-            let fact = |(name, value): &(String, String)| {
-                format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value))
-            };
-            format!(
-                "<dl>\n{}</dl>\n",
-                facts.iter().map(fact).collect::<String>()
-            )
-        }
-        Block::Table { table, .. } => self::table(table),
+        Block::Table(table) => self::table(table),
         Block::Charts(charts, caption) => {
             // The head of a section stands for the title of its only chart.
             let head = |chart: &Chart| format!("<h2>{}</h2>\n", escape(&chart.title));

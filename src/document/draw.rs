@@ -29,8 +29,6 @@ pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
             .map(width)
     });
     let left = 10.0 + labels.fold(24.0, f64::max);
-    // the first of slanted names begins left of its place
-    let left = longest_name(chart, canvas).map_or(left, |longest| left.max(0.79 * longest));
     for (i, panel, range) in shown {
         let mut x = Ruler {
             range: x_range,
@@ -148,39 +146,22 @@ impl Sketch<'_> {
     fn x_axis(&self, is_last: bool, svg: &mut String) -> f64 {
         let (Frame { x, y, .. }, axis, font) = (&self.frame, &self.chart.x, self.canvas.font);
         let (bottom, top) = y.pixels;
-        let longest = longest_name(self.chart, self.canvas);
         for (value, label) in ticks(axis, x.range, self.canvas.labels) {
             let place = x.at(value);
-            if longest.is_none() {
-                let _ = writeln!(
-                    svg,
-                    "<path class=\"grid\" d=\"M{place:.1} {bottom:.1}V{top:.1}\"/>"
-                );
-            }
-            match (is_last, longest) {
-                (true, None) => text(svg, "tick", (place, bottom + font + 5.0), "middle", &label),
-                // a name that ends at its place, rising towards it
-                (true, Some(_)) => {
-                    let (x, y, label) = (place + 4.0, bottom + 16.0, escape(&label));
-                    let _ = writeln!(
-                        svg,
-                        "<text class=\"tick\" text-anchor=\"end\" transform=\"translate({x:.1} {y:.1}) rotate(-38)\">{label}</text>"
-                    );
-                }
-                _ => {}
-            }
-        }
-        let labels = longest.map_or(font + 9.0, |longest| 0.62 * longest + 22.0);
-        if is_last {
-            text(
+            let _ = writeln!(
                 svg,
-                "name",
-                (x.pixels.1, bottom + labels + font),
-                "end",
-                &axis.label,
+                "<path class=\"grid\" d=\"M{place:.1} {bottom:.1}V{top:.1}\"/>"
             );
+            if is_last {
+                text(svg, "tick", (place, bottom + font + 5.0), "middle", &label);
+            }
         }
-        labels + font + 8.0
+        let below = 2.0 * font + 9.0;
+        if is_last {
+            let place = (x.pixels.1, bottom + below);
+            text(svg, "name", place, "end", &axis.label);
+        }
+        below + 8.0
     }
 
     /// Names of places beside them.
@@ -205,20 +186,11 @@ impl Sketch<'_> {
     }
 }
 
-/// Width of the longest of the names of an x axis, if it has names.
-fn longest_name(chart: &Chart, canvas: &Canvas) -> Option<f64> {
-    let Scale::Names(names) = &chart.x.scale else {
-        return None;
-    };
-    let widths = names.iter().map(|name| text_width(name, canvas.font));
-    Some(widths.fold(0.0, f64::max))
-}
-
 /// The values of a mark on both axes.
 fn values(mark: &Mark) -> (Vec<f64>, Vec<f64>) {
     match mark {
         Mark::Line(points, _) => points.iter().copied().unzip(),
-        Mark::Band(points) | Mark::InnerBand(points) => {
+        Mark::Band(points) => {
             let ends = points.iter().flat_map(|&(x, a, b)| [(x, a), (x, b)]);
             ends.unzip()
         }
@@ -704,7 +676,6 @@ fn swatch(mark: &Mark, (x, y): (f64, f64), svg: &mut String) {
         Mark::Line(_, stroke) => (stroke.class(), line),
         Mark::Level(_) => ("line level", line),
         Mark::Band(_) | Mark::Zone(..) => ("area", square),
-        Mark::InnerBand(_) => ("area inner", square),
         Mark::Points(_) | Mark::Place(..) | Mark::Reading(..) => {
             ("dot", format!("M{:.1} {y:.1}h0", x + 0.5 * SWATCH))
         }
@@ -747,7 +718,6 @@ impl Frame {
                 path(svg, stroke.class(), &self.line(points));
             }
             Mark::Band(points) => path(svg, "area", &self.band(points)),
-            Mark::InnerBand(points) => path(svg, "area inner", &self.band(points)),
             Mark::Points(points) => self.points(points, svg),
             Mark::Level(y) => path(svg, "line level", &self.span(*y)),
             Mark::Zone(low, high) => {

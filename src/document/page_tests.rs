@@ -200,25 +200,3 @@ fn greek_letters_are_drawn() {
     };
     assert!(dots("\u{3c3}") != dots("\u{6d4b}"));
 }
-
-/// Bands within bands are told apart, in the legend too.
-#[test]
-fn an_inner_band_has_a_swatch_of_its_own() {
-    let band = |half: f64| vec![(0.0, 1.0 - half, 1.0 + half), (1.0, 1.0 - half, 1.0 + half)];
-    let series = vec![
-        Series::new("5 to 95 %", Colour::REAL, Mark::Band(band(0.5))),
-        Series::new("25 to 75 %", Colour::REAL, Mark::InnerBand(band(0.2))),
-    ];
-    let picture = svg(
-        "t",
-        &[Chart::new(
-            "t",
-            Axis::linear("x"),
-            vec![Panel::new(Axis::linear("y"), series)],
-        )],
-    );
-    // each in its panel and in the legend
-    for class in ["class=\"area\"", "class=\"area inner\""] {
-        assert_eq!(picture.matches(class).count(), 2, "{class}: {picture}");
-    }
-}

@@ -292,7 +292,7 @@ impl Answer for StudyAnswer {
             ("NEES", "nees"),
             ("verdict", "../../verdict/kind"),
         ];
-        document.lead(Table::of(self, "/cells/*/outages/*", &columns).with_keys(2));
+        document.table(Table::of(self, "/cells/*/outages/*", &columns).with_keys(2));
         document.charts(
             &self.charts(),
             "95 % quantile of the horizontal error at the end of the first outage.",
@@ -300,7 +300,7 @@ impl Answer for StudyAnswer {
         for comparison in &self.comparisons {
             document.section(&format!("ASEE relative to {}", comparison.reference));
             document.text("Mean over the outage of (ratio − 1)·100, with its 95 % interval.");
-            document.table(&comparison.table());
+            document.table(comparison.table());
         }
         document.section("Cells");
         let link = |cell: &CellSummary| {

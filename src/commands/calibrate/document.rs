@@ -68,10 +68,10 @@ impl ShownCalibration<'_> {
                     "{figures/N/unit}, {figures/B/unit}, {figures/K/unit}",
                 ),
             ];
-            document.lead(Table::of(json, "/fits/*", &columns));
-            document.table(&figures);
+            document.table(Table::of(json, "/fits/*", &columns));
+            document.table(figures);
         } else {
-            document.lead(figures);
+            document.table(figures);
         }
         for (importance, note) in self.notes() {
             document.note(importance, note);
@@ -83,7 +83,7 @@ impl ShownCalibration<'_> {
                 &chart(fitted, outcome, self.diagnoses, self.settings.rate_hz),
                 CAPTION,
             );
-            document.table(&parameters(outcome));
+            document.table(parameters(outcome));
             if outcome.ranking.is_some() {
                 document.heading("Candidate models");
                 let columns = [
@@ -95,7 +95,7 @@ impl ShownCalibration<'_> {
                     ("J-test p", "j_test_p_value"),
                     ("chosen", "chosen"),
                 ];
-                document.table(&Table::of(
+                document.table(Table::of(
                     json,
                     &format!("/fits/{index}/ranking/*"),
                     &columns,
@@ -115,7 +115,7 @@ impl ShownCalibration<'_> {
             ("J-test p", "j_p_value"),
             ("signals alike: p", "spread_p_value"),
         ];
-        document.table(&Table::of(json, "/fits/*", &columns));
+        document.table(Table::of(json, "/fits/*", &columns));
         if self.diagnoses.iter().any(is_abnormal) {
             recordings_section(json, &mut document);
         }
@@ -128,7 +128,7 @@ impl ShownCalibration<'_> {
                 ("spread of the means (SI)", "spread"),
                 ("by noise alone", "noise"),
             ];
-            document.table(&Table::of(json, "/turn_on/*/axes/*", &columns));
+            document.table(Table::of(json, "/turn_on/*/axes/*", &columns));
         }
         document.checked(
             "wavelet variances of models to 1e-13 of an independent implementation, the optimum to 1e-6 of an exhaustive search",
@@ -237,7 +237,7 @@ fn recordings_section(json: &Value, document: &mut Document) {
         ("scales (s)", "outliers/tau_s"),
         ("drift: p", "drift/p_value"),
     ];
-    document.table(&Table::of(json, "/replicates/*", &columns).without_unknown());
+    document.table(Table::of(json, "/replicates/*", &columns).without_unknown());
 }
 
 /// A row a parameter.

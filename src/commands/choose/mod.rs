@@ -417,11 +417,8 @@ impl ChoiceMade {
             .iter()
             .map(|o| window(o.start_s, o.end_s))
             .collect();
-        document.facts(&[
-            ("trajectory", self.trajectory.clone()),
-            ("outages", ends.join(", ")),
-            ("seed", self.seed.to_string()),
-        ]);
+        let (trajectory, ends, seed) = (&self.trajectory, ends.join(", "), self.seed);
+        document.text(&format!("along {trajectory}, outages {ends}, seed {seed}"));
         let columns = [
             ("candidate", "candidate"),
             ("", "place"),
@@ -432,7 +429,7 @@ impl ChoiceMade {
             ("95 %", "nees/ci95"),
             ("RMSE (m)", "rmse_m"),
         ];
-        document.lead(Table::of(&json, "/candidates/*", &columns));
+        document.table(Table::of(&json, "/candidates/*", &columns));
         document.chart(&self.chart(), CAPTION);
         let columns = [
             ("candidate", "candidate"),
@@ -442,7 +439,7 @@ impl ChoiceMade {
             ("believed (m)", "believed_m"),
             ("coverage (0.95)", "coverage"),
         ];
-        document.table(&Table::of(&json, "/candidates/*", &columns));
+        document.table(Table::of(&json, "/candidates/*", &columns));
         let columns = [
             ("recording left out", "recording"),
             ("candidate", "../../candidate"),
@@ -452,7 +449,7 @@ impl ChoiceMade {
             ("RMSE (m)", "rmse_m"),
         ];
         let folds = Table::of(&json, "/candidates/*/folds/*", &columns);
-        document.folded("Recording by recording", |inside| inside.table(&folds));
+        document.folded("Recording by recording", |inside| inside.table(folds));
         document
     }
 

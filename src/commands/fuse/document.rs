@@ -12,7 +12,6 @@ use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::frames::NavState;
 use nav_sim_navigation::fusion::{ClocksApart, Finding, FixRecord, Row, Solution};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
-use std::path::Path;
 
 const CHECKED: &str =
     "solutions of simulated recordings are consistent with their covariance, smoothed ones too.";
@@ -26,7 +25,8 @@ impl FuseAnswer {
             tone(summary.verdict.kind),
             self.verdict(),
         );
-        document.facts(&self.facts());
+        document.text(&self.span());
+        document.text(&format!("start: {}", summary.initial.how.join("; ")));
         let outages: Vec<_> = summary
             .outcome
             .outages
@@ -45,6 +45,8 @@ impl FuseAnswer {
         document.section("Fixes");
         document.chart(&innovations(solution, &outages), FIXES);
         document.checked(CHECKED);
+        let columns = [("input", "role"), ("file", "path")];
+        document.table(Table::of(&self.inputs, "/*", &columns));
         if let Some(quality) = &self.reduction {
             match reduction_doubt(quality) {
                 Some(doubt) => document.note(Importance::Warning, doubt),
@@ -95,18 +97,9 @@ impl FuseAnswer {
         }
     }
 
-    fn facts(&self) -> Vec<(&str, String)> {
+    /// `0–900 s, 90000 IMU samples at 100.00 Hz, 15 states`
+    fn span(&self) -> String {
         let summary = &self.summary;
-        let name = |path: &str| {
-            Path::new(path)
-                .file_name()
-                .map_or_else(String::new, |n| n.to_string_lossy().into())
-        };
-        let mut facts: Vec<_> = self
-            .inputs
-            .iter()
-            .map(|i| (i.role.as_str(), name(&i.path)))
-            .collect();
         let (samples, rate_hz) = (summary.imu_samples, summary.imu_rate_hz);
         let span = window(summary.start_s, summary.end_s);
         let states = summary.filter_states - summary.turn_on_states;
@@ -114,12 +107,7 @@ impl FuseAnswer {
             0 => String::new(),
             n => format!(" + {n} turn-on"),
         };
-        facts.push((
-            "solution",
-            format!("{span}, {samples} IMU samples at {rate_hz:.2} Hz, {states}{turn_on} states"),
-        ));
-        facts.push(("start", summary.initial.how.join("; ")));
-        facts
+        format!("{span}, {samples} IMU samples at {rate_hz:.2} Hz, {states}{turn_on} states")
     }
 
     /// Consistency and errors, of the filter and smoothed.
@@ -172,11 +160,11 @@ impl FuseAnswer {
             .chain(ends.iter().map(|(title, keys)| (&**title, &**keys)))
             .collect();
         let table = Table::of_keys(self, &["", "filter", "smoothed"], &rows);
-        document.lead(table.without_unknown());
+        document.table(table.without_unknown());
         let mut table = |title: &str, table: Table| {
             if !table.is_empty() {
                 document.heading(title);
-                document.table(&table.without_unknown());
+                document.table(table.without_unknown());
             }
         };
         let columns = [

@@ -53,7 +53,7 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     page.charts(&states(epochs, &windows), STATES_SHOWN);
     page.section("Consistency");
     page.chart(&nees(epochs, summary), CONSISTENCY);
-    page.table(&consistency(answer));
+    page.table(consistency(answer));
     budgets(answer, &shown, &mut page);
     provenance(answer, &mut page);
     page.checked(
@@ -129,7 +129,7 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
     let summary = &answer.navigation.summary;
     if summary.outages.is_empty() {
         page.section("Accuracy over the run");
-        page.lead(Table::of(
+        page.table(Table::of(
             answer,
             "/accuracy/rmse_mean/*",
             &[
@@ -155,7 +155,7 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
         ("error/σ", "verdict/ratio"),
         ("in", "verdict/worst_state"),
     ];
-    page.lead(Table::of(answer, "/outages/*", &columns).without_unknown());
+    page.table(Table::of(answer, "/outages/*", &columns).without_unknown());
     let columns = [
         ("outage", "{start_s}–{end_s} s"),
         ("re-convergence, median (s)", "reconvergence_s/p50"),
@@ -166,7 +166,7 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
         ("ASEE pos_e_m from", "asee_end_ci95/pos_e_m/0"),
         ("to", "asee_end_ci95/pos_e_m/1"),
     ];
-    page.table(&Table::of(answer, "/outages/*", &columns).without_unknown());
+    page.table(Table::of(answer, "/outages/*", &columns).without_unknown());
     let columns = [
         ("state", "@"),
         ("RMSE, end", "."),
@@ -179,7 +179,7 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
         let table = Table::of(answer, &format!("/outages/{k}/rmse_end/*"), &columns);
         page.folded(
             &format!("States, {}", window(outage.start_s, outage.end_s)),
-            |page| page.table(&table),
+            |page| page.table(table),
         );
     }
 }
@@ -210,7 +210,7 @@ fn provenance(answer: &RunAnswer, page: &mut Document) {
         "nav-sim {}; the command is in manifest.json.",
         env!("CARGO_PKG_VERSION")
     ));
-    page.table(&Table::of(
+    page.table(Table::of(
         &answer.inputs,
         "/*",
         &[("input", "role"), ("file", "path"), ("BLAKE3", "blake3")],
@@ -237,7 +237,7 @@ fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
     for k in shown {
         let table = Table::of(answer, &format!("/outages/{k}/budget/*"), &columns);
         let title = window(outages[*k].start_s, outages[*k].end_s);
-        page.folded(&title, |page| page.table(&table));
+        page.folded(&title, |page| page.table(table));
     }
 }
 
