@@ -186,7 +186,7 @@ def choose(
             staging,
             progress,
             threads,
-            inputs=staging.recordings(recordings, "recordings", None),
+            recording=staging.recordings(recordings, "recordings", None),
             trajectory=_trajectory.staged(trajectory, staging),
             outage=windows(outages),
             estimator=estimator,

@@ -42,7 +42,7 @@ pub enum Out {
 }
 
 /// Files that a command reads, by their roles.
-pub type Inputs = Vec<(&'static str, PathBuf)>;
+pub type Inputs = Vec<(String, PathBuf)>;
 
 /// A command: options, inputs, answer.
 pub trait Command: clap::Args + Send + Sync + 'static {
@@ -61,11 +61,13 @@ pub trait Command: clap::Args + Send + Sync + 'static {
     /// Options that do not change the result, such as `--require`.
     const JUDGES: &'static [&'static str] = &[];
 
-    /// Every file that is read, by its role.
+    /// Every file that is read, by its role: those of its path arguments, which have the role of their names.
     ///
     /// # Errors
-    /// When a directory cannot be listed or options do not fit together.
-    fn inputs(&self) -> Result<Inputs>;
+    /// When options do not fit together.
+    fn inputs(&self, given: Inputs) -> Result<Inputs> {
+        Ok(given)
+    }
 
     /// Reads the files and answers; writes nothing.
     ///
@@ -165,6 +167,7 @@ pub struct Asked<C> {
     plots: Vec<PathBuf>,
     /// Options that decide the result, without paths of files.
     pub(crate) options: BTreeMap<String, Vec<String>>,
+    paths: Vec<(String, PathBuf)>,
 }
 
 const OUT: &str = "out";
@@ -212,6 +215,14 @@ impl<C: Command> FromArgMatches for Asked<C> {
             found.into_iter().flatten().cloned().collect::<Vec<_>>()
         };
         let request = C::from_arg_matches(matches)?;
+        let arguments = C::augment_args(clap::Command::new(C::NAME));
+        let own = arguments.get_arguments().filter(|arg| is_path(arg));
+        let named = own.map(|arg| arg.get_id().as_str());
+        let of_argument = |id| {
+            paths(id)
+                .into_iter()
+                .map(move |path| (str::to_owned(id), path))
+        };
         let by_default = match C::OUT {
             Out::File { name, .. } if request.writes_by_default() => Some(name.into()),
             _ => None,
@@ -220,6 +231,7 @@ impl<C: Command> FromArgMatches for Asked<C> {
             out: paths(OUT).pop().or(by_default),
             plots: paths(PLOT),
             options: options::<C>(matches),
+            paths: named.flat_map(of_argument).collect(),
             request,
         })
     }
@@ -483,10 +495,20 @@ const PAGE: &str = "report.html";
 const MANIFEST: &str = "manifest.json";
 
 impl<C: Command> Asked<C> {
+    /// Every file that is read, by its role; those of directories in name order.
+    pub(crate) fn inputs(&self) -> Result<Inputs> {
+        let mut all = Inputs::new();
+        for (role, path) in self.request.inputs(self.paths.clone())? {
+            let files = input::listed(&[path])?;
+            all.extend(files.into_iter().map(|file| (role.clone(), file)));
+        }
+        Ok(all)
+    }
+
     /// The manifest before the run: options, seed, contents of inputs.
     pub(crate) fn manifest(&self, seed: Option<u64>) -> Result<Manifest> {
-        let fingerprint = |(role, path): &(&'static str, PathBuf)| input::input(role, path);
-        let inputs = self.request.inputs()?;
+        let fingerprint = |(role, path): &(String, PathBuf)| input::input(role, path);
+        let inputs = self.inputs()?;
         let inputs: Result<Vec<Input>> = inputs.iter().map(fingerprint).collect();
         let mut options = self.options.clone();
         options.extend(seed.map(|seed| ("seed".to_owned(), vec![seed.to_string()])));

@@ -1,10 +1,10 @@
 //! Inputs that several commands share: files, settings, outages.
 
-use super::{Context, Failure, Inputs, Refuse, Result, refused};
+use super::{Context, Failure, Refuse, Result, refused};
 use crate::io::model_file::{self, ModelFile, TurnOn};
 use crate::io::recordings::{self, ReadOptions};
 use crate::io::toml_file::Source;
-use crate::io::{input, scenario_file, trajectory_file};
+use crate::io::{scenario_file, trajectory_file};
 use crate::parse;
 use crate::report::readable;
 use nav_sim_navigation::ekf::{BeliefError, FilterStates, InitialSettings};
@@ -270,20 +270,6 @@ pub(crate) fn merge(into: &mut toml::Table, over: toml::Table) {
             (_, value) => _ = into.insert(key, value),
         }
     }
-}
-
-/// Files of a list with their role.
-pub(crate) fn files<'a>(
-    role: &'static str,
-    paths: impl IntoIterator<Item = &'a PathBuf>,
-) -> impl Iterator<Item = (&'static str, PathBuf)> {
-    paths.into_iter().map(move |path| (role, path.clone()))
-}
-
-/// Recordings, those of directories in name order, with their role.
-pub(crate) fn listed(role: &'static str, paths: &[PathBuf]) -> Result<Inputs> {
-    let found = input::listed(paths)?;
-    Ok(found.into_iter().map(|path| (role, path)).collect())
 }
 
 /// Why a model has no filter: by the file that is at fault, of the model and the one with the settings; `advice` is on settings.

@@ -60,7 +60,7 @@ impl Command for CheckFiles {
     const NAME: &'static str = "check";
     const PLOT: bool = false;
 
-    fn inputs(&self) -> Result<Inputs> {
+    fn inputs(&self, _: Inputs) -> Result<Inputs> {
         Ok(Vec::new())
     }
 

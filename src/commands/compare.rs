@@ -77,14 +77,14 @@ impl Command for Compare {
         vec!["".into(), ".html".into()]
     }
 
-    fn inputs(&self) -> Result<Inputs> {
+    fn inputs(&self, _: Inputs) -> Result<Inputs> {
         Ok(self
             .runs
             .iter()
             .chain([&self.reference])
             .flat_map(|run| RUN_FILES.map(|name| run.join(name)))
             .filter(|path| path.exists())
-            .map(|path| ("run", path))
+            .map(|path| ("run".to_owned(), path))
             .collect())
     }
 

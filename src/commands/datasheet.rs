@@ -1,7 +1,6 @@
 //! `nav-sim datasheet`: models from data sheets, and the catalogue of IMUs.
 
-use crate::app::inputs::files;
-use crate::app::{Answer, Command, Context, Failure, Inputs, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
 use crate::io::datasheet::{CATALOGUE, Datasheet, Entry, Figure, Quantity, catalogued, read};
 use crate::io::model_file::{self, ModelFile};
 use crate::io::suggest::nearest;
@@ -58,10 +57,6 @@ impl Command for DatasheetArgs {
     };
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
-
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(files("entry", &self.entry).collect())
-    }
 
     fn run(&self, context: &Context<'_>) -> Result<DatasheetAnswer> {
         if self.list {

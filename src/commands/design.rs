@@ -1,7 +1,7 @@
 //! `nav-sim design`: the interval that recordings not made yet would give.
 
-use crate::app::inputs::{self, OutageFlag, files};
-use crate::app::{Answer, Command, Context, Failure, Inputs, Result};
+use crate::app::inputs::{self, OutageFlag};
+use crate::app::{Answer, Command, Context, Failure, Result};
 use crate::commands::calibrate::ESTIMATORS;
 use crate::commands::run::{NavigateInputs, TrueImu, navigate};
 use crate::io::draws_file::DrawsFile;
@@ -72,12 +72,6 @@ const LONGEST_H: f64 = 8766.0;
 impl Command for Design {
     type Answer = Designs;
     const NAME: &'static str = "design";
-
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(files("model", [&self.model])
-            .chain(files("trajectory", &self.trajectory))
-            .collect())
-    }
 
     fn run(&self, context: &Context<'_>) -> Result<Designs> {
         if self.hours.is_some_and(|hours| hours > LONGEST_H) {
@@ -235,7 +229,7 @@ fn destination_quantiles(
     outcomes
         .iter()
         .for_each(|outcome| outcome.put_into(&mut inputs.model));
-    let draws = DrawsFile::of(&outcomes.iter().collect::<Vec<_>>(), rate_hz);
+    let draws = DrawsFile::of(outcomes, rate_hz);
     inputs.model_draws = draws.and_then(|draws| draws.draws(&inputs.model));
     let found = navigate(inputs, scenario, outages, 0, &Context::default())?;
     let quantile = |o: &OutageSummary| {

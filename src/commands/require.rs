@@ -1,6 +1,6 @@
 //! The IMU that a limit needs, what a given one makes of it, and a ranking of several.
 
-use crate::app::inputs::{self, ScenarioArgs, files};
+use crate::app::inputs::{self, ScenarioArgs};
 use crate::app::{
     Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, refused,
 };
@@ -124,7 +124,7 @@ impl Command for Require {
         )
     }
 
-    fn inputs(&self) -> Result<Inputs> {
+    fn inputs(&self, mut given: Inputs) -> Result<Inputs> {
         if let (Ask::Window(outage), Some(start_s)) = (self.outage, self.start) {
             let Outage {
                 start_s: from,
@@ -141,11 +141,8 @@ impl Command for Require {
                 "without one, give a length in seconds",
             );
         }
-        Ok(files("trajectory", [&self.trajectory])
-            .chain(files("model", &self.model))
-            .chain(files("scenario", &self.settings.scenario))
-            .chain(files("gnss", &self.gnss))
-            .collect())
+        given.retain(|(role, _)| role != "catalogue");
+        Ok(given)
     }
 
     fn run(&self, context: &Context<'_>) -> Result<RequireAnswer> {

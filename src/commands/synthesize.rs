@@ -94,15 +94,14 @@ impl Command for Synthesize {
     const PLOT: bool = false;
     const PAGE: bool = false;
 
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(self
+    fn inputs(&self, mut given: Inputs) -> Result<Inputs> {
+        let file = self
             .contaminate
             .iter()
             .map(PathBuf::from)
-            .filter(|path| path.exists())
-            .map(|path| ("contamination", path))
-            .chain([("model", self.model.clone())])
-            .collect())
+            .find(|path| path.exists());
+        given.extend(file.map(|path| ("contamination".to_owned(), path)));
+        Ok(given)
     }
 
     fn output_names(&self) -> Vec<Cow<'static, str>> {

@@ -1,8 +1,6 @@
 //! `nav-sim trajectory`: reference trajectories.
 
-use crate::app::{
-    Answer, Asked, Command, Context, Failure, Inputs, Out, OutputFile, Result, inputs,
-};
+use crate::app::{Answer, Asked, Command, Context, Failure, Out, OutputFile, Result, inputs};
 use crate::io::scenario_file;
 use crate::io::trajectory_file::{self, Instants, Options, parse_origin};
 use crate::parse;
@@ -63,7 +61,7 @@ Examples:
 #[derive(clap::Args, Debug)]
 struct Source {
     /// Motion profile (.toml) or table (.csv, .tsv, .txt, also .gz)
-    #[arg(value_name = "TRAJECTORY")]
+    #[arg(id = "trajectory", value_name = "TRAJECTORY")]
     path: PathBuf,
     /// Origin of local coordinates, if the file does not state it: latitude, longitude, height
     #[arg(long, value_name = "LAT_DEG,LON_DEG,H_M", value_parser = origin, allow_hyphen_values = true)]
@@ -87,10 +85,6 @@ impl Source {
         let read = trajectory_file::load(&self.path, &Options { origin })?;
         context.warn_each(&read.1);
         Ok(read)
-    }
-
-    fn input(&self) -> (&'static str, PathBuf) {
-        ("trajectory", self.path.clone())
     }
 }
 
@@ -134,10 +128,6 @@ impl Command for Convert {
     };
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
-
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(vec![self.source.input()])
-    }
 
     fn run(&self, context: &Context<'_>) -> Result<TrajectoryTable> {
         let (trajectory, _) = self.source.read(context)?;
@@ -184,10 +174,6 @@ impl Command for CheckTrajectory {
     type Answer = TrajectoryCheck;
     const NAME: &'static str = "trajectory check";
     const PLOT: bool = false;
-
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(vec![self.source.input()])
-    }
 
     fn run(&self, context: &Context<'_>) -> Result<TrajectoryCheck> {
         let (trajectory, warnings) = self.source.read(context)?;
@@ -380,13 +366,6 @@ impl Command for Record {
     };
     const PLOT: bool = false;
     const PAGE: bool = false;
-
-    fn inputs(&self) -> Result<Inputs> {
-        Ok([self.source.input(), ("model", self.model.clone())]
-            .into_iter()
-            .chain(inputs::files("scenario", &self.scenario))
-            .collect())
-    }
 
     fn run(&self, context: &Context<'_>) -> Result<RecordedDrive> {
         let mut scenario = self

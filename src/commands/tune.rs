@@ -1,6 +1,6 @@
 //! `nav-sim tune`: the smallest factors on the variances of a noise model that make its filter consistent with other truths.
 
-use crate::app::inputs::{self, SettingsArgs, files};
+use crate::app::inputs::{self, SettingsArgs};
 use crate::app::{
     Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Result, refused,
 };
@@ -79,16 +79,12 @@ impl Command for Tune {
         help: "Model file to write",
     };
 
-    fn inputs(&self) -> Result<Inputs> {
+    fn inputs(&self, mut given: Inputs) -> Result<Inputs> {
         self.refuse_recordings()?;
         let draws = draws_file::beside(&self.model);
-        let draws = (self.intervals && draws.exists()).then_some(draws);
-        Ok(files("model", [&self.model])
-            .chain(files("draws", &draws))
-            .chain(files("truth", &self.truths))
-            .chain(files("trajectory", &self.trajectory))
-            .chain(files("scenario", &self.settings.file.scenario))
-            .collect())
+        let is_read = self.intervals && draws.exists();
+        given.extend(is_read.then(|| ("draws".to_owned(), draws)));
+        Ok(given)
     }
 
     fn run(&self, context: &Context<'_>) -> Result<TuneAnswer> {
@@ -822,7 +818,7 @@ mod tests {
     #[test]
     fn the_colour_is_that_of_the_worst_word() {
         let mut tuned = result(FilterStates::Reduced15, consistency(1.0, 8.8));
-        assert_eq!(tuned.document().verdict.tone, Tone::Doubtful);
+        assert_eq!(tuned.document().tone, Tone::Doubtful);
         tuned.after.range[0] = 0.756;
         let document = tuned.document();
         assert!(
@@ -835,11 +831,11 @@ mod tests {
         );
         tuned.factors[0].on_variance = 1.0;
         (tuned.before, tuned.after) = (consistency(1.0, 9.0), consistency(1.0, 9.0));
-        assert_eq!(tuned.document().verdict.tone, Tone::Good);
+        assert_eq!(tuned.document().tone, Tone::Good);
         (tuned.before.range, tuned.after.range) = ([0.8, 0.9], [0.8, 0.9]);
         let document = tuned.document();
         assert!(
-            document.verdict.tone == Tone::Doubtful
+            document.tone == Tone::Doubtful
                 && document.verdict[0].starts_with("no factor is needed")
         );
     }

@@ -1,8 +1,7 @@
 //! `nav-sim wv`: wavelet variances and Allan deviations of static recordings.
 
-use crate::app::inputs::listed;
 use crate::app::reading::{RecordingRequest, VarianceRequest};
-use crate::app::{Answer, Command, Context, Inputs, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Out, OutputFile, Result};
 use crate::commands::calibrate::{visit, without_warm_up};
 use crate::io::recordings::ReadOptions;
 use crate::parse;
@@ -29,7 +28,7 @@ Examples:
   nav-sim wv calib_data/formats/compressed.csv.gz --format json -o static.wv.json")]
 pub struct Wv {
     /// Recordings, or directories of recordings
-    #[arg(required = true, value_name = "FILE")]
+    #[arg(id = "recording", required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// How they are read.
     #[command(flatten)]
@@ -50,10 +49,6 @@ impl Command for Wv {
         name: "curves.json",
         help: "Write the curves as JSON",
     };
-
-    fn inputs(&self) -> Result<Inputs> {
-        listed("recording", &self.files)
-    }
 
     fn run(&self, context: &Context<'_>) -> Result<SignalsFile> {
         let (scales, tuning) = (self.tuning.levels(), self.tuning.tuning()?);

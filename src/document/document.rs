@@ -263,7 +263,7 @@ mod terminal_tests {
     use crate::{Document, Importance, Table, Tone};
 
     #[test]
-    fn a_screen_has_verdict_lead_and_three_notes() {
+    fn a_screen_has_verdict_first_table_and_three_notes() {
         let mut document = Document::new(
             "t",
             Tone::Undecided,
@@ -271,8 +271,8 @@ mod terminal_tests {
         );
         let mut table = Table::new(["row"]);
         (0..40).for_each(|k| table.row([k.to_string().into()]));
-        document.table(Table::new(["other"]));
         document.table(table);
+        document.table(Table::new(["other"]));
         for k in 0..3 {
             document.note(Importance::Detail, format!("detail {k}"));
             document.note(Importance::Remark, format!("remark {k}"));

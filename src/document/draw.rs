@@ -773,7 +773,14 @@ impl Frame {
     }
 
     fn points(&self, points: &[Interval], svg: &mut String) {
-        let shown = || points.iter().filter(|p| self.shows(p.x, p.y));
+        // more lie on one another
+        let every = points.len().div_ceil(self.most).max(1);
+        let shown = || {
+            points
+                .iter()
+                .step_by(every)
+                .filter(|p| self.shows(p.x, p.y))
+        };
         let with_bar = |p: &&Interval| !(p.low.is_nan() && p.high.is_nan());
         let bar = |p: &Interval| {
             let [low, high] =

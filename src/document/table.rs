@@ -169,7 +169,7 @@ impl Table {
     ///
     /// let result = serde_json::json!({ "nis": { "mean": 5.9, "dof": 6 } });
     /// let rows = [("NIS ({nis/dof} if right)", "nis/mean"), ("NEES", "nees/mean")];
-    /// assert_eq!(Table::of_keys(&result, &["", "mean"], &rows).columns(80), "                   mean\n  NIS (6 if right)  5.90");
+    /// assert_eq!(Table::of_keys(&result, &["", "mean"], &rows).columns(80), "                    mean\n  NIS (6 if right)  5.90");
     /// ```
     pub fn of_keys(result: &impl Serialize, head: &[&str], rows: &[(&str, &str)]) -> Self {
         let json = serde_json::to_value(result).unwrap_or_default();

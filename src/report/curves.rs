@@ -219,7 +219,7 @@ pub(crate) struct ReplicateCurve {
 
 impl CurvesFile {
     /// The file of some outcomes and the groups they are of.
-    pub(crate) fn new(groups: &[Group], outcomes: &[&Outcome], settings: &Settings) -> Self {
+    pub(crate) fn new(groups: &[Group], outcomes: &[Outcome], settings: &Settings) -> Self {
         let replicates = |o: &Outcome| {
             groups
                 .iter()

@@ -619,16 +619,16 @@ impl Door {
         let asked = Asked::<Run>::named(&named_request(&run)?)?;
         let scenario = asked.request.scenario()?;
         let mut inputs = Vec::new();
-        for (role, path) in asked.request.inputs()? {
+        for (role, path) in asked.inputs()? {
             if !self.inputs.contains_key(&path) {
                 self.inputs.insert(
                     path.clone(),
-                    input::input(role, &path)
+                    input::input(&role, &path)
                         .map_err(|e| e.hint("paths are relative to the study's file"))?,
                 );
             }
             inputs.push(Input {
-                role: role.to_owned(),
+                role,
                 ..self.inputs[&path].clone()
             });
         }

@@ -10,12 +10,10 @@ use nav_sim_calibration::{
 use nav_sim_navigation::ekf::{Belief, BeliefError, FilterStates};
 use nav_sim_navigation::monte_carlo;
 use nav_sim_navigation::scenario::Scenario;
-use nav_sim_navigation::sensors::imu::{Truth, TruthError};
+use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_navigation::simulation::lincov::{
-    Aim, Factor, FilterPass, Task, Track, TrueErrors, TruthSide, scaled,
-};
-use nav_sim_navigation::simulation::{Experiment, ExperimentError};
+use nav_sim_navigation::simulation::lincov::{Aim, Factor, Task, Track, TrueErrors, scaled};
+use nav_sim_navigation::simulation::{ExperimentError, RunResult};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::noise::Model;
@@ -343,13 +341,12 @@ pub struct Drive {
 /// One recording left out.
 #[derive(Debug, Clone)]
 pub struct Fold {
-    /// Scores of the candidates, in their order: on windows of the recording, or what is expected where it is shorter
-    /// than the trajectory.
-    pub scores: Vec<Score>,
-    /// As covariance analysis expects them where the recording's own N2 makes the errors.
-    pub expected: Vec<Score>,
-    /// Windows that were navigated; 0 where the recording is shorter than the trajectory.
+    /// The recording.
+    pub recording: String,
+    /// Windows of it that were navigated.
     pub windows: u64,
+    /// Scores of the candidates, in their order.
+    pub scores: Vec<Score>,
 }
 
 impl Drive {
@@ -398,7 +395,8 @@ impl Drive {
     /// takes every candidate along the trajectory `runs` times. `progress` is told how many runs are done.
     ///
     /// # Errors
-    /// When a model cannot be made, has no such filter, or rates do not fit together.
+    /// When a model cannot be made, has no such filter, rates do not fit together, or the recording is shorter than the
+    /// trajectory.
     pub fn leave_out(
         &self,
         laboratory: &Laboratory,
@@ -407,35 +405,19 @@ impl Drive {
         candidates: &[Candidate],
         runs: u64,
         progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<Fold, Failure> {
+    ) -> Result<Vec<Score>, Failure> {
         let beliefs = self.beliefs(candidates, &self.models(laboratory, Some(k), candidates)?)?;
-        let expected = self.expected(&beliefs, &laboratory.models[k]);
-        recordings.retain(|r| self.independent_windows(r.len()) >= 1.0);
-        let sampled = match monte_carlo::run(
-            &self.experiment(Truth::Static(&recordings), &beliefs),
-            runs,
-            progress,
-        ) {
-            Ok(results) => Some(
-                results
-                    .iter()
-                    .map(|r| Score::of_runs(&r.runs, r.outages.len()))
-                    .collect(),
-            ),
-            // none is as long as the trajectory, or lacks its last sample
-            Err(ExperimentError::Truth(TruthError::TooShort { .. })) => None,
-            Err(_) if recordings.is_empty() => None,
-            Err(e) => return Err(e.into()),
-        };
-        if sampled.is_none() {
-            progress(runs);
+        if recordings.len() > 1 {
+            recordings.retain(|r| self.independent_windows(r.len()) >= 1.0);
         }
-        let windows = if sampled.is_some() { runs } else { 0 };
-        Ok(Fold {
-            scores: sampled.unwrap_or_else(|| expected.clone()),
-            expected,
-            windows,
-        })
+        let truth = Truth::Static(&recordings);
+        let (trajectory, outages) = (&self.trajectory, &self.outages);
+        let experiment = self
+            .scenario
+            .experiment(trajectory, truth, &beliefs, outages, self.seed);
+        let results = monte_carlo::run(&experiment, runs, progress)?;
+        let score = |r: &RunResult| Score::of(&r.runs, outages.len());
+        Ok(results.iter().map(score).collect())
     }
 
     /// The model of every candidate, of all recordings but one, inflated as it says.
@@ -527,25 +509,6 @@ impl Drive {
                 .map_err(|source| unfit(candidate, source))
         };
         candidates.par_iter().zip(models).map(belief).collect()
-    }
-
-    /// Every filter on the same fixes.
-    fn experiment<'a>(&'a self, truth: Truth<'a>, beliefs: &'a [Belief]) -> Experiment<'a> {
-        let (trajectory, outages) = (&self.trajectory, &self.outages);
-        self.scenario
-            .experiment(trajectory, truth, beliefs, outages, self.seed)
-    }
-
-    /// Every filter where a model makes the errors.
-    fn expected(&self, beliefs: &[Belief], truth: &Model) -> Vec<Score> {
-        let sources = TruthSide::together(&TruthSide::sources(
-            &self.experiment(Truth::Model(truth), beliefs),
-            truth,
-        ));
-        let score = |belief: &Belief| {
-            Score::expected(&FilterPass::new(&self.track, belief).errors_at_ends(&sources))
-        };
-        beliefs.par_iter().map(score).collect()
     }
 }
 

@@ -7,7 +7,7 @@
 //! raise by claiming more, or less, than it knows. The recording is the unit of every interval, not the window:
 //! windows of one recording share its noise. [`Ranking`] compares candidates pair by pair, recording by recording.
 
-use crate::app::inputs::{self, SettingsArgs, files, listed};
+use crate::app::inputs::{self, SettingsArgs};
 use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
 use crate::app::{Answer, Command, Context, Inputs, Out, OutputFile, Result, refused};
 use crate::commands::calibrate::{
@@ -53,7 +53,7 @@ Examples:
       --estimator awv --model N1,WN+RW --filter 15,full -o out/models --format json")]
 pub struct Choose {
     /// Static recordings, three or more files, or directories of them
-    #[arg(required = true, value_name = "RECORDINGS")]
+    #[arg(id = "recording", required = true, value_name = "RECORDINGS")]
     inputs: Vec<PathBuf>,
     /// Trajectory: motion profile (.toml) or table (.csv)
     #[arg(long, value_name = "FILE")]
@@ -149,12 +149,8 @@ impl Command for Choose {
         ],
     };
 
-    fn inputs(&self) -> Result<Inputs> {
-        self.candidates()?;
-        Ok(files("trajectory", [&self.trajectory])
-            .chain(listed("recording", &self.inputs)?)
-            .chain(files("scenario", &self.settings.file.scenario))
-            .collect())
+    fn inputs(&self, given: Inputs) -> Result<Inputs> {
+        self.candidates().map(|_| given)
     }
 
     /// Files are read twice, so that no more than a few are in memory.
@@ -219,7 +215,7 @@ impl Command for Choose {
         };
         let judges = laboratory.judges()?;
         context.begin("runs", judges.iter().map(runs_on).sum());
-        let mut folds: Vec<(String, Fold)> = Vec::new();
+        let mut folds = Vec::new();
         for k in &judges {
             let file = &files[*k];
             let (read, _) = recordings::read(std::slice::from_ref(&file.path), &reading)?;
@@ -229,10 +225,15 @@ impl Command for Choose {
                 .map(|recording| without_warm_up(recording, options.skip_warm_up).0)
                 .collect();
             let advance = |n| context.advance(n);
-            folds.push((
-                file.file.clone(),
-                drive.leave_out(&laboratory, *k, read, &candidates, runs_on(k), &advance)?,
-            ));
+            let (recording, windows) = (file.file.clone(), runs_on(k));
+            let scores = drive
+                .leave_out(&laboratory, *k, read, &candidates, windows, &advance)
+                .map_err(|e| e.within(&recording))?;
+            folds.push(Fold {
+                recording,
+                windows,
+                scores,
+            });
         }
         context.end();
         let ranking = Ranking::new(&candidates, &folds);
@@ -482,12 +483,6 @@ impl ChoiceMade {
         warn(&ranking.decisive, &|names| {
             format!("without any one of {names} another candidate would win")
         });
-        if folds.iter().any(|fold| fold.windows == 0) {
-            document.note(
-                Importance::Remark,
-                "recordings shorter than the trajectory are judged by covariance analysis, their own N2 as truth",
-            );
-        }
     }
 
     /// Log scores against the best, a row a candidate.

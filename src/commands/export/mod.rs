@@ -3,10 +3,7 @@
 //! [`Export::new`] fits the pair that the target knows ([`noise::practical`](nav_sim_signal::noise::practical)) to the model's
 //! noisiest axis, states by how much the two differ, and [`Export::text`] writes it in the target's own syntax (`targets.rs`).
 
-use crate::app::inputs::files;
-use crate::app::{
-    Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, refused,
-};
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Refuse, Result, refused};
 use crate::io::model_file::{self, ModelFile};
 use crate::parse::{one_of, seconds_range};
 use nav_sim_calibration::percent;
@@ -86,10 +83,6 @@ impl Command for ExportArgs {
     };
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
-
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(files("model", [&self.model]).collect())
-    }
 
     fn run(&self, _: &Context<'_>) -> Result<ExportAnswer> {
         let file = model_file::read(&self.model)?;

@@ -144,21 +144,6 @@ impl FuseAnswer {
                 "reference/rmse/yaw_deg smoothed/reference/rmse/yaw_deg",
             ),
         ];
-        let of_outage = |k: usize| {
-            ["fix", "reference"].map(|end| {
-                let place = format!("{{outages/{k}/start_s}}–{{outages/{k}/end_s}} s");
-                (
-                    format!("end of outage {place}: error from the {end} (m)"),
-                    format!("outages/{k}/end_from_{end}/horizontal_m -"),
-                )
-            })
-        };
-        let outages = 0..self.summary.outcome.outages.len();
-        let ends: Vec<_> = outages.flat_map(of_outage).collect();
-        let rows: Vec<_> = rows
-            .into_iter()
-            .chain(ends.iter().map(|(title, keys)| (&**title, &**keys)))
-            .collect();
         let table = Table::of_keys(self, &["", "filter", "smoothed"], &rows);
         document.table(table.without_unknown());
         let mut table = |title: &str, table: Table| {
@@ -327,12 +312,6 @@ fn cause(cause: &Cause) -> String {
 
 // A fusion drawn: track, position, errors, innovations.
 
-/// Points of a curve that is smooth: more do not show.
-const MOST: usize = 120;
-/// Fixes of one fate in a panel: more lie on one another.
-const MOST_FIXES: usize = 1000;
-/// Points of a line on the map.
-const MOST_PLACES: usize = 400;
 /// Velocities of a reference that are known worse than this are not drawn: its positions jump (m/s).
 const UNEVEN: f64 = 0.5;
 
@@ -356,7 +335,6 @@ fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     };
     let track = |rows: &[Row], point: &dyn Fn(&Row) -> DVec2| -> Vec<(f64, [f64; 2])> {
         rows.iter()
-            .step_by(rows.len().div_ceil(MOST_PLACES).max(1))
             .map(|row| (row.t_s, point(row).into()))
             .collect()
     };
@@ -387,11 +365,6 @@ fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     chart
 }
 
-/// Some of many rows, for curves that are smooth.
-fn thinned(rows: &[Row]) -> impl Iterator<Item = &Row> {
-    rows.iter().step_by(rows.len().div_ceil(MOST).max(1))
-}
-
 /// Rows of the filter, and smoothed ones: names of what is stated and of the error, colours. A panel has room for three
 /// names in its legend.
 fn solutions(solution: &Solution) -> Vec<(&[Row], [&'static str; 2], [Colour; 2])> {
@@ -413,7 +386,7 @@ fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
         series.push(Series::dashed(
             stated,
             believed,
-            thinned(rows)
+            rows.iter()
                 .map(|row| (row.t_s, row.sigma[0].hypot(row.sigma[1])))
                 .collect(),
         ));
@@ -447,7 +420,7 @@ fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
                 stated,
                 believed,
                 Mark::Band(
-                    thinned(rows)
+                    rows.iter()
                         .map(|row| (row.t_s, -row.sigma[i], row.sigma[i]))
                         .collect(),
                 ),
@@ -473,13 +446,8 @@ const FATES: [(bool, &str, Colour); 2] = [
 /// A series for each fate of fixes.
 fn fixes(fixes: &[FixRecord], value: &dyn Fn(&FixRecord) -> f64) -> Vec<Series> {
     let of_fate = |(fate, name, colour): (bool, &str, Colour)| {
-        let of_fate: Vec<&FixRecord> = fixes.iter().filter(|f| f.used == fate).collect();
-        let every = of_fate.len().div_ceil(MOST_FIXES).max(1);
-        let points = of_fate
-            .into_iter()
-            .step_by(every)
-            .map(|f| (f.t_s, value(f), f64::NAN));
-        let points: Vec<_> = points.collect();
+        let of_fate = fixes.iter().filter(|f| f.used == fate);
+        let points: Vec<_> = of_fate.map(|f| (f.t_s, value(f), f64::NAN)).collect();
         (!points.is_empty()).then(|| Series::points(name, colour, points))
     };
     FATES.into_iter().filter_map(of_fate).collect()

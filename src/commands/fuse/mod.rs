@@ -2,7 +2,6 @@
 
 mod document;
 
-use crate::app::inputs::files;
 use crate::app::{
     Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Refuse, Result, inputs,
     refused,
@@ -21,10 +20,11 @@ use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
 use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
 use nav_sim_navigation::fusion::mounting::{self, Mounting};
 use nav_sim_navigation::fusion::{
-    Assessment, ClocksApart, Correlation, Displaced, Finding, Found, FusionError, Heading,
-    Levelling, Outcome, Recorded, Row, Settings, Solution, Start, Weighed, WheelSpeed, Whiteness,
-    aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier, fuse, fuse_correlated,
-    interval_s, outcome, rest_of_origin, rough_origin, vehicle_velocities, wheel_ratio,
+    Assessment, ClocksApart, Correlation, Displaced, Finding, FixRecord, Found, FusionError,
+    Heading, Levelling, Outcome, Recorded, Row, Settings, Solution, Start, Weighed, WheelSpeed,
+    Whiteness, aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier, fuse,
+    fuse_correlated, interval_s, outcome, rest_of_origin, rough_origin, vehicle_velocities,
+    wheel_ratio,
 };
 use nav_sim_navigation::gnss::{FixSigma, GnssFix};
 use nav_sim_navigation::linalg::median;
@@ -58,14 +58,10 @@ impl Command for Fuse {
     };
     const PLOT: bool = false;
 
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(files("imu", [&self.imu])
-            .chain(files("gnss", [&self.gnss]))
-            .chain(files("model", [&self.model]))
-            .chain(files("initial", self.initial_file()))
-            .chain(files("odometer", &self.odometer))
-            .chain(files("reference", &self.reference))
-            .collect())
+    fn inputs(&self, mut given: Inputs) -> Result<Inputs> {
+        let initial = self.initial_file();
+        given.extend(initial.map(|path| ("initial".to_owned(), path.clone())));
+        Ok(given)
     }
 
     fn run(&self, context: &Context<'_>) -> Result<FuseAnswer> {
@@ -1271,101 +1267,100 @@ fn directory(answer: &FuseAnswer) -> Vec<OutputFile<'static>> {
         .collect()
 }
 
-fn header(groups: &[(&str, &[&str])]) -> String {
-    let names = groups
-        .iter()
-        .flat_map(|(prefix, names)| names.iter().map(move |n| format!("{prefix}{n}")));
-    std::iter::once("t_s".to_owned())
-        .chain(names)
-        .collect::<Vec<_>>()
-        .join(",")
-        + "\n"
-}
+const TIME: Columns = ("", &["t_s"], Some(6));
 
-/// A number with as many digits as its size deserves: 1e-10 degrees are 0.01 mm.
-fn fixed(x: f64, digits: usize) -> String {
-    if x.is_finite() && x.abs() < 1e15 {
-        format!("{x:.digits$}")
-    } else {
-        shortest(x)
-    }
+/// Columns of a table: prefix and names, and with how many digits; none: four after the first, and a power of ten.
+type Columns = (&'static str, &'static [&'static str], Option<usize>);
+
+/// Rows as CSV with as many digits as their size deserves, 1e-10 degrees are 0.01 mm; NaN is an empty cell.
+fn table(columns: &[Columns], rows: impl Iterator<Item = Vec<f64>>) -> String {
+    let columns: Vec<(String, Option<usize>)> = columns
+        .iter()
+        .flat_map(|(prefix, names, digits)| {
+            names
+                .iter()
+                .map(move |name| (format!("{prefix}{name}"), *digits))
+        })
+        .collect();
+    let head = columns.iter().map(|(name, _)| name.clone());
+    let cell = |(x, (_, digits)): (f64, &(String, Option<usize>))| match digits {
+        _ if x.is_nan() => String::new(),
+        Some(digits) if x.abs() < 1e15 => format!("{x:.digits$}"),
+        None => format!("{x:.4e}"),
+        _ => shortest(x),
+    };
+    let rows = rows.map(|row| row.into_iter().zip(&columns).map(cell).collect());
+    let lines = std::iter::once(head.collect()).chain(rows);
+    lines
+        .map(|cells: Vec<String>| cells.join(",") + "\n")
+        .collect()
 }
 
 /// `solution.csv` and `smoothed.csv`: states, their standard deviations (those of latitude and longitude in degrees), bias
 /// estimates, the horizontal standard deviations in metres, and those of the biases.
 fn solution_csv(rows: &[Row]) -> String {
-    let mut text = header(&[
-        ("", &STATE),
-        ("sd_", &STATE),
-        ("", &BIAS_NAMES),
-        ("sd_", &["n_m", "e_m"]),
-        ("sd_", &BIAS_NAMES),
-    ]);
-    for row in rows {
-        let (state, sd) = (values(&row.state), &row.sigma);
-        let r = radii(row.state.lat.sin());
-        let sd_lat = sd[0] / (r.meridian + row.state.h) / DEG;
-        let sd_lon = sd[1] / ((r.transverse + row.state.h) * row.state.lat.cos()) / DEG;
-        let digits = [10, 10, 5, 6, 6, 6, 7, 7, 7];
-        let mut cells = vec![fixed(row.t_s, 6)];
-        cells.extend(state.iter().zip(digits).map(|(x, d)| fixed(*x, d)));
-        cells.extend([sd_lat, sd_lon].map(|x| format!("{x:.4e}")));
-        cells.extend(sd[2..].iter().map(|x| fixed(*x, 6)));
-        cells.extend(
-            row.bias
-                .iter()
-                .flat_map(|b| b.to_array())
-                .map(|x| fixed(x, 9)),
-        );
-        cells.extend(sd[..2].iter().map(|x| fixed(*x, 6)));
-        cells.extend(
-            row.bias_sigma
-                .iter()
-                .flat_map(|b| b.to_array())
-                .map(|x| fixed(x, 9)),
-        );
-        text += &(cells.join(",") + "\n");
-    }
-    text
+    const COLUMNS: [Columns; 10] = [
+        TIME,
+        ("", STATE.split_at(2).0, Some(10)),
+        ("", &["h_m"], Some(5)),
+        ("", STATE.split_at(6).0.split_at(3).1, Some(6)),
+        ("", STATE.split_at(6).1, Some(7)),
+        ("sd_", STATE.split_at(2).0, None),
+        ("sd_", STATE.split_at(2).1, Some(6)),
+        ("", &BIAS_NAMES, Some(9)),
+        ("sd_", &["n_m", "e_m"], Some(6)),
+        ("sd_", &BIAS_NAMES, Some(9)),
+    ];
+    let row = |row: &Row| {
+        let (NavState { lat, h, .. }, sd) = (row.state, &row.sigma);
+        let r = radii(lat.sin());
+        let sd_lat = sd[0] / (r.meridian + h) / DEG;
+        let sd_lon = sd[1] / ((r.transverse + h) * lat.cos()) / DEG;
+        let [bias, bias_sigma] =
+            [row.bias, row.bias_sigma].map(|b| b.map(|b| b.to_array()).concat());
+        let state = values(&row.state);
+        [
+            &[row.t_s],
+            &state[..],
+            &[sd_lat, sd_lon],
+            &sd[2..],
+            &bias,
+            &sd[..2],
+            &bias_sigma,
+        ]
+        .concat()
+    };
+    table(&COLUMNS, rows.iter().map(row))
 }
 
-/// `innovations.csv`: every fix; 1 where it was used, and why not where it was not.
+/// `innovations.csv`: every fix; 1 where it was used.
 fn innovations_csv(solution: &Solution) -> String {
-    let mut text = header(&[
-        ("", &["used", "status"]),
-        ("", &REPORTED_NAMES[..6]),
-        ("sd_", &REPORTED_NAMES[..6]),
-        ("", &["nis", "dof"]),
-    ]);
-    for fix in &solution.fixes {
-        let status = if fix.used { "used" } else { "withheld" };
-        let mut cells = vec![
-            fixed(fix.t_s, 6),
-            u8::from(fix.used).to_string(),
-            status.to_owned(),
-        ];
-        for list in [&fix.innovation, &fix.sigma] {
-            cells.extend((0..6).map(|i| list.get(i).map_or_else(String::new, |x| fixed(*x, 6))));
-        }
-        cells.extend([fixed(fix.nis, 4), fix.innovation.len().to_string()]);
-        text += &(cells.join(",") + "\n");
-    }
-    text
+    const MEASURED: &[&str] = REPORTED_NAMES.split_at(6).0;
+    const COLUMNS: [Columns; 6] = [
+        TIME,
+        ("", &["used"], Some(0)),
+        ("", MEASURED, Some(6)),
+        ("sd_", MEASURED, Some(6)),
+        ("", &["nis"], Some(4)),
+        ("", &["dof"], Some(0)),
+    ];
+    let six = |list: &[f64]| [0, 1, 2, 3, 4, 5].map(|i| list.get(i).copied().unwrap_or(f64::NAN));
+    let row = |fix: &FixRecord| {
+        let (used, dof) = (f64::from(u8::from(fix.used)), fix.innovation.len() as f64);
+        let [innovation, sigma] = [&fix.innovation, &fix.sigma].map(|list| six(list));
+        [&[fix.t_s, used], &innovation[..], &sigma, &[fix.nis, dof]].concat()
+    };
+    table(&COLUMNS, solution.fixes.iter().map(row))
 }
 
 fn errors_csv(rows: &[Row]) -> String {
-    let mut text = header(&[("err_", &REPORTED_NAMES), ("", &["nees"])]);
-    for (row, error) in rows.iter().filter_map(|row| Some((row, row.error?))) {
-        let cells: Vec<String> = error.values.iter().map(|x| fixed(*x, 6)).collect();
-        let _ = writeln!(
-            text,
-            "{},{},{}",
-            fixed(row.t_s, 6),
-            cells.join(","),
-            fixed(error.nees, 4)
-        );
-    }
-    text
+    const COLUMNS: [Columns; 3] = [
+        TIME,
+        ("err_", &REPORTED_NAMES, Some(6)),
+        ("", &["nees"], Some(4)),
+    ];
+    let row = |row: &Row| Some([&[row.t_s], &row.error?.values[..], &[row.error?.nees]].concat());
+    table(&COLUMNS, rows.iter().filter_map(row))
 }
 
 /// The way as a line on the map, a point a second at most.

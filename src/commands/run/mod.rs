@@ -1,8 +1,8 @@
 //! `nav-sim run`: the main job.
 
-use crate::app::inputs::{self, FilterArgs, SettingsArgs, files};
+use crate::app::inputs::{self, FilterArgs, SettingsArgs};
 use crate::app::{
-    Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Refuse, Result, refused,
+    Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result, refused,
 };
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::ModelFile;
@@ -148,16 +148,6 @@ impl Command for Run {
         files: &RUN_FILES,
     };
     const JUDGES: &'static [&'static str] = &["require"];
-
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(files("trajectory", [&self.trajectory])
-            .chain(files("model", [&self.model]))
-            .chain(files("truth", &self.truth))
-            .chain(inputs::listed("static", &self.recordings)?)
-            .chain(files("scenario", &self.settings.file.scenario))
-            .chain(files("gnss", &self.gnss))
-            .collect())
-    }
 
     fn run(&self, context: &Context<'_>) -> Result<RunAnswer> {
         self.prepare(context)?.navigate(None, context)
