@@ -117,11 +117,6 @@ pub trait Answer: Serialize {
         None
     }
 
-    /// The figures of `--plot FILE.svg`.
-    fn svg(&self, document: &Document) -> String {
-        document.svg()
-    }
-
     /// The files to be written; of [`Out::File`] their names are endings.
     fn files(&self) -> Vec<OutputFile<'_>> {
         Vec::new()
@@ -612,7 +607,7 @@ impl<C: Command> Asked<C> {
             _ => {}
         }
         for path in &self.plots {
-            write_plot(path, document, answer.svg(document))?;
+            write_plot(path, document)?;
             written.push(path.clone());
         }
         Ok(written)
@@ -684,11 +679,11 @@ fn form(path: &Path) -> Result<Form> {
 }
 
 /// Writes a page, or figures in the form that the name says.
-fn write_plot(path: &Path, document: &Document, svg: String) -> Result<()> {
+fn write_plot(path: &Path, document: &Document) -> Result<()> {
     if is_page(path) {
         return atomic::write(path, document.html());
     }
-    let picture = encode(svg, form(path)?).map_err(Failure::could_not)?;
+    let picture = encode(document.svg(), form(path)?).map_err(Failure::could_not)?;
     atomic::write(path, picture)
 }
 

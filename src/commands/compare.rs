@@ -244,7 +244,7 @@ fn compared(
             }
         }
     }
-    let label = Label::of(&run, candidate.origin.model.estimator.as_deref());
+    let label = Label::of(&run, candidate.origin.estimator.as_deref());
     let both = candidate
         .experiment
         .epochs

@@ -55,7 +55,6 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     page.chart(&nees(epochs, summary), CONSISTENCY);
     page.table(consistency(answer));
     budgets(answer, &shown, &mut page);
-    provenance(answer, &mut page);
     page.checked(
         "The filter's standard deviations agree to 2e-4 with an independent implementation; the NEES of filters whose model is right \
          with chi-square at p = 0.001.",
@@ -203,22 +202,6 @@ fn consistency(answer: &RunAnswer) -> Table {
     Table::of_keys(answer, &head, &rows).without_unknown()
 }
 
-fn provenance(answer: &RunAnswer, page: &mut Document) {
-    page.section("Provenance");
-    // the command, the threads and the time taken are in manifest.json: this page is the same for the same seed
-    page.text(&format!(
-        "nav-sim {}; the command is in manifest.json.",
-        env!("CARGO_PKG_VERSION")
-    ));
-    page.table(Table::of(
-        &answer.inputs,
-        "/*",
-        &[("input", "role"), ("file", "path"), ("BLAKE3", "blake3")],
-    ));
-    let configuration = toml::to_string_pretty(&answer.origin.configuration).unwrap_or_default();
-    page.folded("Configuration", |page| page.code(&configuration));
-}
-
 /// The sources of the errors at the ends of the outages that are shown.
 fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
     let outages = &answer.navigation.summary.outages;
@@ -247,7 +230,7 @@ fn over_time(epochs: &[EpochMetrics], value: impl Fn(&EpochMetrics) -> f64) -> V
     epochs.iter().map(|e| (e.t_s, value(e))).collect()
 }
 
-pub(super) fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
+fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
     let rmse = over_time(epochs, |e| e.rmse.0[0].value.hypot(e.rmse.0[1].value));
     let believed = over_time(epochs, |e| e.asee.0[0].value.hypot(e.asee.0[1].value));
     let three = believed
@@ -303,7 +286,7 @@ fn states(epochs: &[EpochMetrics], outages: &[(f64, f64)]) -> Vec<Chart> {
     REPORTED_NAMES.iter().enumerate().map(chart).collect()
 }
 
-pub(super) fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
+fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
     let panel = |axis: Axis, band: [f64; 2], value: fn(&EpochMetrics) -> f64| {
         let mut series = vec![Series::line("", Colour::Ink, over_time(epochs, value))];
         // of expected values there is no scatter, and no band for it
@@ -343,7 +326,8 @@ pub(super) fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
 /// consequence.
 fn remedy(summary: &Summary, unexpected: &[String], answer: &RunAnswer) -> String {
     let verdict = &summary.verdict;
-    let [is_recorded, is_modelled] = ["static", "truth"].map(|role| answer.has_input(role));
+    let has_input = |role| answer.inputs.iter().any(|input| input.role == role);
+    let [is_recorded, is_modelled] = ["static", "truth"].map(has_input);
     let ratios = summary.reduction.iter().flat_map(|quality| {
         quality
             .outage_end
