@@ -106,32 +106,55 @@ pub(crate) fn placed(
 /// Lets the filter expect the turn-on bias that its model states, where settings are silent.
 pub(crate) fn expect_turn_on(
     initial: &mut InitialSettings,
-    file: &ModelFile,
+    stated: Option<TurnOn>,
     path: &Path,
     context: &Context<'_>,
 ) {
-    let set = expected_turn_on(initial, &file.turn_on.unwrap_or_default());
-    tell_turn_on("the filter expects", set, path, context);
+    let (accel, gyro) = (
+        &mut initial.accel_bias_sigma_m_s2,
+        &mut initial.gyro_bias_sigma_rad_s,
+    );
+    set_turn_on(
+        [accel, gyro],
+        stated,
+        context,
+        &format!("{}: the filter expects", path.display()),
+    );
 }
 
 /// Gives the true IMU the turn-on bias that the model of its errors states, where settings are silent; a 0 is a setting.
 pub(crate) fn make_turn_on(
     imu: &mut ImuSettings,
-    file: &ModelFile,
+    stated: Option<TurnOn>,
     path: &Path,
     context: &Context<'_>,
 ) {
-    let set = made_turn_on(imu, &file.turn_on.unwrap_or_default());
-    tell_turn_on("the true IMU has", set, path, context);
+    let (accel, gyro) = (
+        &mut imu.turn_on_bias_accel_m_s2,
+        &mut imu.turn_on_bias_gyro_rad_s,
+    );
+    set_turn_on(
+        [accel, gyro],
+        stated,
+        context,
+        &format!("{}: the true IMU has", path.display()),
+    );
 }
 
-fn tell_turn_on(who: &str, set: [Option<f64>; 2], path: &Path, context: &Context<'_>) {
-    for (sensor, sigma) in Sensor::ALL.into_iter().zip(set) {
-        let Some(sigma) = sigma else { continue };
-        let (shown, sigma, unit) = (path.display(), readable(sigma), sensor.unit());
-        context.remark(format!(
-            "{shown}: {who} a turn-on bias of {sigma} {unit} ({sensor}, standard deviation)"
-        ));
+fn set_turn_on(
+    settings: [&mut Option<f64>; 2],
+    stated: Option<TurnOn>,
+    context: &Context<'_>,
+    who: &str,
+) {
+    for (sensor, setting) in Sensor::ALL.into_iter().zip(settings) {
+        if let (None, Some(sigma)) = (&setting, stated.unwrap_or_default().sigma(sensor)) {
+            *setting = Some(sigma);
+            let (sigma, unit) = (readable(sigma), sensor.unit());
+            context.remark(format!(
+                "{who} a turn-on bias of {sigma} {unit} ({sensor}, standard deviation)"
+            ));
+        }
     }
 }
 
@@ -287,26 +310,4 @@ pub(crate) fn no_filter(
         }
         _ => within(Failure::input(e), model),
     }
-}
-
-/// Lets the filter expect the turn-on bias of its model; settings win. What was set.
-pub(crate) fn expected_turn_on(initial: &mut InitialSettings, stated: &TurnOn) -> [Option<f64>; 2] {
-    [
-        fill(&mut initial.accel_bias_sigma_m_s2, stated, Sensor::Accel),
-        fill(&mut initial.gyro_bias_sigma_rad_s, stated, Sensor::Gyro),
-    ]
-}
-
-/// Gives the true IMU the turn-on bias of the model that makes its errors; settings win, a 0 too. What was set.
-pub(crate) fn made_turn_on(imu: &mut ImuSettings, stated: &TurnOn) -> [Option<f64>; 2] {
-    [
-        fill(&mut imu.turn_on_bias_accel_m_s2, stated, Sensor::Accel),
-        fill(&mut imu.turn_on_bias_gyro_rad_s, stated, Sensor::Gyro),
-    ]
-}
-
-fn fill(setting: &mut Option<f64>, stated: &TurnOn, sensor: Sensor) -> Option<f64> {
-    let sigma = stated.sigma(sensor).filter(|_| setting.is_none());
-    *setting = setting.or(sigma);
-    sigma
 }

@@ -85,10 +85,6 @@ impl Command for DatasheetArgs {
             .flat_map(|sensor| lacking(&sheet, sensor))
             .chain(made.doubts)
             .for_each(|doubt| context.warn(doubt));
-        Sensor::ALL
-            .into_iter()
-            .flat_map(|sensor| left_out(&sheet, sensor))
-            .for_each(|note| context.remark(note));
         context.remark("an assumption, not a calibration");
         Ok(DatasheetAnswer::Model(Box::new(made.file)))
     }
@@ -217,17 +213,6 @@ fn lacking(sheet: &Datasheet, sensor: Sensor) -> impl Iterator<Item = String> {
         .into_iter()
         .filter(move |f| sheet.value(sensor, f.0).is_none())
         .map(move |(_, name, flag)| format!("{sensor}: no {name} is given (--{flag})"))
-}
-
-fn left_out(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
-    let name = sensor.name();
-    let offset = sheet.given(sensor, Figure::Offset).map(|offset| {
-        format!("{name}: the zero offset of ±{offset} is removed before use and not in the model")
-    });
-    let scale = sheet.value(sensor, Figure::Scale).map(|ppm| {
-        format!("{name}: the scale factor of {ppm} ppm is not in the model: run --scale-ppm")
-    });
-    offset.into_iter().chain(scale).collect()
 }
 
 /// A catalogued unit.

@@ -244,8 +244,8 @@ impl Requirements {
         let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
         let file = inputs::model(path, context)?;
         let mut scenario = self.scenario.clone();
-        inputs::expect_turn_on(&mut scenario.initial, &file, path, context);
-        inputs::make_turn_on(&mut scenario.imu, &file, path, context);
+        inputs::expect_turn_on(&mut scenario.initial, file.turn_on, path, context);
+        inputs::make_turn_on(&mut scenario.imu, file.turn_on, path, context);
         let missing = missing(&file.not_stated());
         if !missing.is_empty() {
             context.warn(format!(
@@ -660,29 +660,25 @@ impl Requirements {
                 .map(|f| (f.figure.to_owned(), f.allocated.into())),
         );
         needed.file.provenance = Some(provenance);
-        let stated = self.stated_turn_on();
-        needed.file.turn_on = (stated != TurnOn::default()).then_some(stated);
+        needed.file.turn_on = self.stated_turn_on();
         Ok(needed)
     }
 
     /// The scenario with a filter that expects the turn-on biases that `[imu]` states, as it expects those of a model file.
     fn with_stated_turn_on(&self) -> Scenario {
         let mut scenario = self.scenario.clone();
-        inputs::expected_turn_on(&mut scenario.initial, &self.stated_turn_on());
+        let (stated, silent) = (self.stated_turn_on(), Context::default());
+        inputs::expect_turn_on(&mut scenario.initial, stated, Path::new(""), &silent);
         scenario
     }
 
-    fn stated_turn_on(&self) -> TurnOn {
-        let sigma = |sensor| {
-            self.scenario
-                .imu
-                .turn_on_bias(sensor)
-                .map(|sigma| [sigma; 3])
-        };
-        TurnOn {
+    fn stated_turn_on(&self) -> Option<TurnOn> {
+        let sigma = |sensor| Some([self.scenario.imu.turn_on_bias(sensor)?; 3]);
+        let stated = TurnOn {
             accel_m_s2: sigma(Sensor::Accel),
             gyro_rad_s: sigma(Sensor::Gyro),
-        }
+        };
+        (stated != TurnOn::default()).then_some(stated)
     }
 
     /// Errors after outages of growing length, at the places that the outage asked for has, each as far as the trajectory
@@ -869,9 +865,9 @@ impl Requirements {
     /// A unit whose turn-on biases are there and expected; `model` is at the rate of the IMU.
     fn unit(&self, name: String, file: &ModelFile, model: Model) -> CatalogueUnit {
         let mut scenario = self.scenario.clone();
-        let stated = file.turn_on.unwrap_or_default();
-        inputs::expected_turn_on(&mut scenario.initial, &stated);
-        inputs::made_turn_on(&mut scenario.imu, &stated);
+        let (path, silent) = (Path::new(&name), Context::default());
+        inputs::expect_turn_on(&mut scenario.initial, file.turn_on, path, &silent);
+        inputs::make_turn_on(&mut scenario.imu, file.turn_on, path, &silent);
         CatalogueUnit {
             name,
             model,

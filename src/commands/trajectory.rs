@@ -378,7 +378,7 @@ impl Command for Record {
         let file = inputs::model(&self.model, context)?;
         let model = continuous::at_rate(&file.model, scenario.imu.rate_hz)
             .map_err(|e| Failure::input(format!("{}: {e}", self.model.display())))?;
-        inputs::make_turn_on(&mut scenario.imu, &file, &self.model, context);
+        inputs::make_turn_on(&mut scenario.imu, file.turn_on, &self.model, context);
         let seed = context.seed_or(scenario.run.seed);
         // a recording is what IMU and receiver give: neither barometer nor wheel, no filter
         let scenario = Scenario {

@@ -97,7 +97,7 @@ impl Command for Tune {
         }
         let file = inputs::model(&self.model, context)?;
         let model = inputs::at_rate(&self.model, &file.model, scenario.imu.rate_hz, context)?;
-        inputs::expect_turn_on(&mut scenario.initial, &file, &self.model, context);
+        inputs::expect_turn_on(&mut scenario.initial, file.turn_on, &self.model, context);
         let truths = self.truths((&file, &model), &scenario, context)?;
         let (track, outages) = self.track(&scenario, &model, context)?;
         let found = self.tune(&scenario, &model, truths, &track, &outages);
@@ -144,7 +144,7 @@ impl Tune {
     ) -> Result<Truths> {
         let true_errors = |path: &Path, model: Model, turned_on: &ModelFile| {
             let (mut imu, gnss) = (scenario.imu.clone(), scenario.gnss.clone());
-            inputs::make_turn_on(&mut imu, turned_on, path, context);
+            inputs::make_turn_on(&mut imu, turned_on.turn_on, path, context);
             TrueErrors {
                 model,
                 imu,

@@ -143,10 +143,10 @@ impl Answer for SignalsFile {
         let (tone, verdict) = match self
             .signals
             .iter()
-            .flat_map(|s| ratios(s, self.efficiency).map(move |r| (s, r)))
-            .min_by(|a, b| a.1.ratio.total_cmp(&b.1.ratio))
+            .flat_map(|s| ratios(s).map(move |r| (s, r)))
+            .min_by(|a, b| a.1.1.total_cmp(&b.1.1))
         {
-            Some((s, Ratio { ratio, tau_s, .. })) if ratio < 1.0 / OUTLIERS => {
+            Some((s, (tau_s, ratio))) if ratio < 1.0 / OUTLIERS => {
                 let (name, ratio) = (recording_names([s.file.as_str()]).concat(), 1.0 / ratio);
                 let (channel, at) = (s.channel(), duration(tau_s));
                 let verdict = format!(
@@ -161,7 +161,7 @@ impl Answer for SignalsFile {
         };
         let count = recordings(self).len();
         let head = format!(
-            "Allan deviation over averages, median of recordings ({count}); ratio: robust/classical, * less than by chance"
+            "Allan deviation over averages, median of recordings ({count}); ratio: least robust/classical"
         );
         let mut document = Document::new(
             "Wavelet variance of static recordings",
@@ -245,11 +245,9 @@ fn digest(file: &SignalsFile) -> Table {
             .zip(&times)
             .min_by(|a, b| a.0.total_cmp(b.0))
             .map(|(deviation, time)| format!("{deviation:.2e} at {}", duration(*time)));
-        let ratios: Vec<Ratio> = signals
-            .iter()
-            .flat_map(|s| ratios(s, file.efficiency))
-            .collect();
-        let ratio = least_ratio(&ratios).map(|(r, mark)| format!("{r:.2}{mark}"));
+        let ratios = signals.iter().flat_map(|s| ratios(s));
+        let ratio = ratios.map(|(_, ratio)| ratio).min_by(f64::total_cmp);
+        let ratio = ratio.map(|ratio| format!("{ratio:.2}"));
         let figures = decades
             .iter()
             .map(|i| Some(format!("{:.2e}", medians[*i])))
@@ -325,37 +323,11 @@ fn decades(file: &SignalsFile) -> Vec<usize> {
     found
 }
 
-/// Robust over classical at one scale, and the standard deviation of its logarithm that chance has.
-struct Ratio {
-    tau_s: f64,
-    ratio: f64,
-    deviation: f64,
-}
-
-/// At the scales that are well known. Of Gaussian coefficients the classical variance is efficient, so that the variance of
-/// the robust one is 1/e times its, their covariance is its, and that of their ratio 1/e − 1 times its, 2/edof.
-fn ratios(s: &SignalCurves, efficiency: f64) -> impl Iterator<Item = Ratio> {
+/// Scale (s) and robust over classical variance, at the scales that are well known.
+fn ratios(s: &SignalCurves) -> impl Iterator<Item = (f64, f64)> {
     (0..s.tau_s.len())
         .filter(|i| s.edof[*i] >= LEAST && s.robust.status[*i] == "ok")
-        .map(move |i| Ratio {
-            tau_s: s.tau_s[i],
-            ratio: s.robust.wv[i] / s.classical.wv[i],
-            deviation: ((1.0 / efficiency - 1.0) * 2.0 / s.edof[i]).sqrt(),
-        })
-}
-
-/// How often a row without outliers is marked, at most.
-const FALSE_ALARMS: f64 = 0.025;
-
-/// The least of the ratios, which is below 1 by chance too, and a mark where one of them is lower than chance makes the
-/// least of so many: a normal variable is below −z with a probability of at most e^(−z²/2).
-fn least_ratio(ratios: &[Ratio]) -> Option<(f64, &'static str)> {
-    let z = (2.0 * (ratios.len() as f64 / FALSE_ALARMS).ln()).sqrt();
-    let is_marked = ratios.iter().any(|r| r.ratio.ln() < -z * r.deviation);
-    Some((
-        ratios.iter().map(|r| r.ratio).min_by(f64::total_cmp)?,
-        if is_marked { " *" } else { "" },
-    ))
+        .map(|i| (s.tau_s[i], s.robust.wv[i] / s.classical.wv[i]))
 }
 
 #[cfg(test)]
@@ -410,42 +382,7 @@ mod tests {
             ["0.01 s", "0.08 s", "1.28 s", "10.2 s", "81.9 s"]
         );
         assert_eq!(rows[2][1..3], ["gyro.z (rad/s)", "1.00e1"]);
-        assert_eq!(rows[2][6..9], ["1.10e-1", "1.10e-1 at 81.9 s", "0.90 *"]);
-    }
-
-    /// 200 recordings of white noise, 4096 samples each: at most 2.5 % have a mark, four deviations of a binomial share more,
-    /// 4 √(0.025·0.975/200) = 0.044, while the least ratio is below 1 in nearly all. With 2 % of the samples ten times as
-    /// large all have one.
-    #[test]
-    fn outliers_are_marked_and_chance_is_not() {
-        let tuning = Tuning::new(0.6).unwrap();
-        let row = |seed: u64, outliers: usize| {
-            let mut generator = Generator::seed_from_u64(seed);
-            let mut signal: Vec<f64> = (0..4096)
-                .map(|_| generator.sample(StandardNormal))
-                .collect();
-            signal
-                .iter_mut()
-                .step_by(50)
-                .take(outliers)
-                .for_each(|x| *x *= 10.0);
-            let (classical, robust) = nav_sim_signal::wavelet::both(&signal, 8, &tuning).unwrap();
-            let ratios: Vec<Ratio> = (1..=8_u32)
-                .map(|level| (level, interval::edof_eta3(4096, level)))
-                .filter(|(_, edof)| *edof >= LEAST)
-                .map(|(level, edof)| Ratio {
-                    tau_s: 1.0,
-                    ratio: robust[level as usize - 1].value / classical[level as usize - 1],
-                    deviation: ((1.0 / 0.6 - 1.0) * 2.0 / edof).sqrt(),
-                })
-                .collect();
-            least_ratio(&ratios).unwrap()
-        };
-        let clean: Vec<(f64, &str)> = (0..200).map(|seed| row(seed, 0)).collect();
-        let marked = clean.iter().filter(|(_, mark)| !mark.is_empty()).count();
-        assert!(marked as f64 / 200.0 <= 0.025 + 0.044, "{marked} of 200");
-        assert!(clean.iter().filter(|(ratio, _)| *ratio < 1.0).count() > 180);
-        assert!((0..20).all(|seed| row(seed, 82).1 == " *"));
+        assert_eq!(rows[2][6..9], ["1.10e-1", "1.10e-1 at 81.9 s", "0.90"]);
     }
 
     #[test]

@@ -24,7 +24,7 @@ use nav_sim_document::{
 };
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_signal::imu::{Channel, Recording};
+use nav_sim_signal::imu::Recording;
 use nav_sim_signal::noise::Model;
 use ranking::{Mean, Placed, Ranking};
 use serde::Serialize;
@@ -76,9 +76,9 @@ pub struct Choose {
     /// times the standard deviations) [default: none, and all three with awv]
     #[arg(long, value_name = "HOW", value_delimiter = ',')]
     inflate: Vec<Inflation>,
-    /// Runs on each recording (default: two for each window that fits side by side, 16 to 64)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
-    runs: Option<u64>,
+    /// Runs on each recording
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    runs: u64,
     /// What DR-AWV drops at each end of each scale: a number, or a share such as 30%
     #[arg(long, value_name = "A", default_value_t)]
     trim: Trim,
@@ -204,17 +204,10 @@ impl Command for Choose {
             );
         }
         let units = units(&measured);
-        let samples: Vec<usize> = units.iter().map(samples_in).collect();
         let laboratory = Laboratory::new(units, measured.settings)?;
         let drive = Drive::new(&trajectory, scenario, outages.clone(), rate_hz, seed)?;
-        let runs_on = |k: &usize| {
-            // two on each window that lies in the recording side by side; whole batches
-            let windows = drive.independent_windows(samples[*k]);
-            self.runs
-                .unwrap_or(((2.0 * windows / 8.0).ceil() as u64 * 8).clamp(16, 64))
-        };
         let judges = laboratory.judges()?;
-        context.begin("runs", judges.iter().map(runs_on).sum());
+        context.begin("runs", judges.len() as u64 * self.runs);
         let mut folds = Vec::new();
         for k in &judges {
             let file = &files[*k];
@@ -225,7 +218,7 @@ impl Command for Choose {
                 .map(|recording| without_warm_up(recording, options.skip_warm_up).0)
                 .collect();
             let advance = |n| context.advance(n);
-            let (recording, windows) = (file.file.clone(), runs_on(k));
+            let (recording, windows) = (file.file.clone(), self.runs);
             let scores = drive
                 .leave_out(&laboratory, *k, read, &candidates, windows, &advance)
                 .map_err(|e| e.within(&recording))?;
@@ -350,18 +343,6 @@ fn units(measured: &Measured) -> Vec<Unit> {
         }
     };
     measured.report.files.iter().map(unit).collect()
-}
-
-/// Samples of a recording that were measured: a warm-up that is left out is not among them.
-fn samples_in(unit: &Unit) -> usize {
-    let of_channel = |channel: Channel| {
-        unit.replicates
-            .iter()
-            .filter(|(of_channel, _)| *of_channel == channel)
-            .map(|(_, r)| r.samples)
-            .sum::<usize>()
-    };
-    Channel::ALL.into_iter().map(of_channel).max().unwrap_or(0)
 }
 
 // The ranking of candidates as a document.

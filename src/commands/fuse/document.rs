@@ -45,8 +45,6 @@ impl FuseAnswer {
         document.section("Fixes");
         document.chart(&innovations(solution, &outages), FIXES);
         document.checked(CHECKED);
-        let columns = [("input", "role"), ("file", "path")];
-        document.table(Table::of(&self.inputs, "/*", &columns));
         if let Some(quality) = &self.reduction {
             match reduction_doubt(quality) {
                 Some(doubt) => document.note(Importance::Warning, doubt),

@@ -3,8 +3,7 @@
 mod document;
 
 use crate::app::{
-    Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Refuse, Result, inputs,
-    refused,
+    Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, inputs, refused,
 };
 use crate::commands::run::reduction_of;
 use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
@@ -413,9 +412,6 @@ pub struct FuseAnswer {
     /// Quality of the model reduced to the filter's states, where it loses something.
     #[serde(skip)]
     pub reduction: Option<ReductionQuality>,
-    /// Files by their roles.
-    #[serde(skip)]
-    inputs: Vec<Input>,
     /// Settings, for the manifest.
     #[serde(skip)]
     configuration: Value,
@@ -493,7 +489,7 @@ impl Drive {
                 .map(|start| start.sigma.clone())
                 .unwrap_or_default(),
         );
-        inputs::expect_turn_on(&mut expected, &model, &request.model, context);
+        inputs::expect_turn_on(&mut expected, model.turn_on, &request.model, context);
         expected.validate().refuse()?;
         let options = trajectory_file::Options::default();
         let reference = request
@@ -691,7 +687,6 @@ impl Drive {
             solution: weighed.solution,
             summary,
             reduction,
-            inputs: context.inputs().to_vec(),
             configuration: self.configuration,
         })
     }
@@ -1245,19 +1240,15 @@ fn directory(answer: &FuseAnswer) -> Vec<OutputFile<'static>> {
     let FuseAnswer {
         solution, summary, ..
     } = answer;
-    let title = answer
-        .inputs
-        .first()
-        .map_or("solution", |imu| imu.path.as_str());
     let smoothed = solution.smoothed.as_deref();
     let contents = [
         Some(solution_csv(&solution.rows)),
         Some(innovations_csv(solution)),
         Some(errors_csv(&solution.rows)),
-        Some(kml(&solution.rows, "solution", title)),
+        Some(kml(&solution.rows, "solution")),
         smoothed.map(solution_csv),
         smoothed.map(errors_csv),
-        smoothed.map(|rows| kml(rows, "smoothed solution", title)),
+        smoothed.map(|rows| kml(rows, "smoothed solution")),
         Some(json(summary)),
     ];
     FILES
@@ -1364,7 +1355,7 @@ fn errors_csv(rows: &[Row]) -> String {
 }
 
 /// The way as a line on the map, a point a second at most.
-fn kml(rows: &[Row], name: &str, title: &str) -> String {
+fn kml(rows: &[Row], name: &str) -> String {
     let mut line = String::new();
     let mut last = f64::NEG_INFINITY;
     for (k, row) in rows.iter().enumerate() {
@@ -1378,13 +1369,11 @@ fn kml(rows: &[Row], name: &str, title: &str) -> String {
             last = row.t_s;
         }
     }
-    let title = title.replace('&', "&amp;").replace('<', "&lt;");
     let points = line.trim_end();
     format!(
         r#"<?xml version="1.0" encoding="UTF-8"?>
 <kml xmlns="http://www.opengis.net/kml/2.2">
 <Document>
-<name>{title}</name>
 <Placemark>
 <name>{name}</name>
 <Style><LineStyle><color>ff0050ff</color><width>3</width></LineStyle></Style>

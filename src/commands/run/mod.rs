@@ -246,13 +246,13 @@ impl Run {
         };
         let trajectory = inputs::trajectory(&self.trajectory, context)?;
         let (model, file) = read_model(&self.model)?;
-        inputs::expect_turn_on(&mut scenario.initial, &file, &self.model, context);
+        inputs::expect_turn_on(&mut scenario.initial, file.turn_on, &self.model, context);
         let truth = self.truth.as_deref().map(read_model).transpose()?;
         // recordings are their own truth: what they had of a constant bias is taken from them
         if self.recordings.is_empty() {
             inputs::make_turn_on(
                 &mut scenario.imu,
-                truth.as_ref().map_or(&file, |(_, file)| file),
+                truth.as_ref().map_or(&file, |(_, file)| file).turn_on,
                 self.truth.as_ref().unwrap_or(&self.model),
                 context,
             );
