@@ -112,11 +112,6 @@ pub trait Answer: Serialize {
         None
     }
 
-    /// All of it as a table for `--format csv`.
-    fn csv(&self) -> Option<String> {
-        None
-    }
-
     /// The files to be written; of [`Out::File`] their names are endings.
     fn files(&self) -> Vec<OutputFile<'_>> {
         Vec::new()
@@ -431,12 +426,7 @@ pub fn answered<C: Command>(
             each_file(&answer, page, &mut manifest, &context, keep)?;
         }
         _ => {
-            let table = answer.csv().map(|text| OutputFile::whole(".csv", text));
-            answer
-                .files()
-                .into_iter()
-                .chain(table)
-                .try_for_each(&mut keep)?;
+            answer.files().into_iter().try_for_each(&mut keep)?;
         }
     }
     Ok(Answered {

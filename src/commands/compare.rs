@@ -472,10 +472,6 @@ impl Answer for Comparison {
         })
     }
 
-    fn csv(&self) -> Option<String> {
-        Some(self.rows_csv())
-    }
-
     fn files(&self) -> Vec<OutputFile<'_>> {
         vec![
             OutputFile::whole("", json(self)),

@@ -433,23 +433,6 @@ impl Answer for Designs {
                 ],
             ));
         }
-        if designs.len() > 1 {
-            document.section("All parameters");
-            let plan = |(i, d): (usize, &DesignOutcome)| {
-                (
-                    format!("{} × {} h (± %)", d.recordings, d.hours),
-                    format!("../../../{i}/parameters/@/half_width_pct|not determined"),
-                )
-            };
-            let plans: Vec<_> = designs.iter().enumerate().map(plan).collect();
-            let mut columns = vec![("parameter", "{signals} {parameter}"), ("value", "value")];
-            columns.extend(
-                plans
-                    .iter()
-                    .map(|(title, key)| (title.as_str(), key.as_str())),
-            );
-            document.table(Table::of(self, "/designs/0/parameters/*", &columns));
-        }
         document.checked(
             "against 150 calibrations of synthetic recordings, within four deviations of the scatter (27 %).",
         );

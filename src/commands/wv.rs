@@ -5,10 +5,9 @@ use crate::app::{Answer, Command, Context, Out, OutputFile, Result};
 use crate::commands::calibrate::{visit, without_warm_up};
 use crate::io::recordings::ReadOptions;
 use crate::parse;
-use crate::report::csv::{csv, flat};
 use crate::report::curves::{
-    Band, CONFIDENCE, SignalCurves, SignalsFile, band, curve, recording_names, scale_axis,
-    sensor_name, variance_axis,
+    CONFIDENCE, SignalCurves, SignalsFile, band, curve, recording_names, scale_axis, sensor_name,
+    variance_axis,
 };
 use crate::report::in_order;
 use nav_sim_calibration::{Replicate, duration, median, replicates};
@@ -16,7 +15,6 @@ use nav_sim_document::{Cell, Chart, Colour, Document, Panel, Series, Table, Tone
 use nav_sim_signal::imu::{Channel, Recording};
 use nav_sim_signal::wavelet::{WaveletError, haar, interval};
 use rayon::prelude::*;
-use serde_json::json;
 use std::path::PathBuf;
 
 /// Compute wavelet variances (classical, robust) and Allan deviations of static recordings
@@ -131,10 +129,6 @@ const LEAST: f64 = 100.0;
 const OUTLIERS: f64 = 1.5;
 
 impl Answer for SignalsFile {
-    fn csv(&self) -> Option<String> {
-        Some(signals_csv(self))
-    }
-
     fn files(&self) -> Vec<OutputFile<'_>> {
         vec![OutputFile::whole("", crate::report::json(self))]
     }
@@ -214,15 +208,15 @@ fn recordings(file: &SignalsFile) -> Vec<&str> {
     in_order(file.signals.iter().map(|s| s.file.as_str()))
 }
 
-/// One table for all recordings: a row for each sensor and axis, its Allan deviation at one averaging time a decade (the
+/// One table for all recordings: a row for each sensor and axis, its Allan deviation at every third averaging time (the
 /// median over the recordings), the lowest of all averaging times, and how far the robust wavelet variance is below the
 /// classical one.
 fn digest(file: &SignalsFile) -> Table {
-    let (times, decades) = (times(file), decades(file));
+    let times = times(file);
+    let shown = || (0..times.len()).step_by(3);
     let mut table = Table::new(["axis"]).and(
-        decades
-            .iter()
-            .map(|i| duration(times[*i]))
+        shown()
+            .map(|i| duration(times[i]))
             .chain(["lowest", "ratio"].map(str::to_owned)),
     );
     for channel in channels(file) {
@@ -248,9 +242,8 @@ fn digest(file: &SignalsFile) -> Table {
         let ratios = signals.iter().flat_map(|s| ratios(s));
         let ratio = ratios.map(|(_, ratio)| ratio).min_by(f64::total_cmp);
         let ratio = ratio.map(|ratio| format!("{ratio:.2}"));
-        let figures = decades
-            .iter()
-            .map(|i| Some(format!("{:.2e}", medians[*i])))
+        let figures = shown()
+            .map(|i| Some(format!("{:.2e}", medians[i])))
             .chain([lowest, ratio])
             .map(|text| Cell::figures(text.unwrap_or_default()));
         table.row(
@@ -259,30 +252,6 @@ fn digest(file: &SignalsFile) -> Table {
         );
     }
     table
-}
-
-/// All scales of all signals as CSV.
-fn signals_csv(file: &SignalsFile) -> String {
-    let of_signal = |s: &SignalCurves| {
-        let row = |i: usize| {
-            let band =
-                |b: &Band| json!({ "wv": b.wv[i], "ci_low": b.ci_low[i], "ci_high": b.ci_high[i] });
-            flat(&json!({
-                "file": s.file,
-                "sensor": s.sensor,
-                "axis": s.axis,
-                "tau_s": s.tau_s[i],
-                "edof": s.edof[i],
-                "classical": band(&s.classical),
-                "robust": band(&s.robust),
-                "robust_status": s.robust.status[i],
-                "allan_tau_s": 0.5 * s.tau_s[i],
-                "allan_deviation": s.allan_deviation(i),
-            }))
-        };
-        (0..s.tau_s.len()).map(row).collect::<Vec<_>>()
-    };
-    csv(&file.signals.iter().flat_map(of_signal).collect::<Vec<_>>())
 }
 
 fn signals_of(file: &SignalsFile, channel: Channel) -> Vec<&SignalCurves> {
@@ -308,21 +277,6 @@ fn times(file: &SignalsFile) -> Vec<f64> {
         })
 }
 
-/// The scales whose averaging times are nearest to powers of ten (s), each once.
-fn decades(file: &SignalsFile) -> Vec<usize> {
-    let logs: Vec<f64> = times(file).iter().map(|time| time.log10()).collect();
-    let (first, last) = (logs[0].floor() as i32, logs[logs.len() - 1].ceil() as i32);
-    let nearest = |decade: i32| {
-        let distance = |i: &usize| (logs[*i] - f64::from(decade)).abs();
-        (0..logs.len())
-            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-            .unwrap_or(0)
-    };
-    let mut found: Vec<usize> = (first..=last).map(nearest).collect();
-    found.dedup();
-    found
-}
-
 /// Scale (s) and robust over classical variance, at the scales that are well known.
 fn ratios(s: &SignalCurves) -> impl Iterator<Item = (f64, f64)> {
     (0..s.tau_s.len())
@@ -333,11 +287,8 @@ fn ratios(s: &SignalCurves) -> impl Iterator<Item = (f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::curves::Band;
     use nav_sim_signal::imu::{Axis, Sensor};
-    use nav_sim_signal::rng::Generator;
-    use nav_sim_signal::wavelet::{Tuning, interval};
-    use rand::{RngExt, SeedableRng};
-    use rand_distr::StandardNormal;
 
     fn file(count: usize) -> SignalsFile {
         // 100 Hz, 14 scales: white noise of density 1, wv = 1/(2·tau/2)/… so that the Allan deviation at t is 1/√t.
@@ -370,7 +321,7 @@ mod tests {
         }
     }
 
-    /// 1/√t at the octaves nearest to the decades: 0.01, 0.08, 1.28 and 10.24 s (81.92 s is the last).
+    /// 1/√t at every third octave of 0.01 s.
     #[test]
     fn a_digest_has_a_row_a_channel() {
         let text = digest(&file(3)).markdown();
@@ -379,16 +330,9 @@ mod tests {
         assert_eq!(rows.len(), 3);
         assert_eq!(
             rows[0][2..7],
-            ["0.01 s", "0.08 s", "1.28 s", "10.2 s", "81.9 s"]
+            ["0.01 s", "0.08 s", "0.64 s", "5.12 s", "41.0 s"]
         );
         assert_eq!(rows[2][1..3], ["gyro.z (rad/s)", "1.00e1"]);
-        assert_eq!(rows[2][6..9], ["1.10e-1", "1.10e-1 at 81.9 s", "0.90"]);
-    }
-
-    #[test]
-    fn a_csv_has_a_row_a_scale() {
-        let file = file(2);
-        assert_eq!(channels(&file).count(), 1);
-        assert_eq!(signals_csv(&file).lines().count(), 1 + 2 * 14);
+        assert_eq!(rows[2][6..9], ["1.56e-1", "1.10e-1 at 81.9 s", "0.90"]);
     }
 }

@@ -3,10 +3,10 @@
 use super::{Cause, FuseAnswer};
 use crate::report::trajectory::track_map;
 use crate::report::{reduction_doubt, reduction_line, tone};
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use nav_sim_document::{
-    Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke, Table, readable,
-    seconds, window,
+    Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, readable, seconds,
+    window,
 };
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::frames::NavState;
@@ -324,43 +324,10 @@ fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let place = |row: &Row| {
         let NavState { lat, lon, h, .. } = row.state;
         let moved = ned_difference(&solution.rows[0].state, lat, lon, h);
-        DVec2::new(moved.y, moved.x)
+        [moved.y, moved.x]
     };
-    let error = |row: &Row| {
-        row.error
-            .map(|e| DVec2::new(e.values[1], e.values[0]))
-            .unwrap_or(DVec2::NAN)
-    };
-    let track = |rows: &[Row], point: &dyn Fn(&Row) -> DVec2| -> Vec<(f64, [f64; 2])> {
-        rows.iter()
-            .map(|row| (row.t_s, point(row).into()))
-            .collect()
-    };
-    let mut chart = track_map("solution", &track(&solution.rows, &place), "Track", outages);
-    let line = |track: Vec<(f64, [f64; 2])>| track.into_iter().map(|(_, p)| p.into()).collect();
-    let mut series = Vec::new();
-    // the lines lie on one another but for metres: wide beneath narrow beneath dashed, all are seen
-    if solution.rows.iter().any(|row| row.error.is_some()) {
-        series.push(Series::new(
-            "reference",
-            Colour::Ink,
-            Mark::Line(
-                line(track(&solution.rows, &|row| place(row) - error(row))),
-                Stroke::Bold,
-            ),
-        ));
-    }
-    let drawn = &mut chart.panels[0].series;
-    series.append(drawn);
-    series.extend(
-        solution
-            .smoothed
-            .iter()
-            .map(|rows| line(track(rows, &place)))
-            .map(|line| Series::dashed("smoothed", SMOOTHED, line)),
-    );
-    *drawn = series;
-    chart
+    let track = solution.rows.iter().map(|row| (row.t_s, place(row)));
+    track_map("solution", &track.collect::<Vec<_>>(), "Track", outages)
 }
 
 /// Rows of the filter, and smoothed ones: names of what is stated and of the error, colours. A panel has room for three

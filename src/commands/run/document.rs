@@ -156,17 +156,6 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
     ];
     page.table(Table::of(answer, "/outages/*", &columns).without_unknown());
     let columns = [
-        ("outage", "{start_s}–{end_s} s"),
-        ("re-convergence, median (s)", "reconvergence_s/p50"),
-        ("p50 (m) from", "horizontal_error_end_m/p50_ci95/0"),
-        ("to", "horizontal_error_end_m/p50_ci95/1"),
-        ("RMSE pos_e_m from", "rmse_end_ci95/pos_e_m/0"),
-        ("to", "rmse_end_ci95/pos_e_m/1"),
-        ("ASEE pos_e_m from", "asee_end_ci95/pos_e_m/0"),
-        ("to", "asee_end_ci95/pos_e_m/1"),
-    ];
-    page.table(Table::of(answer, "/outages/*", &columns).without_unknown());
-    let columns = [
         ("state", "@"),
         ("RMSE, end", "."),
         ("ASEE, end", "../../asee_end/@"),
