@@ -1,7 +1,7 @@
 //! A command is a struct of options with inputs and an answer. Words of a command line and requests by name (Python,
 //! studies) become it by the same parser, so that both are refused in the same words.
 
-use super::{Context, Failure, Front, Input, Refuse, Result};
+use super::{Context, Failure, Front, Input, Refuse, Result, refused};
 use crate::io::atomic::{AtomicDir, Claim, Found, claim_directory, claim_file};
 use crate::io::{atomic, input, suggest};
 use crate::parse;
@@ -10,7 +10,7 @@ use clap::builder::ValueParser;
 use clap::{Arg, ArgAction, ArgMatches, FromArgMatches};
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use nav_sim_document::{Document, Form, encode};
+use nav_sim_document::{Document, FORMS, encode};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::any::TypeId;
@@ -545,10 +545,13 @@ impl<C: Command> Asked<C> {
             _ => {}
         }
         for path in &self.plots {
-            if !is_page(path) {
-                form(path)?;
+            let (kind, form) = (path.to_string_lossy().to_lowercase(), ending(path));
+            if form != PAGE_ENDING && !FORMS.contains(&form.as_str()) {
+                return refused(
+                    format!("{}: no picture is written as .{form}", path.display()),
+                    format!("name a file that ends in .html or .{}", FORMS.join(", .")),
+                );
             }
-            let kind = path.to_string_lossy().to_lowercase();
             claims.own.push(claim_file(path, &kind, inputs())?);
         }
         Ok(claims)
@@ -597,7 +600,12 @@ impl<C: Command> Asked<C> {
             _ => {}
         }
         for path in &self.plots {
-            write_plot(path, document)?;
+            let form = ending(path);
+            let bytes = match form == PAGE_ENDING {
+                true => document.html().into(),
+                false => encode(document.svg(), &form).map_err(Failure::could_not)?,
+            };
+            atomic::write(path, bytes)?;
             written.push(path.clone());
         }
         Ok(written)
@@ -636,8 +644,7 @@ fn each_file(
 
 /// The bytes of a file: packed where its name ends in `.gz`.
 fn packed(path: &Path, text: String) -> std::io::Result<Vec<u8>> {
-    let is_packed = |ending: &OsStr| ending.eq_ignore_ascii_case("gz");
-    if !path.extension().is_some_and(is_packed) {
+    if ending(path) != "gz" {
         return Ok(text.into_bytes());
     }
     let mut packed = GzEncoder::new(Vec::new(), Compression::default());
@@ -645,36 +652,15 @@ fn packed(path: &Path, text: String) -> std::io::Result<Vec<u8>> {
     packed.finish()
 }
 
-fn is_page(path: &Path) -> bool {
+/// What the name of a page ends in.
+const PAGE_ENDING: &str = "html";
+
+/// The ending of a file's name.
+fn ending(path: &Path) -> String {
     path.extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("html"))
-}
-
-/// The form of a picture, by its name.
-fn form(path: &Path) -> Result<Form> {
-    let (forms, hint) = match cfg!(feature = "pictures") {
-        true => ("SVG or PNG", "name a file that ends in .svg or .png"),
-        false => (
-            "SVG",
-            "name a file that ends in .svg; PNG needs a build with --features pictures",
-        ),
-    };
-    let refused = || {
-        Failure::input(format!(
-            "{}: a picture is written as {forms}",
-            path.display()
-        ))
-    };
-    Form::of(path).ok_or_else(|| refused().hint(hint))
-}
-
-/// Writes a page, or figures in the form that the name says.
-fn write_plot(path: &Path, document: &Document) -> Result<()> {
-    if is_page(path) {
-        return atomic::write(path, document.html());
-    }
-    let picture = encode(document.svg(), form(path)?).map_err(Failure::could_not)?;
-    atomic::write(path, picture)
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase()
 }
 
 // `manifest.json`: where a result directory came from, and whether another command makes the same.

@@ -192,38 +192,26 @@ impl FilterArgs {
 
 /// A value of `--outage`: a window, or that there is none.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum OutageFlag {
-    /// Not even the default ones.
-    None,
-    /// A window without fixes.
-    Window(Outage),
-}
+pub(crate) struct OutageFlag(Option<Outage>);
 
 impl FromStr for OutageFlag {
     type Err = Refused;
 
     fn from_str(text: &str) -> std::result::Result<Self, Refused> {
-        if text == "none" {
-            Ok(Self::None)
-        } else {
-            text.parse().map(Self::Window)
-        }
+        let window = (text != "none").then(|| text.parse());
+        window.transpose().map(Self)
     }
 }
 
 /// The windows among the values of `--outage`, of which "none" stands alone.
 pub(crate) fn windows_of(outages: &[OutageFlag]) -> Result<Vec<Outage>> {
-    if outages.len() > 1 && outages.contains(&OutageFlag::None) {
+    if outages.len() > 1 && outages.contains(&OutageFlag(None)) {
         return refused(
             "--outage none stands beside other outages",
             "give the windows, or none alone",
         );
     }
-    let window = |flag: &OutageFlag| match flag {
-        OutageFlag::None => None,
-        OutageFlag::Window(outage) => Some(*outage),
-    };
-    Ok(outages.iter().filter_map(window).collect())
+    Ok(outages.iter().filter_map(|flag| flag.0).collect())
 }
 
 /// Settings in a TOML file and by key.

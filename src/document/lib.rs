@@ -32,5 +32,5 @@ pub use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Scale, Series, Size,
 pub use document::{Block, Document, Importance, NOTES, Note, Tone};
 pub use draw::{escape, turns};
 pub use number::{percent, readable, seconds, short_names, shortest, six_digits, window};
-pub use picture::{Form, encode, svg};
+pub use picture::{FORMS, encode, svg};
 pub use table::{Cell, Table};

@@ -416,8 +416,6 @@ impl ChoiceMade {
         let columns = [
             ("candidate", "candidate"),
             ("RMSE (m)", "rmse_m"),
-            ("to the best (%)", "difference/rmse_pct/value"),
-            ("95 %", "difference/rmse_pct/ci95"),
             ("believed (m)", "believed_m"),
             ("coverage (0.95)", "coverage"),
         ];

@@ -28,8 +28,6 @@ pub struct Difference {
     pub log_score: Mean,
     /// The same interval, true of all candidates together at 95 % (Bonferroni).
     pub joint95: (f64, f64),
-    /// Its horizontal RMSE above the winner's (%), mean of the logarithms of the ratios.
-    pub rmse_pct: Mean,
 }
 
 /// A candidate on one recording.
@@ -185,29 +183,8 @@ fn place(c: usize, candidate: &Candidate, winner: usize, rivals: usize, folds: &
         believed_m: root_mean_square(per_recording(&|s| s.all.believed_m)),
         nees: positive(interval(&per_recording(&|s| s.all.nees), 0.05)),
         coverage: mean(scores().map(|s| s.coverage)),
-        difference: Difference {
-            log_score,
-            joint95,
-            rmse_pct: rmse_ratio_pct(c, winner, folds),
-        },
+        difference: Difference { log_score, joint95 },
         folds: folds.iter().map(fold).collect(),
-    }
-}
-
-/// The RMSE over all recordings against that of the winner (%). The interval is that of the mean of what each recording adds to the
-/// logarithm of the ratio (its derivative with respect to the recording's weight).
-fn rmse_ratio_pct(c: usize, winner: usize, folds: &[Fold]) -> Mean {
-    let square = |candidate: usize, fold: &Fold| fold.scores[candidate].all.rmse_m.powi(2);
-    let mean = |candidate: usize| {
-        folds.iter().map(|f| square(candidate, f)).sum::<f64>() / folds.len() as f64
-    };
-    let (own, best) = (mean(c), mean(winner));
-    let added = |f: &Fold| 0.5 * (square(c, f) / own - square(winner, f) / best);
-    let spread = interval(&folds.iter().map(added).collect::<Vec<_>>(), 0.05);
-    let percent = |more: f64| 100.0 * (0.5 * (own / best).ln() + more).exp_m1();
-    Mean {
-        value: percent(0.0),
-        ci95: (percent(spread.ci95.0), percent(spread.ci95.1)),
     }
 }
 
@@ -261,38 +238,8 @@ mod ranking_tests {
         }
     }
 
-    /// What stands beside one another agrees: the ratio is that of the RMSE shown, though the mean of the recordings' own
-    /// ratios is on the other side (RMSE 10 and 1 against 9 and 2: √(101/85) = 1.09, the geometric mean 0.745). Of two recordings the
-    /// interval by hand: each adds ½(100/50.5 − 81/42.5) = ±0.0372 to the logarithm, so that a half width is
-    /// t √(2 · 0.0372² (1/2 + 1)) with t = 12.706 of one degree of freedom. What is positive has positive intervals.
     #[test]
-    fn the_ratio_of_the_rmse_is_that_of_the_rmse_shown() {
-        let with = |rmse_m: [f64; 2]| {
-            let scores = rmse_m
-                .map(|rmse_m| {
-                    let mut score = fold(&[0.0]).scores[0].clone();
-                    score.all.rmse_m = rmse_m;
-                    score
-                })
-                .to_vec();
-            Fold {
-                scores,
-                ..fold(&[])
-            }
-        };
-        let folds = [with([10.0, 9.0]), with([1.0, 2.0])];
-        let Mean { value, ci95 } = rmse_ratio_pct(0, 1, &folds);
-        assert!(
-            (value - 100.0 * ((101.0_f64 / 85.0).sqrt() - 1.0)).abs() < 1e-9,
-            "{value}"
-        );
-        let added = 0.5 * (100.0 / 50.5 - 81.0 / 42.5);
-        let half = 12.706_204_7 * (2.0 * f64::powi(added, 2) * 1.5).sqrt();
-        let high = 100.0 * ((101.0_f64 / 85.0).sqrt() * half.exp() - 1.0);
-        assert!(
-            (ci95.1 / high - 1.0).abs() < 1e-6 && ci95.0 > -100.0,
-            "{ci95:?} {high}"
-        );
+    fn the_interval_of_what_is_positive_is_positive() {
         let nees = positive(Mean {
             value: 30.0,
             ci95: (-20.0, 80.0),
