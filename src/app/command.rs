@@ -548,8 +548,8 @@ impl<C: Command> Asked<C> {
             let (kind, form) = (path.to_string_lossy().to_lowercase(), ending(path));
             if form != PAGE_ENDING && !FORMS.contains(&form.as_str()) {
                 return refused(
-                    format!("{}: no picture is written as .{form}", path.display()),
-                    format!("name a file that ends in .html or .{}", FORMS.join(", .")),
+                    format!("{}: not a page or picture", path.display()),
+                    "name a file that ends in .html or .svg (.png with the feature `pictures`)",
                 );
             }
             claims.own.push(claim_file(path, &kind, inputs())?);

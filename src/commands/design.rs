@@ -433,9 +433,6 @@ impl Answer for Designs {
                 ],
             ));
         }
-        document.checked(
-            "against 150 calibrations of synthetic recordings, within four deviations of the scatter (27 %).",
-        );
         document
     }
 }

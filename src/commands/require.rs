@@ -337,9 +337,6 @@ const CURVE_S: [u32; 7] = [1, 3, 10, 30, 60, 120, 300];
 const LONGEST_S: f64 = 600.0;
 /// What confirms a figure of covariance analysis.
 const CONFIRM: &str = "confirm with nav-sim run --method both";
-/// Last line of each page.
-const CHECKED: &str = "covariance analysis against sampled runs: docs/validation.md.";
-
 /// Warns of an outage in which errors are beyond linear theory.
 fn note_beyond(beyond: Option<Outage>, document: &mut Document) {
     if let Some(Outage { start_s, end_s }) = beyond {
@@ -440,9 +437,6 @@ pub struct NeededImu {
     worst: Worst,
     /// The outage of the answer, where it is beyond linear theory.
     beyond_linear: Option<Outage>,
-    /// With equal shares.
-    #[serde(skip)]
-    imu: ImuParameters,
     #[serde(skip)]
     file: ModelFile,
 }
@@ -488,13 +482,6 @@ impl NeededImu {
         ];
         let mut document = Document::new("The IMU that a limit needs", Tone::Good, lines);
         note_beyond(self.beyond_linear, &mut document);
-        let (from_s, to_s) = self.imu.floor_s();
-        let floor = format!(
-            "bias instability: floor of the Allan deviation, here {} to {} s",
-            readable(from_s),
-            readable(to_s)
-        );
-        document.note(Importance::Detail, floor);
         document.section("Figures, at most");
         document.text("If alone: without any other error of the IMU. Others 10 × better: every other figure ten times smaller.");
         let columns = [
@@ -504,7 +491,6 @@ impl NeededImu {
             ("others 10 × better", "others_10_times_better"),
         ];
         document.table(Table::of(self, "/figures/*", &columns));
-        document.checked(CHECKED);
         document
     }
 }
@@ -643,7 +629,6 @@ impl Requirements {
             beyond_linear: self.beyond_linear(scenario, &model, outages[worst.place])?,
             question: self.question(outages),
             worst,
-            imu,
             file: ModelFile::new(model),
         };
         let mut provenance = known(json!({
@@ -1069,7 +1054,6 @@ impl GivenImu {
             "/curves/*",
             &[("limit on", "quantity"), AFTER],
         ));
-        document.checked(CHECKED);
         document
     }
 }
@@ -1165,7 +1149,6 @@ impl Ranking {
             &[("unit", "unit"), ("not stated", "missing")],
         ));
         document.text(RULE);
-        document.checked(CHECKED);
         document
     }
 }

@@ -117,11 +117,6 @@ impl Command for Synthesize {
                 "see the head of calib_data/consumer_mems.toml, or leave --spread out",
             );
         }
-        if file.turn_on.is_some() {
-            context.remark(format!(
-                "{shown}: its turn-on biases are not drawn: recordings are of noise about their mean"
-            ));
-        }
         let contamination = self
             .contaminate
             .as_deref()

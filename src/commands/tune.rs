@@ -9,7 +9,7 @@ use crate::io::model_file::{self, ModelFile, PROGRAM, known};
 use crate::parse;
 use crate::report::in_order;
 use nav_sim_calibration::derived_interval;
-use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds, short_names};
+use nav_sim_document::{Document, Table, Tone, readable, seconds, short_names};
 use nav_sim_navigation::ekf::{BeliefError, FilterStates};
 use nav_sim_navigation::metrics::{PerState, VerdictKind};
 use nav_sim_navigation::scenario::Scenario;
@@ -233,8 +233,6 @@ impl Tune {
                 Failure::input("no built-in drive for this receiver")
                     .hint("give a trajectory with --trajectory")
             })?;
-            let text = "along a built-in drive with outages as long; --trajectory takes another";
-            context.remark(text.to_owned());
             return Ok((track, outages));
         };
         let trajectory = inputs::trajectory(path, context)?;
@@ -665,25 +663,6 @@ impl Answer for TuneAnswer {
             None => Tone::Doubtful,
         };
         let mut document = Document::new("Factors on a noise model", tone, self.verdict());
-        if found == VerdictKind::Underconfident && self.aim == Aim::Worst {
-            let why = "no error exceeds its sigma in any truth; --for mean aims at the right NEES in the mean";
-            document.note(Importance::Remark, why);
-        }
-        if self
-            .of_run
-            .as_ref()
-            .is_some_and(|of_run| kind(of_run) == VerdictKind::Overconfident)
-        {
-            let states = self.filter_of_run;
-            document.note(
-                Importance::Remark,
-                format!("--filter {states} tunes the default of run"),
-            );
-        }
-        if self.is_drawn {
-            let counted = "errors count up to the upper end of the 95 % interval that run states";
-            document.note(Importance::Remark, counted);
-        }
         let truths: Vec<&str> = self.truths.iter().map(String::as_str).collect();
         document.text(&format!("truths: {}", short_names(&truths).join(", ")));
         document.section("Filters");
@@ -705,7 +684,6 @@ impl Answer for TuneAnswer {
             ("on the standard deviation", "on_sigma"),
         ];
         document.table(Table::of(self, "/factors/*", &columns));
-        document.checked("covariance analysis against 2000 Monte-Carlo runs: docs/validation.md.");
         document
     }
 

@@ -165,9 +165,6 @@ impl Answer for SignalsFile {
         document.table(digest(self));
         let charts: Vec<Chart> = channels(self).map(|channel| chart(self, channel)).collect();
         document.charts(&charts, "Robust wavelet variance; dashed: classical, which outliers raise. τ is twice the averaging time.");
-        document.checked(
-            "wavelet variances to 1e-12, ends of intervals to 1e-9 of an independent implementation",
-        );
         document
     }
 }

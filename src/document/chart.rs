@@ -147,8 +147,6 @@ pub enum Mark {
     Zone(f64, f64),
     /// A dot with its name beside it, at (x, y); not in the legend.
     Place(f64, f64),
-    /// The same, with lines to both axes: a value that is read off a curve, such as N at 1 s of an Allan deviation.
-    Reading(f64, f64),
 }
 
 /// Something to see and its name in the legend. Series of one name, in all panels, are one entry there.

@@ -51,8 +51,6 @@ pub struct Note {
 pub enum Block {
     /// The beginning of a section.
     Section(String),
-    /// A heading within a section.
-    Heading(String),
     /// A paragraph.
     Text(String),
     /// A table; a terminal shows the first one.
@@ -61,8 +59,6 @@ pub enum Block {
     Charts(Vec<Chart>, String),
     /// Files beside the document: relative path and what is there.
     Links(Vec<(String, String)>),
-    /// A text as it stands in a file.
-    Code(String),
     /// What few want to see, under a title.
     Folded(String, Vec<Block>),
 }
@@ -102,11 +98,6 @@ impl Document {
         self.blocks.push(Block::Section(title.to_owned()));
     }
 
-    /// Begins a part of a section.
-    pub fn heading(&mut self, title: &str) {
-        self.blocks.push(Block::Heading(title.to_owned()));
-    }
-
     /// Adds a paragraph.
     pub fn text(&mut self, words: &str) {
         self.blocks.push(Block::Text(words.to_owned()));
@@ -133,22 +124,12 @@ impl Document {
         self.blocks.push(Block::Links(links.to_vec()));
     }
 
-    /// Adds a text as it stands in a file.
-    pub fn code(&mut self, text: &str) {
-        self.blocks.push(Block::Code(text.to_owned()));
-    }
-
     /// Adds what `inside` adds, folded under a title.
     pub fn folded(&mut self, title: &str, inside: impl FnOnce(&mut Self)) {
         let before = std::mem::take(&mut self.blocks);
         inside(self);
         let folded = std::mem::replace(&mut self.blocks, before);
         self.blocks.push(Block::Folded(title.to_owned(), folded));
-    }
-
-    /// Adds what the figures were checked against, and to which tolerance.
-    pub fn checked(&mut self, words: &str) {
-        self.text(&format!("Checked: {words}"));
     }
 
     /// Adds a note behind those of its importance, once.
@@ -246,9 +227,8 @@ fn blocks(all: &[Block], width: usize, text: &mut String) {
     for block in all {
         match block {
             Block::Section(title) => *text += &format!("\n{}\n", title.to_uppercase()),
-            Block::Heading(words) | Block::Text(words) => *text += &format!("\n{words}\n"),
+            Block::Text(words) => *text += &format!("\n{words}\n"),
             Block::Table(table) => *text += &format!("\n{}\n", table.columns(width)),
-            Block::Code(code) => *text += &format!("\n{}\n", code.trim_end()),
             Block::Folded(title, inside) => {
                 *text += &format!("\n{title}\n");
                 blocks(inside, width, text);
@@ -363,7 +343,6 @@ fn notes(notes: &[Note]) -> String {
 fn block(block: &Block, html: &mut String) {
     *html += &match block {
         Block::Section(title) => format!("<h2>{}</h2>\n", escape(title)),
-        Block::Heading(title) => format!("<h3>{}</h3>\n", escape(title)),
         Block::Text(words) => format!("<p>{}</p>\n", escape(words)),
         Block::Table(table) => self::table(table),
         Block::Charts(charts, caption) => {
@@ -396,7 +375,6 @@ fn block(block: &Block, html: &mut String) {
                 links.iter().map(link).collect::<String>()
             )
         }
-        Block::Code(text) => format!("<pre>{}</pre>\n", escape(text)),
         Block::Folded(title, blocks) => {
             let mut inside = String::new();
             blocks.iter().for_each(|b| self::block(b, &mut inside));

@@ -168,7 +168,7 @@ impl Sketch<'_> {
     fn places(&self, svg: &mut String) {
         let Frame { x, y, .. } = &self.frame;
         for series in &self.panel.series {
-            let (Mark::Place(px, py) | Mark::Reading(px, py)) = series.mark else {
+            let Mark::Place(px, py) = series.mark else {
                 continue;
             };
             if !self.frame.shows(px, py) {
@@ -202,7 +202,7 @@ fn values(mark: &Mark) -> (Vec<f64>, Vec<f64>) {
         }
         Mark::Level(y) => (Vec::new(), vec![*y]),
         Mark::Zone(low, high) => (Vec::new(), vec![*low, *high]),
-        Mark::Place(x, y) | Mark::Reading(x, y) => (vec![*x], vec![*y]),
+        Mark::Place(x, y) => (vec![*x], vec![*y]),
     }
 }
 
@@ -215,11 +215,9 @@ fn y_range(panel: &Panel) -> Option<(f64, f64)> {
     let is_log = panel.y.scale == Scale::Log;
     let main = panel.series.iter().flat_map(|s| match &s.mark {
         Mark::Points(points) if is_log => points.iter().map(|p| p.y).collect(),
-        Mark::Line(_, Stroke::Plain)
-        | Mark::Level(_)
-        | Mark::Points(_)
-        | Mark::Place(..)
-        | Mark::Reading(..) => values(&s.mark).1,
+        Mark::Line(_, Stroke::Plain) | Mark::Level(_) | Mark::Points(_) | Mark::Place(..) => {
+            values(&s.mark).1
+        }
         _ => Vec::new(),
     });
     let main = extremes(main.filter(|y| is_shown(*y, is_log)));
@@ -573,7 +571,7 @@ impl<'a> Legend<'a> {
         let mut entries: Vec<Entry<'a>> = Vec::new();
         for (panel, of_panel) in chart.panels.iter().enumerate() {
             for series in &of_panel.series {
-                let is_beside = matches!(series.mark, Mark::Place(..) | Mark::Reading(..));
+                let is_beside = matches!(series.mark, Mark::Place(..));
                 match entries.iter_mut().find(|e| e.name == series.name) {
                     _ if series.name.is_empty() || is_beside => {}
                     Some(entry) => entry.series.push(series),
@@ -676,9 +674,7 @@ fn swatch(mark: &Mark, (x, y): (f64, f64), svg: &mut String) {
         Mark::Line(_, stroke) => (stroke.class(), line),
         Mark::Level(_) => ("line level", line),
         Mark::Band(_) | Mark::Zone(..) => ("area", square),
-        Mark::Points(_) | Mark::Place(..) | Mark::Reading(..) => {
-            ("dot", format!("M{:.1} {y:.1}h0", x + 0.5 * SWATCH))
-        }
+        Mark::Points(_) | Mark::Place(..) => ("dot", format!("M{:.1} {y:.1}h0", x + 0.5 * SWATCH)),
     };
     let _ = write!(svg, "<path class=\"{class}\" d=\"{d}\"/>");
 }
@@ -729,16 +725,6 @@ impl Frame {
                 );
             }
             Mark::Place(x, y) => path(svg, "dot", &format!("M{}h0", self.point(*x, *y))),
-            Mark::Reading(x, y) => {
-                let (left, bottom) = (self.x.pixels.0, self.y.pixels.0);
-                let (px, py) = (self.x.at(*x), self.y.at(*y));
-                path(
-                    svg,
-                    "line level",
-                    &format!("M{left:.1} {py:.1}H{px:.1}V{bottom:.1}"),
-                );
-                path(svg, "dot", &format!("M{px:.1} {py:.1}h0"));
-            }
         }
         *svg += "</g>\n";
     }

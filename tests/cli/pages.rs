@@ -121,18 +121,18 @@ fn wv_writes_a_page_and_a_picture_where_it_is_told() {
                 .starts_with(b"\x89PNG\r\n\x1a\n")
         );
     } else {
-        let said = "curves.PNG: a picture is written as SVG\n\nhint: name a file that ends in .svg; PNG needs a build";
+        let said = "curves.PNG: not a page or picture\n\nhint: name a file that ends in .html or .svg (.png with";
         assert!(ran.code == 2 && ran.stderr.contains(said), "{}", ran.stderr);
     }
     let ran = nav_sim(dir, "wv static --plot curves");
     assert!(
-        ran.code == 2 && ran.stderr.contains("curves: a picture is written as SVG"),
+        ran.code == 2 && ran.stderr.contains("curves: not a page or picture"),
         "{}",
         ran.stderr
     );
     let ran = nav_sim(dir, "wv static --plot static/replicate_1.csv");
     assert!(
-        ran.code == 2 && ran.stderr.contains("a picture is written as SVG"),
+        ran.code == 2 && ran.stderr.contains("not a page or picture"),
         "{}",
         ran.stderr
     );

@@ -72,7 +72,7 @@ impl Calibration {
             );
             document.table(parameters(outcome));
             if outcome.ranking.is_some() {
-                document.heading("Candidate models");
+                document.section("Candidate models");
                 let columns = [
                     ("model", "model"),
                     ("WVIC", "wvic"),
@@ -117,9 +117,6 @@ impl Calibration {
             ];
             document.table(Table::of(json, "/replicates/*", &columns).without_unknown());
         }
-        document.checked(
-            "wavelet variances of models to 1e-13 of an independent implementation, the optimum to 1e-6 of an exhaustive search",
-        );
         document
     }
 
@@ -280,7 +277,7 @@ fn chart(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_
         upper.extend(
             read.into_iter()
                 .flatten()
-                .map(|(name, x, y)| Series::new(name, Colour::RIGHT, Mark::Reading(x, y))),
+                .map(|(name, x, y)| Series::new(name, Colour::RIGHT, Mark::Place(x, y))),
         );
     }
     let mut lower = data(&|nu, i| nu / fitted.implied[i]).to_vec();

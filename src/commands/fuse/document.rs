@@ -13,9 +13,6 @@ use nav_sim_navigation::frames::NavState;
 use nav_sim_navigation::fusion::{ClocksApart, Finding, FixRecord, Row, Solution};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 
-const CHECKED: &str =
-    "solutions of simulated recordings are consistent with their covariance, smoothed ones too.";
-
 impl FuseAnswer {
     /// Verdict, figures, charts and notes.
     pub(super) fn page(&self) -> Document {
@@ -44,7 +41,6 @@ impl FuseAnswer {
         }
         document.section("Fixes");
         document.chart(&innovations(solution, &outages), FIXES);
-        document.checked(CHECKED);
         if let Some(quality) = &self.reduction {
             match reduction_doubt(quality) {
                 Some(doubt) => document.note(Importance::Warning, doubt),
@@ -146,7 +142,7 @@ impl FuseAnswer {
         document.table(table.without_unknown());
         let mut table = |title: &str, table: Table| {
             if !table.is_empty() {
-                document.heading(title);
+                document.section(title);
                 document.table(table.without_unknown());
             }
         };

@@ -12,7 +12,7 @@ use crate::io::trajectory_file::{self, load_reference};
 use crate::parse::{self, numbers};
 use crate::report::json;
 use glam::{DMat3, DQuat, DVec3};
-use nav_sim_document::{Document, Importance, seconds, shortest, window};
+use nav_sim_document::{Document, seconds, shortest, window};
 use nav_sim_navigation::earth::{GravityModel, radii};
 use nav_sim_navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
@@ -45,7 +45,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 
 impl Command for Fuse {
@@ -418,9 +418,8 @@ pub struct FuseAnswer {
 }
 
 /// A drive that was read.
-struct Drive {
-    request: Fuse,
-    settings: Settings,
+struct Drive<'a> {
+    request: &'a Fuse,
     imu: Vec<ImuIncrement>,
     imu_rate_hz: f64,
     gnss: Vec<GnssFix>,
@@ -429,95 +428,54 @@ struct Drive {
     expected: InitialSettings,
     initial: Option<Start>,
     reference: Option<Reference>,
-    configuration: Value,
 }
 
-impl Drive {
+impl<'a> Drive<'a> {
     /// Reads the files of a request.
     ///
     /// # Errors
     /// A setting out of range, a file that cannot be used.
-    fn read(request: &Fuse, context: &Context<'_>) -> Result<Self> {
-        let settings = request.settings();
-        let (unsaid, gnss_sigma_factor) = request.gnss_sigma.unwrap_or((None, [1.0; 2]));
-        let [position, velocity] = gnss_sigma_factor;
+    fn read(request: &'a Fuse, context: &Context<'_>) -> Result<Self> {
+        let (unsaid, [position, velocity]) = request.gnss_sigma.unwrap_or((None, [1.0; 2]));
         let topic = |k: usize| {
-            request
-                .topic
-                .get(k)
-                .map(String::as_str)
-                .filter(|t| !t.is_empty())
+            let topic = request.topic.get(k).map(String::as_str);
+            topic.filter(|t| !t.is_empty())
         };
         let imu = read_imu(&request.imu, request.columns.as_deref(), topic(0))?;
-        let (mut gnss, remarks) = read_gnss(
-            &request.gnss,
-            unsaid.as_ref(),
-            imu.samples
-                .first()
-                .zip(imu.samples.last())
-                .map(|(first, last)| (first.t_s, last.t_s)),
-            topic(1),
-        )?;
+        let ends = imu.samples.first().zip(imu.samples.last());
+        let span = ends.map(|(first, last)| (first.t_s, last.t_s));
+        let (mut gnss, remarks) = read_gnss(&request.gnss, unsaid.as_ref(), span, topic(1))?;
         for fix in &mut gnss {
             *fix = fix.with_sigmas_times(position, velocity);
             fix.t_s -= request.gnss_delay_s;
         }
         for note in imu.remarks.into_iter().chain(remarks) {
-            match note.importance {
-                Importance::Warning => context.warn(note.text),
-                _ => context.remark(note.text),
-            }
+            context.note(note.importance, note.text);
         }
         let wheel = request
             .odometer
             .as_deref()
-            .map_or_else(|| Ok(Vec::new()), read_wheel)?;
+            .map(read_wheel)
+            .transpose()?
+            .unwrap_or_default();
         let initial = request
             .initial_file()
             .map(|path| read_initial(path))
             .transpose()?;
         let model = inputs::model(&request.model, context)?;
-        if (model.model.rate_hz / imu.rate_hz - 1.0).abs() > 0.01 {
-            let (from, to) = (model.model.rate_hz, imu.rate_hz);
-            context.detail(format!(
-                "the model was converted from {from} Hz to {to:.3} Hz"
-            ));
-        }
-        let mut expected = request.expected(
-            initial
-                .as_ref()
-                .map(|start| start.sigma.clone())
-                .unwrap_or_default(),
-        );
+        let of_file = initial.as_ref().map(|start| start.sigma.clone());
+        let mut expected = request.expected(of_file.unwrap_or_default());
         inputs::expect_turn_on(&mut expected, model.turn_on, &request.model, context);
         expected.validate().refuse()?;
         let options = trajectory_file::Options::default();
-        let reference = request
-            .reference
-            .as_deref()
-            .map(|path| load_reference(path, &options))
-            .transpose()?;
-        let reference = reference.map(|(reference, warnings)| {
+        let reference = request.reference.as_deref().map(|path| {
+            let (reference, warnings) = load_reference(path, &options)?;
             context.warn_each(&warnings);
-            reference
+            Ok::<_, Failure>(reference)
         });
-        let mut configuration = json!({
-            "settings": settings,
-            "filter": request.filter,
-            "initial": expected,
-            "gnss_sigma": unsaid,
-            "gnss_sigma_factor": gnss_sigma_factor,
-            "gnss_correlation": request.gnss_correlation,
-            "heading": request.given_heading(),
-            "gnss_delay_s": request.gnss_delay_s,
-        });
-        let aiding = request.aiding();
-        if !aiding.is_none() {
-            configuration["aiding"] = json!(aiding);
-        }
+        let reference = reference.transpose()?;
         Ok(Self {
-            request: request.clone(),
-            settings,
+            request,
             imu: imu.samples,
             imu_rate_hz: imu.rate_hz,
             gnss,
@@ -526,7 +484,6 @@ impl Drive {
             expected,
             initial,
             reference,
-            configuration,
         })
     }
 
@@ -541,7 +498,18 @@ impl Drive {
             gnss: &self.gnss,
             aids: &[],
         };
-        let mut settings = self.settings.clone();
+        let mut settings = self.request.settings();
+        let aiding = self.request.aiding();
+        let configuration = json!({
+            "settings": settings,
+            "filter": self.request.filter,
+            "initial": self.expected,
+            "gnss_sigma": self.request.gnss_sigma,
+            "gnss_correlation": self.request.gnss_correlation,
+            "heading": self.request.given_heading(),
+            "gnss_delay_s": self.request.gnss_delay_s,
+            "aiding": aiding,
+        });
         let (belief, reduction) = belief(
             (&self.model.model, self.request.filter, &self.expected),
             self.imu_rate_hz,
@@ -599,7 +567,6 @@ impl Drive {
             !is_early
         });
         // the start and the mounting are found without: they are what the vehicle's axes come from
-        let aiding = self.request.aiding();
         self.check_wheel(&recorded, &settings.outages)?;
         let aids = vehicle_velocities(&recorded, &self.wheel, &aiding, &settings.outages);
         recorded.aids = &aids;
@@ -627,24 +594,17 @@ impl Drive {
             settings: &settings,
             is_given: self.initial.is_some(),
         };
-        let cause = is_unexplained
-            .then(|| {
-                scene.cause(&Recorded {
-                    gnss: &weighed.gnss,
-                    ..recorded
-                })
-            })
-            .flatten()
-            .map(|cause| cause.after(delay_s));
-        let kind = if cause.is_some() {
-            verdict.max(VerdictKind::Doubtful)
-        } else {
-            verdict
+        let gnss = &weighed.gnss;
+        let cause = is_unexplained.then(|| scene.cause(&Recorded { gnss, ..recorded }));
+        let cause = cause.flatten().map(|cause| cause.after(delay_s));
+        let kind = match cause {
+            Some(_) => verdict.max(VerdictKind::Doubtful),
+            None => verdict,
         };
-        let evidence = findings
+        let grave = findings
             .into_iter()
-            .filter_map(|(verdict, finding)| (verdict > VerdictKind::Consistent).then_some(finding))
-            .collect();
+            .filter(|(verdict, _)| *verdict > VerdictKind::Consistent);
+        let evidence = grave.map(|(_, finding)| finding).collect();
         let constants = belief
             .groups
             .iter()
@@ -666,17 +626,10 @@ impl Drive {
             imu_samples: weighed.solution.samples,
             imu_rate_hz: self.imu_rate_hz,
             start_s: start.t_s,
-            end_s: weighed
-                .solution
-                .rows
-                .last()
-                .map_or(start.t_s, |row| row.t_s),
+            end_s: rows.last().map_or(start.t_s, |row| row.t_s),
             filter_states: belief.states,
             turn_on_states: 3 * constants,
-            initial: Initial::new(
-                &start,
-                self.request.initial_file().map(|path| path.as_path()),
-            ),
+            initial: Initial::new(&start, self.request.initial_file()),
             mounting: mounting.as_ref().map(Into::into),
             horizontal_sigma_rms_m: (squares.sum::<f64>() / rows.len() as f64).sqrt(),
             gnss_correlation: fix_correlation(&weighed),
@@ -687,12 +640,12 @@ impl Drive {
             solution: weighed.solution,
             summary,
             reduction,
-            configuration: self.configuration,
+            configuration,
         })
     }
 }
 
-impl Drive {
+impl Drive<'_> {
     /// Brings fixes to the clock of the IMU where the two have nothing in common and no delay is given; by how much (s).
     fn common_origin(&mut self) -> Result<Option<f64>> {
         let recorded = Recorded {
@@ -1055,14 +1008,10 @@ struct MountingRow {
 
 impl Initial {
     /// The start, from the data or from a file.
-    fn new(start: &Start, file: Option<&Path>) -> Self {
-        let how = match (&start.found, file) {
-            (Some(found), _) => how(start, found),
-            (None, file) => file
-                .iter()
-                .map(|file| format!("as {} says", file.display()))
-                .collect(),
-        };
+    fn new(start: &Start, file: Option<&PathBuf>) -> Self {
+        let stated = file.map(|file| format!("as {} says", file.display()));
+        let found = start.found.as_ref().map(|found| how(start, found));
+        let how = found.unwrap_or(stated.into_iter().collect());
         let state = STATE.into_iter().zip(values(&start.state)).collect();
         Self {
             t_s: start.t_s,
