@@ -130,7 +130,10 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
     let beside = path.parent().unwrap_or(Path::new(""));
     let found = match file_kind::of(path)? {
         FileKind::Scenario => scenario_file::read(path).map(|_| "a scenario")?,
-        FileKind::Study => Study::read(path, &[])?.cells(beside).map(|_| "a study")?,
+        FileKind::Study => {
+            let cells = Study::read(path, &[])?.cells(beside)?.len();
+            return Ok(format!("a study of {cells} cells"));
+        }
         FileKind::Model => inputs::model(path, context).map(|_| "a noise model")?,
         FileKind::Log => {
             inspect(path, Stamp::default()).map(|_| "a log (nav-sim inspect lists its channels)")?

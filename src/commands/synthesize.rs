@@ -57,6 +57,9 @@ pub struct Synthesize {
     axes: Vec<ChannelSet>,
 }
 
+/// Samples of a recording, at most.
+const MOST: f64 = 1e9;
+
 /// Recordings whose models are drawn; their noise is drawn as they are written.
 #[derive(Debug, Serialize)]
 pub struct Synthesis {
@@ -128,17 +131,9 @@ impl Command for Synthesize {
             Some(s) => (s * rate_hz).round(),
             None => self.samples.unwrap_or(524_284) as f64,
         };
-        if samples < 2.0 {
+        if !(2.0..=MOST).contains(&samples) {
             return Err(Failure::input(format!(
-                "a recording needs at least 2 samples; these are {samples}"
-            )));
-        }
-        let bytes = samples * channels.len() as f64 * 8.0;
-        if bytes >= isize::MAX as f64 || Vec::<u8>::new().try_reserve_exact(bytes as usize).is_err()
-        {
-            let gigabytes = bytes / 1e9;
-            return Err(Failure::could_not(format!(
-                "{samples} samples need {gigabytes:.0} GB of memory"
+                "a recording has 2 to {MOST:e} samples; these are {samples}"
             )));
         }
         let mut synthesis = Synthesis {

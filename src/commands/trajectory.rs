@@ -188,12 +188,6 @@ impl Command for CheckTrajectory {
         for excess in beyond.iter().take(SAID) {
             context.warn(format!("{name}: {excess}"));
         }
-        if beyond.len() > SAID {
-            let more = beyond.len() - SAID;
-            context.warn(format!(
-                "{name}: and {more} more stretches beyond limits (--format json lists all)"
-            ));
-        }
         let closure = Closure::new(&trajectory, self.rate_hz, GravityModel::default())
             .map_err(|e| Failure::input(format!("{name}: {e}")).hint("give another --rate-hz"))?;
         let motion = |[speed_m_s, acceleration_m_s2, jerk_m_s3, rate_deg_s]: [f64; 4]| {

@@ -323,7 +323,6 @@ impl Tune {
             full: &full,
             filter: &tuned,
             aim: self.aim,
-            allow_smaller: false,
         };
         let factors = task.factors()?;
         let ones: Vec<Factor> = factors

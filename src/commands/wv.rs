@@ -6,13 +6,12 @@ use crate::commands::calibrate::{visit, without_warm_up};
 use crate::io::recordings::ReadOptions;
 use crate::parse;
 use crate::report::curves::{
-    CONFIDENCE, SignalCurves, SignalsFile, band, curve, recording_names, scale_axis, sensor_name,
-    variance_axis,
+    CONFIDENCE, SignalCurves, SignalsFile, band, curve, recording_names, sensor_name,
 };
 use crate::report::in_order;
 use nav_sim_calibration::{Replicate, duration, median, replicates};
-use nav_sim_document::{Cell, Chart, Colour, Document, Panel, Series, Table, Tone};
-use nav_sim_signal::imu::{Channel, Recording};
+use nav_sim_document::{Axis, Cell, Chart, Colour, Document, Panel, Series, Table, Tone};
+use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::wavelet::{WaveletError, haar, interval};
 use rayon::prelude::*;
 use std::path::PathBuf;
@@ -191,10 +190,14 @@ fn chart(file: &SignalsFile, channel: Channel) -> Chart {
             curve(&s.tau_s, &s.robust.wv),
         ));
     }
+    let variance = match channel.sensor {
+        Sensor::Accel => "wavelet variance (m²/s⁴)",
+        Sensor::Gyro => "wavelet variance (rad²/s²)",
+    };
     Chart::new(
         &format!("{} {}", sensor_name(channel.sensor), channel.axis),
-        scale_axis(),
-        vec![Panel::new(variance_axis(channel.sensor), series)],
+        Axis::log("scale τ (s)"),
+        vec![Panel::new(Axis::log(variance), series)],
     )
     .small()
     .in_group("scales")

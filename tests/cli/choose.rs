@@ -284,7 +284,7 @@ fn what_cannot_be_compared_is_refused() {
         ["no candidate uses all recordings", "add awv"],
     );
     refused(&["--model", "N3"], ["--model", "hint"]);
-    refused(&["--inflate", "more"], ["more", "none, tuned, x10"]);
+    refused(&["--inflate", "more"], ["more", "none, x10"]);
     let none = [
         "choose",
         "r",

@@ -519,11 +519,6 @@ fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
             continue;
         };
         let [time, longest] = [time_s, longest_s].map(duration);
-        if time_s * rate_hz < 1.0 {
-            notes.push(format!(
-                "{label}: correlation time {time} is below a sample, as of white noise"
-            ));
-        }
         // Before its peak the curve of an AR1 rises as that of a random walk does: without the peak only sigma2 is known.
         if PEAK * time_s > longest_s {
             notes.push(format!(

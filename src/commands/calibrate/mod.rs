@@ -251,30 +251,14 @@ impl Calibrate {
 
     fn structure(&self) -> Result<ModelChoice> {
         let chosen: ModelChoice = self.model.parse().map_err(unknown_model)?;
-        if self.estimator != EstimatorChoice::One(Estimator::Avlr) {
-            return Ok(chosen);
-        }
-        if self.tuning.fitted().is_some() {
+        let is_avlr = self.estimator == EstimatorChoice::One(Estimator::Avlr);
+        if is_avlr && self.tuning.fitted().is_some() {
             return refused(
                 "--scales FROM:TO with --estimator avlr: slopes are read where they are found",
                 "--estimator gmwm fits the same curve over a range",
             );
         }
-        let without = match &chosen {
-            ModelChoice::Given(spec) => spec
-                .kinds()
-                .iter()
-                .find(|k| k.shape().is_some())
-                .map(|k| k.code()),
-            ModelChoice::Auto => Some("the AR1 of auto"),
-        };
-        let Some(name) = without else {
-            return Ok(chosen);
-        };
-        refused(
-            format!("--estimator avlr: {name} has no slope of its own in the Allan deviation"),
-            "--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm",
-        )
+        Ok(chosen)
     }
 }
 

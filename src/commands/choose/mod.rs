@@ -72,8 +72,7 @@ pub struct Choose {
     /// [default: 15, and full with awv]
     #[arg(long, value_name = "STATES", value_delimiter = ',')]
     filter: Vec<FilterStates>,
-    /// How models are inflated: none, tuned (consistent in the mean for the models of the single recordings), x10 (ten
-    /// times the standard deviations) [default: none, and all three with awv]
+    /// How models are inflated: none, x10 (ten times the standard deviations) [default: none, and both with awv]
     #[arg(long, value_name = "HOW", value_delimiter = ',')]
     inflate: Vec<Inflation>,
     /// Runs on each recording
@@ -200,7 +199,10 @@ impl Command for Choose {
             );
         }
         let units = units(&measured);
-        let laboratory = Laboratory::new(units, measured.settings)?;
+        let laboratory = Laboratory {
+            units,
+            settings: measured.settings,
+        };
         let drive = Drive::new(&trajectory, scenario, outages.clone(), rate_hz, seed)?;
         let judges = laboratory.judges()?;
         context.begin("runs", judges.len() as u64 * self.runs);
@@ -229,12 +231,7 @@ impl Command for Choose {
         let winner = &candidates[ranking.candidates[0].index];
         // an estimator of single recordings never wins: this is of all of them
         let (groups, outcomes, settings) = laboratory.calibrate(winner, None)?;
-        let model = drive.inflated(
-            &laboratory,
-            None,
-            winner,
-            &model_of(&outcomes, settings.rate_hz),
-        )?;
+        let model = winner.inflated(&model_of(&outcomes, settings.rate_hz));
         let mut calibration = Calibration::new(
             groups,
             outcomes,

@@ -47,8 +47,6 @@ pub struct Task<'a> {
     pub filter: &'a Filter<'a>,
     /// Condition under which it is consistent.
     pub aim: Aim,
-    /// Whether a factor may be below 1.
-    pub allow_smaller: bool,
 }
 
 const ITERATIONS: usize = 60;
@@ -129,10 +127,9 @@ impl Task<'_> {
             value.parts.extend(ln.iter().map(bent));
             value
         };
-        let low = if self.allow_smaller { -MAX_LN } else { 0.0 };
         let descent = Damped {
             value: &value,
-            bounds: (low, MAX_LN),
+            bounds: (0.0, MAX_LN),
             iterations: ITERATIONS,
             enough: ENOUGH,
         };
