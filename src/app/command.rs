@@ -484,7 +484,11 @@ impl<C: Command> Asked<C> {
     pub(crate) fn inputs(&self) -> Result<Inputs> {
         let mut all = Inputs::new();
         for (role, path) in self.request.inputs(self.paths.clone())? {
-            let files = input::listed(&[path])?;
+            let is_recording = ["recording", "static"].contains(&role.as_str());
+            let files = match is_recording {
+                true => input::listed(&[path])?,
+                false => vec![path],
+            };
             all.extend(files.into_iter().map(|file| (role.clone(), file)));
         }
         Ok(all)

@@ -552,7 +552,7 @@ fn useless_fusions_are_refused_or_said() {
         "fuse rec/imu.csv rec/gnss.csv imu.toml --initial rec/initial.toml -o out",
     );
     assert!(!ran.stderr.contains("warning"), "{}", ran.stderr);
-    let twice = "fuse rec/imu.csv rec/gnss.csv imu.toml --outage 60:70 --outage 65:75 -o out";
+    let twice = "fuse rec/imu.csv rec/gnss.csv imu.toml --outage 60:70 --outage 65:75 -o out -v";
     let ran = done(place.path(), twice);
     assert!(
         ran.stderr.contains("overlap or touch") && ran.stdout.contains("60–75 s"),

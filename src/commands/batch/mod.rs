@@ -67,9 +67,6 @@ pub struct BatchRequest {
     /// A key of [run] over that of the study, such as runs=10000 (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// States in the tables of the page (repeatable), or "all"
-    #[arg(long = "state", value_name = "STATE", default_values = ["pos_e_m", "roll_deg"])]
-    pub states: Vec<String>,
     /// Compute cells again whose request has changed
     #[arg(skip)]
     pub force: bool,
@@ -130,10 +127,9 @@ impl BatchRequest {
         if !study.run.contains_key("seed") {
             context.remark("no seed in the study: 1");
         }
-        let states = crate::commands::compare::states(&self.states)?;
         let share = find_shard(self.shard, self.shards, variable)?;
         let merged = || {
-            let answer = results::merge(study, &cells, &place, &states, context)?;
+            let answer = results::merge(study, &cells, &place, context)?;
             answer.write(&place)?;
             Ok(Outcome::Merged(Box::new(answer)))
         };

@@ -43,24 +43,7 @@ impl Calibration {
             (interval, "ci95|not determined"),
             ("averages of", "averages"),
         ];
-        let figures = Table::of(json, "/fits/*/figures/*", &columns);
-        if self.outcomes.len() > 2 {
-            let columns = [
-                ("fit", "name"),
-                ("N", "figures/N/value"),
-                ("95 %", "figures/N/ci95"),
-                ("B", "figures/B/value"),
-                ("K", "figures/K/value"),
-                (
-                    "units",
-                    "{figures/N/unit}, {figures/B/unit}, {figures/K/unit}",
-                ),
-            ];
-            document.table(Table::of(json, "/fits/*", &columns));
-            document.table(figures);
-        } else {
-            document.table(figures);
-        }
+        document.table(Table::of(json, "/fits/*/figures/*", &columns));
         for (importance, note) in self.notes() {
             document.note(importance, note);
         }

@@ -16,7 +16,7 @@ use crate::commands::calibrate::{
 };
 use crate::io::recordings::{self, FileReport, Gaps, ReadOptions};
 use crate::parse;
-use crate::report::json;
+use crate::report::{json, six_digits};
 use candidates::{Candidate, Drive, Fold, Inflation, Laboratory, Unit};
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, model_of};
 use nav_sim_document::{
@@ -180,6 +180,10 @@ impl Command for Choose {
         let found_hz = measured.settings.rate_hz;
         let rate_hz = nominal_hz(found_hz, scenario.gnss.rate_hz);
         if rate_hz != found_hz {
+            context.remark(format!(
+                "the recordings run at {} Hz: taken as {rate_hz} Hz, so that fixes meet samples",
+                six_digits(found_hz)
+            ));
             measured.settings.rate_hz = rate_hz;
         }
         // The clocks of the files are not quite alike: one rate is that of all.

@@ -55,6 +55,10 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     page.chart(&nees(epochs, summary), CONSISTENCY);
     page.table(consistency(answer));
     budgets(answer, &shown, &mut page);
+    let configuration = toml::to_string_pretty(&answer.origin.configuration);
+    page.folded("Configuration", |page| {
+        page.text(&configuration.unwrap_or_default())
+    });
     page
 }
 
