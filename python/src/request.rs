@@ -165,7 +165,6 @@ pub(crate) fn study_run(
             study,
             out: Some(directory),
             shard,
-            states: vec!["all".to_owned()],
             ..BatchRequest::default()
         };
         let outcome = request.run(&|_| None, &Context::new(meter, None));

@@ -456,9 +456,6 @@ impl ChoiceMade {
                 format!("no candidate describes {names}: look at it with nav-sim calibrate")
             }
         });
-        warn(&ranking.decisive, &|names| {
-            format!("without any one of {names} another candidate would win")
-        });
     }
 
     /// Log scores against the best, a row a candidate.

@@ -80,8 +80,6 @@ pub struct Ranking {
     pub tied: Vec<String>,
     /// The candidates.
     pub candidates: Vec<Placed>,
-    /// Recordings without which another candidate would win.
-    pub decisive: Vec<String>,
     /// Recordings that no candidate describes: the least NEES of all is above 18 where 9 is right.
     pub undescribed: Vec<String>,
     /// Whether the data tell the winner from any other that may be chosen.
@@ -108,11 +106,6 @@ impl Ranking {
                 .cmp(&a.eligible)
                 .then(b.log_score.value.total_cmp(&a.log_score.value))
         });
-        let without = |left_out: usize| {
-            let mut rest = all.clone();
-            rest.remove(left_out);
-            best(&eligible, &rest).is_some_and(|other| other != winner)
-        };
         let named = |k: usize| folds[k].recording.clone();
         let fails = |k: &usize| !all[*k].scores.iter().any(|s| s.all.nees <= FAILS);
         let tells = folds.len() >= FEWEST && placed.iter().any(|p| p.eligible && !p.tied);
@@ -121,10 +114,6 @@ impl Ranking {
             winner: placed[0].candidate.clone(),
             tied: tied.map(|p| p.candidate.clone()).collect(),
             candidates: placed,
-            decisive: (0..folds.len())
-                .filter(|k| without(*k))
-                .map(named)
-                .collect(),
             undescribed: (0..folds.len()).filter(fails).map(named).collect(),
             tells,
         }
@@ -303,7 +292,6 @@ mod ranking_tests {
             ],
         );
         assert_eq!((found.candidates[0].index, found.tells), (1, false));
-        assert_eq!(found.decisive, ["r3"]);
         assert!(found.candidates.iter().all(|c| c.tied));
     }
 

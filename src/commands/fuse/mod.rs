@@ -12,7 +12,7 @@ use crate::io::trajectory_file::{self, load_reference};
 use crate::parse::{self, numbers};
 use crate::report::json;
 use glam::{DMat3, DQuat, DVec3};
-use nav_sim_document::{Document, seconds, shortest, window};
+use nav_sim_document::{Document, shortest, window};
 use nav_sim_navigation::earth::{GravityModel, radii};
 use nav_sim_navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
@@ -1027,41 +1027,18 @@ fn how(start: &Start, found: &Found) -> Vec<String> {
     let [.., roll, pitch, yaw] = values(&start.state);
     let [tilt_sigma, _, yaw_sigma] = start.sigma.att_sigma_deg;
     let level = match found.level {
-        Levelling::AtRest(until_s) => {
-            format!("from levelling at rest until {until_s:.2} s, carried on by the gyroscopes")
-        }
-        Levelling::InMotion(seconds) => {
-            format!(
-                "from accelerations over the {seconds:.1} s after it (no better static window before)"
-            )
-        }
+        Levelling::AtRest(until_s) => format!("levelled at rest until {until_s:.2} s"),
+        Levelling::InMotion(seconds) => format!("from accelerations over {seconds:.1} s"),
     };
-    let (speed, sigma) = (start.state.v_n.truncate().length(), found.course_sigma_deg);
-    let reversing = if found.is_reversing {
-        ", reversing"
-    } else {
-        ""
+    let source = match (found.is_given, found.is_reversing) {
+        (true, _) => "as given",
+        (_, true) => "from the course in reverse",
+        _ => "from the course",
     };
-    let t_s = start.t_s;
-    let source = if found.is_given {
-        "as given".to_owned()
-    } else {
-        format!(
-            "from the course of the fix at {} s ({speed:.1} m/s{reversing})",
-            seconds(t_s)
-        )
-    };
-    let mut how = vec![
+    vec![
         format!("roll {roll:.2}°, pitch {pitch:.2}° ± {tilt_sigma:.2}° {level}"),
-        format!("heading {yaw:.1}° ± {sigma:.1}° {source}"),
-        "biases start at zero".to_owned(),
-    ];
-    how.extend(found.moved_deg.map(|moved| {
-        format!(
-            "heading ± {yaw_sigma:.1}°: the fixes of the next minute move it by {moved:+.0}° (wind, slip)"
-        )
-    }));
-    how
+        format!("heading {yaw:.1}° ± {yaw_sigma:.1}° {source}"),
+    ]
 }
 
 impl From<&Mounting> for MountingRow {

@@ -144,7 +144,6 @@ impl Command for Run {
 pub(crate) struct PreparedRun<'a> {
     request: &'a Run,
     inputs: NavigateInputs,
-    scenario: Scenario,
     origin: RunOrigin,
     seed: u64,
 }
@@ -184,11 +183,10 @@ impl Run {
                 "give an outage with --outage START:END",
             );
         }
-        let mut configuration = scenario.clone();
-        configuration.outage = Some(outages);
-        (configuration.outage_periodic, configuration.outage_random) = (None, None);
+        scenario.outage = Some(outages);
+        (scenario.outage_periodic, scenario.outage_random) = (None, None);
         let origin = RunOrigin {
-            configuration,
+            configuration: scenario,
             spread: self.spread,
             estimator: file.estimator(),
             independent_windows: None,
@@ -196,7 +194,6 @@ impl Run {
         Ok(PreparedRun {
             request: self,
             inputs,
-            scenario,
             origin,
             seed,
         })
@@ -311,7 +308,7 @@ pub(crate) fn columns(
 ) -> Result<Option<Vec<Option<RunResult>>>> {
     let Some(one) = runs
         .first()
-        .filter(|run| run.scenario.run.method != Method::Lincov)
+        .filter(|run| run.origin.configuration.run.method != Method::Lincov)
     else {
         context.advance(count * runs.len() as u64);
         return Ok(Some(runs.iter().map(|_| None).collect()));
@@ -319,7 +316,7 @@ pub(crate) fn columns(
     let beliefs = runs.iter().map(|run| Ok(run.filter()?.1));
     let (beliefs, outages) = (beliefs.collect::<Result<Vec<_>>>()?, one.outages());
     let inputs = &one.inputs;
-    let experiment = one.scenario.experiment(
+    let experiment = one.origin.configuration.experiment(
         &inputs.trajectory,
         inputs.truth(),
         &beliefs,
@@ -349,7 +346,7 @@ impl PreparedRun<'_> {
 
     /// The track and the filter.
     fn filter(&self) -> Result<(Track, Belief)> {
-        let (scenario, outages) = (&self.scenario, self.outages());
+        let (scenario, outages) = (&self.origin.configuration, self.outages());
         let (model, request) = (&self.inputs.model, self.request);
         let track = scenario.track(&self.inputs.trajectory, model, &outages)?;
         let belief = scenario.belief(model, &outages, &track).map_err(|e| {
@@ -376,13 +373,12 @@ impl PreparedRun<'_> {
         let Self {
             request,
             inputs,
-            scenario,
             mut origin,
             seed,
         } = self;
         let mut navigation = with_runs(
             &inputs,
-            &scenario,
+            &origin.configuration,
             &outages,
             (&track, &belief),
             seed,
@@ -602,7 +598,7 @@ fn with_runs(
             epochs,
             // Nothing is drawn but outages; a seed that is given stays on record.
             summary: Summary {
-                seed: scenario.outage_random.map(|_| seed).or(scenario.run.seed),
+                seed: scenario.run.seed,
                 ..summary
             },
         },
