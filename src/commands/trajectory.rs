@@ -210,10 +210,8 @@ impl Command for CheckTrajectory {
             limits: motion(limits),
             beyond_limits: beyond.iter().map(ToString::to_string).collect(),
             warnings,
-            closure: Closed {
-                closure,
-                within_bounds: closure.within(&bounds),
-            },
+            within_bounds: closure.within(&bounds),
+            closure,
             bounds,
         })
     }
@@ -232,15 +230,9 @@ pub struct TrajectoryCheck {
     limits: Value,
     beyond_limits: Vec<String>,
     warnings: Vec<String>,
-    closure: Closed,
-    bounds: Bounds,
-}
-
-#[derive(Serialize)]
-struct Closed {
-    #[serde(flatten)]
     closure: Closure,
     within_bounds: bool,
+    bounds: Bounds,
 }
 
 impl Answer for TrajectoryCheck {
@@ -268,7 +260,7 @@ impl Answer for TrajectoryCheck {
             ("velocity (m/s)", "closure/velocity_m_s bounds/velocity_m_s"),
             ("attitude (rad)", "closure/attitude_rad bounds/attitude_rad"),
         ];
-        let c = &self.closure.closure;
+        let c = &self.closure;
         let text = format!(
             "{}: {} s from {} s, {} points\nclosure at {} Hz over {} s: {}\n{}",
             self.file,
@@ -277,7 +269,7 @@ impl Answer for TrajectoryCheck {
             self.points,
             c.rate_hz,
             c.duration_s,
-            if self.closure.within_bounds {
+            if self.within_bounds {
                 "within bounds"
             } else {
                 "BEYOND A BOUND"
@@ -289,8 +281,8 @@ impl Answer for TrajectoryCheck {
 
     fn unmet(&self) -> Option<Failure> {
         let (mut missed, mut hints) = (Vec::new(), Vec::new());
-        if !self.closure.within_bounds {
-            let (c, b) = (&self.closure.closure, &self.bounds);
+        if !self.within_bounds {
+            let (c, b) = (&self.closure, &self.bounds);
             missed.push(format!(
                 "closure at {} Hz is {:.3e} m, {:.3e} m/s, {:.3e} rad, beyond {:e} m, {:e} m/s or {:e} rad",
                 c.rate_hz,

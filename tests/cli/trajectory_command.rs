@@ -67,7 +67,7 @@ fn check_speaks_json_and_exits_with_3_beyond_a_limit() {
     let (code, out, err) = trajectory(&["check", DRIVE, "--limit-speed", "24", "--format", "json"]);
     let report: serde_json::Value = serde_json::from_str(&out).unwrap();
     assert_eq!(
-        (code, report["closure"]["within_bounds"].as_bool()),
+        (code, report["within_bounds"].as_bool()),
         (3, Some(true))
     );
     assert!(report["closure"]["horizontal_m"].as_f64().unwrap() < 0.01);
