@@ -152,11 +152,14 @@ impl Document {
         &self.notes
     }
 
-    /// Its charts below one another as an SVG picture.
+    /// Its charts below one another as an SVG picture, small ones where there are no others.
     #[must_use]
     pub fn svg(&self) -> String {
         let mut charts = Vec::new();
         collect(&self.blocks, &mut charts);
+        if charts.iter().any(|chart| chart.size == Size::Full) {
+            charts.retain(|chart| chart.size == Size::Full);
+        }
         svg(&self.title, &charts)
     }
 }
