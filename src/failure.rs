@@ -431,6 +431,9 @@ impl From<CalibrationError> for Failure {
                 "the signal is quantised so coarsely that scales are silent: --estimator awv, or another range"
             }
             Cause::Trim => "a smaller --trim, or --estimator sr-awv",
+            Cause::NoSlope => {
+                "--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm"
+            }
             Cause::Other => return Self::input(e),
         };
         Self::input(e).hint(hint)

@@ -187,7 +187,7 @@ def calibrate(
             staging,
             progress,
             threads,
-            inputs=files,
+            recording=files,
             estimator=estimator,
             model=model,
             trim=trim,

@@ -176,7 +176,7 @@ def choose(
     """Which estimator and model navigate best on one's own recordings, three or more: `nav-sim choose`.
 
     Each recording makes the errors of runs along the trajectory whose filters were calibrated on the others. `.model` is the winner's.
-    `estimator`, `model`, `filter` and `inflate` ("none", "tuned", "x10", …) list what is tried; `rate_hz`, `trim`, `skip_s`
+    `estimator`, `model`, `filter` and `inflate` ("none", "x10") list what is tried; `rate_hz`, `trim`, `skip_s`
     and `gaps` are as of `calibrate`, `outages`, `runs`, `scenario`, `seed`, `threads` and `progress` as of `run`.
     """
     with Staging() as staging:
@@ -186,7 +186,7 @@ def choose(
             staging,
             progress,
             threads,
-            inputs=staging.recordings(recordings, "recordings", None),
+            recording=staging.recordings(recordings, "recordings", None),
             trajectory=_trajectory.staged(trajectory, staging),
             outage=windows(outages),
             estimator=estimator,

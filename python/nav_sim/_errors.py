@@ -57,7 +57,7 @@ def warn(doubts: Iterable[str]) -> None:
 _RENAMED = {
     "for": "aim",
     "heading": "heading_deg",
-    "inputs": "recordings",
+    "recording": "recordings",
     "lever_arm": "lever_arm_m",
     "outage": "outages",
     "state": "states",

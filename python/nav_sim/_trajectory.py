@@ -55,7 +55,7 @@ class Trajectory:
 
     def _read(self, rate_hz: float) -> Answer:
         with Staging() as staging:
-            asked = as_json({"path": self.staged(staging), "rate_hz": rate_hz})
+            asked = as_json({"trajectory": self.staged(staging), "rate_hz": rate_hz})
             return Answer(_native.answer("trajectory convert", asked, staging.hidden, None))
 
     def write(self, path: StrPath) -> Path:

@@ -164,7 +164,7 @@ def wv(
             staging,
             progress,
             threads,
-            files=files,
+            recording=files,
             **reading(rate_hz, skip_s, gaps, axes),
             efficiency=efficiency,
             scales=scales,

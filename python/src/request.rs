@@ -108,7 +108,7 @@ impl Answer {
 
     /// Its verdict, a line each.
     fn verdict(&self) -> Vec<String> {
-        let lines = self.answered.document.verdict.lines.iter();
+        let lines = self.answered.document.verdict.iter();
         lines.map(|line| self.shown(line)).collect()
     }
 
@@ -165,7 +165,6 @@ pub(crate) fn study_run(
             study,
             out: Some(directory),
             shard,
-            states: vec!["all".to_owned()],
             ..BatchRequest::default()
         };
         let outcome = request.run(&|_| None, &Context::new(meter, None));

@@ -1,7 +1,7 @@
 //! A command is a struct of options with inputs and an answer. Words of a command line and requests by name (Python,
 //! studies) become it by the same parser, so that both are refused in the same words.
 
-use super::{Context, Failure, Front, Input, Refuse, Result};
+use super::{Context, Failure, Front, Input, Refuse, Result, refused};
 use crate::io::atomic::{AtomicDir, Claim, Found, claim_directory, claim_file};
 use crate::io::{atomic, input, suggest};
 use crate::parse;
@@ -10,7 +10,7 @@ use clap::builder::ValueParser;
 use clap::{Arg, ArgAction, ArgMatches, FromArgMatches};
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use nav_sim_document::{Document, Form, encode};
+use nav_sim_document::{Document, FORMS, encode};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::any::TypeId;
@@ -42,7 +42,7 @@ pub enum Out {
 }
 
 /// Files that a command reads, by their roles.
-pub type Inputs = Vec<(&'static str, PathBuf)>;
+pub type Inputs = Vec<(String, PathBuf)>;
 
 /// A command: options, inputs, answer.
 pub trait Command: clap::Args + Send + Sync + 'static {
@@ -61,11 +61,13 @@ pub trait Command: clap::Args + Send + Sync + 'static {
     /// Options that do not change the result, such as `--require`.
     const JUDGES: &'static [&'static str] = &[];
 
-    /// Every file that is read, by its role.
+    /// Every file that is read, by its role: those of its path arguments, which have the role of their names.
     ///
     /// # Errors
-    /// When a directory cannot be listed or options do not fit together.
-    fn inputs(&self) -> Result<Inputs>;
+    /// When options do not fit together.
+    fn inputs(&self, given: Inputs) -> Result<Inputs> {
+        Ok(given)
+    }
 
     /// Reads the files and answers; writes nothing.
     ///
@@ -108,16 +110,6 @@ pub trait Answer: Serialize {
     /// The text for stdout, where it is not the document.
     fn text(&self) -> Option<String> {
         None
-    }
-
-    /// All of it as a table for `--format csv`.
-    fn csv(&self) -> Option<String> {
-        None
-    }
-
-    /// The figures of `--plot FILE.svg`.
-    fn svg(&self, document: &Document) -> String {
-        document.svg()
     }
 
     /// The files to be written; of [`Out::File`] their names are endings.
@@ -165,6 +157,7 @@ pub struct Asked<C> {
     plots: Vec<PathBuf>,
     /// Options that decide the result, without paths of files.
     pub(crate) options: BTreeMap<String, Vec<String>>,
+    paths: Vec<(String, PathBuf)>,
 }
 
 const OUT: &str = "out";
@@ -212,6 +205,14 @@ impl<C: Command> FromArgMatches for Asked<C> {
             found.into_iter().flatten().cloned().collect::<Vec<_>>()
         };
         let request = C::from_arg_matches(matches)?;
+        let arguments = C::augment_args(clap::Command::new(C::NAME));
+        let own = arguments.get_arguments().filter(|arg| is_path(arg));
+        let named = own.map(|arg| arg.get_id().as_str());
+        let of_argument = |id| {
+            paths(id)
+                .into_iter()
+                .map(move |path| (str::to_owned(id), path))
+        };
         let by_default = match C::OUT {
             Out::File { name, .. } if request.writes_by_default() => Some(name.into()),
             _ => None,
@@ -220,6 +221,7 @@ impl<C: Command> FromArgMatches for Asked<C> {
             out: paths(OUT).pop().or(by_default),
             plots: paths(PLOT),
             options: options::<C>(matches),
+            paths: named.flat_map(of_argument).collect(),
             request,
         })
     }
@@ -424,12 +426,7 @@ pub fn answered<C: Command>(
             each_file(&answer, page, &mut manifest, &context, keep)?;
         }
         _ => {
-            let table = answer.csv().map(|text| OutputFile::whole(".csv", text));
-            answer
-                .files()
-                .into_iter()
-                .chain(table)
-                .try_for_each(&mut keep)?;
+            answer.files().into_iter().try_for_each(&mut keep)?;
         }
     }
     Ok(Answered {
@@ -483,10 +480,24 @@ const PAGE: &str = "report.html";
 const MANIFEST: &str = "manifest.json";
 
 impl<C: Command> Asked<C> {
+    /// Every file that is read, by its role; those of directories in name order.
+    pub(crate) fn inputs(&self) -> Result<Inputs> {
+        let mut all = Inputs::new();
+        for (role, path) in self.request.inputs(self.paths.clone())? {
+            let is_recording = ["recording", "static"].contains(&role.as_str());
+            let files = match is_recording {
+                true => input::listed(&[path])?,
+                false => vec![path],
+            };
+            all.extend(files.into_iter().map(|file| (role.clone(), file)));
+        }
+        Ok(all)
+    }
+
     /// The manifest before the run: options, seed, contents of inputs.
     pub(crate) fn manifest(&self, seed: Option<u64>) -> Result<Manifest> {
-        let fingerprint = |(role, path): &(&'static str, PathBuf)| input::input(role, path);
-        let inputs = self.request.inputs()?;
+        let fingerprint = |(role, path): &(String, PathBuf)| input::input(role, path);
+        let inputs = self.inputs()?;
         let inputs: Result<Vec<Input>> = inputs.iter().map(fingerprint).collect();
         let mut options = self.options.clone();
         options.extend(seed.map(|seed| ("seed".to_owned(), vec![seed.to_string()])));
@@ -538,10 +549,13 @@ impl<C: Command> Asked<C> {
             _ => {}
         }
         for path in &self.plots {
-            if !is_page(path) {
-                form(path)?;
+            let (kind, form) = (path.to_string_lossy().to_lowercase(), ending(path));
+            if form != PAGE_ENDING && !FORMS.contains(&form.as_str()) {
+                return refused(
+                    format!("{}: not a page or picture", path.display()),
+                    "name a file that ends in .html or .svg (.png with the feature `pictures`)",
+                );
             }
-            let kind = path.to_string_lossy().to_lowercase();
             claims.own.push(claim_file(path, &kind, inputs())?);
         }
         Ok(claims)
@@ -590,7 +604,12 @@ impl<C: Command> Asked<C> {
             _ => {}
         }
         for path in &self.plots {
-            write_plot(path, document, answer.svg(document))?;
+            let form = ending(path);
+            let bytes = match form == PAGE_ENDING {
+                true => document.html().into(),
+                false => encode(document.svg(), &form).map_err(Failure::could_not)?,
+            };
+            atomic::write(path, bytes)?;
             written.push(path.clone());
         }
         Ok(written)
@@ -629,8 +648,7 @@ fn each_file(
 
 /// The bytes of a file: packed where its name ends in `.gz`.
 fn packed(path: &Path, text: String) -> std::io::Result<Vec<u8>> {
-    let is_packed = |ending: &OsStr| ending.eq_ignore_ascii_case("gz");
-    if !path.extension().is_some_and(is_packed) {
+    if ending(path) != "gz" {
         return Ok(text.into_bytes());
     }
     let mut packed = GzEncoder::new(Vec::new(), Compression::default());
@@ -638,36 +656,15 @@ fn packed(path: &Path, text: String) -> std::io::Result<Vec<u8>> {
     packed.finish()
 }
 
-fn is_page(path: &Path) -> bool {
+/// What the name of a page ends in.
+const PAGE_ENDING: &str = "html";
+
+/// The ending of a file's name.
+fn ending(path: &Path) -> String {
     path.extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("html"))
-}
-
-/// The form of a picture, by its name.
-fn form(path: &Path) -> Result<Form> {
-    let (forms, hint) = match cfg!(feature = "pictures") {
-        true => ("SVG or PNG", "name a file that ends in .svg or .png"),
-        false => (
-            "SVG",
-            "name a file that ends in .svg; PNG needs a build with --features pictures",
-        ),
-    };
-    let refused = || {
-        Failure::input(format!(
-            "{}: a picture is written as {forms}",
-            path.display()
-        ))
-    };
-    Form::of(path).ok_or_else(|| refused().hint(hint))
-}
-
-/// Writes a page, or figures in the form that the name says.
-fn write_plot(path: &Path, document: &Document, svg: String) -> Result<()> {
-    if is_page(path) {
-        return atomic::write(path, document.html());
-    }
-    let picture = encode(svg, form(path)?).map_err(Failure::could_not)?;
-    atomic::write(path, picture)
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase()
 }
 
 // `manifest.json`: where a result directory came from, and whether another command makes the same.

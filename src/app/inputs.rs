@@ -1,10 +1,10 @@
 //! Inputs that several commands share: files, settings, outages.
 
-use super::{Context, Failure, Inputs, Refuse, Result, refused};
+use super::{Context, Failure, Refuse, Result, refused};
 use crate::io::model_file::{self, ModelFile, TurnOn};
 use crate::io::recordings::{self, ReadOptions};
 use crate::io::toml_file::Source;
-use crate::io::{input, scenario_file, trajectory_file};
+use crate::io::{scenario_file, trajectory_file};
 use crate::parse;
 use crate::report::readable;
 use nav_sim_navigation::ekf::{BeliefError, FilterStates, InitialSettings};
@@ -106,32 +106,55 @@ pub(crate) fn placed(
 /// Lets the filter expect the turn-on bias that its model states, where settings are silent.
 pub(crate) fn expect_turn_on(
     initial: &mut InitialSettings,
-    file: &ModelFile,
+    stated: Option<TurnOn>,
     path: &Path,
     context: &Context<'_>,
 ) {
-    let set = expected_turn_on(initial, &file.turn_on.unwrap_or_default());
-    tell_turn_on("the filter expects", set, path, context);
+    let (accel, gyro) = (
+        &mut initial.accel_bias_sigma_m_s2,
+        &mut initial.gyro_bias_sigma_rad_s,
+    );
+    set_turn_on(
+        [accel, gyro],
+        stated,
+        context,
+        &format!("{}: the filter expects", path.display()),
+    );
 }
 
 /// Gives the true IMU the turn-on bias that the model of its errors states, where settings are silent; a 0 is a setting.
 pub(crate) fn make_turn_on(
     imu: &mut ImuSettings,
-    file: &ModelFile,
+    stated: Option<TurnOn>,
     path: &Path,
     context: &Context<'_>,
 ) {
-    let set = made_turn_on(imu, &file.turn_on.unwrap_or_default());
-    tell_turn_on("the true IMU has", set, path, context);
+    let (accel, gyro) = (
+        &mut imu.turn_on_bias_accel_m_s2,
+        &mut imu.turn_on_bias_gyro_rad_s,
+    );
+    set_turn_on(
+        [accel, gyro],
+        stated,
+        context,
+        &format!("{}: the true IMU has", path.display()),
+    );
 }
 
-fn tell_turn_on(who: &str, set: [Option<f64>; 2], path: &Path, context: &Context<'_>) {
-    for (sensor, sigma) in Sensor::ALL.into_iter().zip(set) {
-        let Some(sigma) = sigma else { continue };
-        let (shown, sigma, unit) = (path.display(), readable(sigma), sensor.unit());
-        context.remark(format!(
-            "{shown}: {who} a turn-on bias of {sigma} {unit} ({sensor}, standard deviation)"
-        ));
+fn set_turn_on(
+    settings: [&mut Option<f64>; 2],
+    stated: Option<TurnOn>,
+    context: &Context<'_>,
+    who: &str,
+) {
+    for (sensor, setting) in Sensor::ALL.into_iter().zip(settings) {
+        if let (None, Some(sigma)) = (&setting, stated.unwrap_or_default().sigma(sensor)) {
+            *setting = Some(sigma);
+            let (sigma, unit) = (readable(sigma), sensor.unit());
+            context.remark(format!(
+                "{who} a turn-on bias of {sigma} {unit} ({sensor}, standard deviation)"
+            ));
+        }
     }
 }
 
@@ -169,38 +192,26 @@ impl FilterArgs {
 
 /// A value of `--outage`: a window, or that there is none.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum OutageFlag {
-    /// Not even the default ones.
-    None,
-    /// A window without fixes.
-    Window(Outage),
-}
+pub(crate) struct OutageFlag(Option<Outage>);
 
 impl FromStr for OutageFlag {
     type Err = Refused;
 
     fn from_str(text: &str) -> std::result::Result<Self, Refused> {
-        if text == "none" {
-            Ok(Self::None)
-        } else {
-            text.parse().map(Self::Window)
-        }
+        let window = (text != "none").then(|| text.parse());
+        window.transpose().map(Self)
     }
 }
 
 /// The windows among the values of `--outage`, of which "none" stands alone.
 pub(crate) fn windows_of(outages: &[OutageFlag]) -> Result<Vec<Outage>> {
-    if outages.len() > 1 && outages.contains(&OutageFlag::None) {
+    if outages.len() > 1 && outages.contains(&OutageFlag(None)) {
         return refused(
             "--outage none stands beside other outages",
             "give the windows, or none alone",
         );
     }
-    let window = |flag: &OutageFlag| match flag {
-        OutageFlag::None => None,
-        OutageFlag::Window(outage) => Some(*outage),
-    };
-    Ok(outages.iter().filter_map(window).collect())
+    Ok(outages.iter().filter_map(|flag| flag.0).collect())
 }
 
 /// Settings in a TOML file and by key.
@@ -272,20 +283,6 @@ pub(crate) fn merge(into: &mut toml::Table, over: toml::Table) {
     }
 }
 
-/// Files of a list with their role.
-pub(crate) fn files<'a>(
-    role: &'static str,
-    paths: impl IntoIterator<Item = &'a PathBuf>,
-) -> impl Iterator<Item = (&'static str, PathBuf)> {
-    paths.into_iter().map(move |path| (role, path.clone()))
-}
-
-/// Recordings, those of directories in name order, with their role.
-pub(crate) fn listed(role: &'static str, paths: &[PathBuf]) -> Result<Inputs> {
-    let found = input::listed(paths)?;
-    Ok(found.into_iter().map(|path| (role, path)).collect())
-}
-
 /// Why a model has no filter: by the file that is at fault, of the model and the one with the settings; `advice` is on settings.
 pub(crate) fn no_filter(
     e: &BeliefError,
@@ -301,26 +298,4 @@ pub(crate) fn no_filter(
         }
         _ => within(Failure::input(e), model),
     }
-}
-
-/// Lets the filter expect the turn-on bias of its model; settings win. What was set.
-pub(crate) fn expected_turn_on(initial: &mut InitialSettings, stated: &TurnOn) -> [Option<f64>; 2] {
-    [
-        fill(&mut initial.accel_bias_sigma_m_s2, stated, Sensor::Accel),
-        fill(&mut initial.gyro_bias_sigma_rad_s, stated, Sensor::Gyro),
-    ]
-}
-
-/// Gives the true IMU the turn-on bias of the model that makes its errors; settings win, a 0 too. What was set.
-pub(crate) fn made_turn_on(imu: &mut ImuSettings, stated: &TurnOn) -> [Option<f64>; 2] {
-    [
-        fill(&mut imu.turn_on_bias_accel_m_s2, stated, Sensor::Accel),
-        fill(&mut imu.turn_on_bias_gyro_rad_s, stated, Sensor::Gyro),
-    ]
-}
-
-fn fill(setting: &mut Option<f64>, stated: &TurnOn, sensor: Sensor) -> Option<f64> {
-    let sigma = stated.sigma(sensor).filter(|_| setting.is_none());
-    *setting = setting.or(sigma);
-    sigma
 }

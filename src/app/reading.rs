@@ -2,6 +2,7 @@
 
 use crate::app::{Context, Failure};
 use crate::io::logs::LogOptions;
+use crate::io::model_file::known;
 use crate::io::recordings::{Gaps, ReadOptions, Report};
 use crate::io::suggest;
 use crate::parse;
@@ -10,6 +11,7 @@ use nav_sim_document::Importance;
 use nav_sim_logs::Stamp;
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::wavelet::Tuning;
+use serde_json::json;
 use std::str::FromStr;
 
 /// Options for reading recordings.
@@ -103,26 +105,17 @@ impl ReadingRequest {
 
     /// Options that decide which samples are read, for the provenance of a result.
     pub(crate) fn provenance(&self, gaps: Gaps) -> toml::Table {
-        let skip_s = match self.skip_s {
-            Skip::Seconds(s) => s.into(),
-            Skip::Auto => "auto".into(),
-        };
-        let mut table = toml::Table::new();
-        table.insert("skip_s".to_owned(), skip_s);
-        table.insert("gaps".to_owned(), gaps.name().into());
-        if let Some(rate_hz) = self.rate_hz {
-            table.insert("rate_hz_given".to_owned(), rate_hz.into());
-        }
-        if !self.columns.is_empty() {
-            table.insert("columns".to_owned(), self.columns.clone().into());
-        }
-        if let Some(topic) = &self.topic {
-            table.insert("topic".to_owned(), topic.as_str().into());
-        }
-        if self.log.stamp == Stamp::Log {
-            table.insert("stamp".to_owned(), "log".into());
-        }
-        table
+        known(json!({
+            "skip_s": match self.skip_s {
+                Skip::Seconds(s) => json!(s),
+                Skip::Auto => json!("auto"),
+            },
+            "gaps": gaps.name(),
+            "rate_hz_given": self.rate_hz,
+            "columns": (!self.columns.is_empty()).then_some(&self.columns),
+            "topic": self.topic,
+            "stamp": (self.log.stamp == Stamp::Log).then_some("log"),
+        }))
     }
 
     /// Options for the reader of the files.

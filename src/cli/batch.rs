@@ -6,8 +6,9 @@ use crate::commands::batch::{BatchRequest, Outcome};
 use crate::parse;
 use serde_json::json;
 use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 #[derive(clap::Args)]
@@ -21,21 +22,21 @@ pub(crate) struct Args {
 
 /// Runs a study, of a session that it makes stop at a signal or a time.
 pub(crate) fn run(args: &Args, mut session: Session) -> Result<(), Failure> {
-    let flag = |signal| -> Result<Arc<AtomicBool>, Failure> {
-        let flag = Arc::new(AtomicBool::new(false));
-        // A second signal of the kind ends the process at once: whatever is there is whole.
-        signal_hook::flag::register_conditional_default(signal, Arc::clone(&flag))
-            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&flag)))
+    let (is_stopped, signal) = (
+        Arc::new(AtomicBool::new(false)),
+        Arc::new(AtomicUsize::new(0)),
+    );
+    for number in [SIGTERM, SIGINT] {
+        // A second signal ends the process at once: whatever is there is whole.
+        flag::register_conditional_default(number, Arc::clone(&is_stopped))
+            .and_then(|_| flag::register(number, Arc::clone(&is_stopped)))
+            .and_then(|_| flag::register_usize(number, Arc::clone(&signal), number as usize))
             .map_err(Failure::could_not)?;
-        Ok(flag)
-    };
-    let (terminated, interrupted) = (flag(SIGTERM)?, flag(SIGINT)?);
+    }
     let limit = args.time_limit.map(Duration::try_from_secs_f64);
     let deadline = limit.and_then(|limit| Instant::now().checked_add(limit.ok()?));
-    let (is_terminated, is_interrupted) = (Arc::clone(&terminated), Arc::clone(&interrupted));
     session.go_on = Some(Box::new(move || {
-        let is_stopped = [&terminated, &interrupted].map(|flag| flag.load(Ordering::Relaxed));
-        is_stopped == [false; 2] && deadline.is_none_or(|d| Instant::now() < d)
+        !is_stopped.load(Ordering::Relaxed) && deadline.is_none_or(|d| Instant::now() < d)
     }));
     let mut request = args.request.clone();
     request.force = session.common.force;
@@ -43,12 +44,11 @@ pub(crate) fn run(args: &Args, mut session: Session) -> Result<(), Failure> {
     request.set.extend(seed);
     let variable = |name: &str| std::env::var(name).ok();
     let mut outcome = request.run(&variable, &Context::new(&session, None));
+    let signal = signal.load(Ordering::Relaxed) as i32;
     if let Ok(Outcome::Stopped { is_resumable, .. }) = &mut outcome {
-        *is_resumable |= is_terminated.load(Ordering::Relaxed);
+        *is_resumable |= signal == SIGTERM;
     }
-    if matches!(outcome, Err(_) | Ok(Outcome::Stopped { .. }))
-        && is_interrupted.load(Ordering::Relaxed)
-    {
+    if matches!(outcome, Err(_) | Ok(Outcome::Stopped { .. })) && signal == SIGINT {
         return Err(Failure::interrupted("interrupted")
             .hint("the same command goes on where this one stopped"));
     }

@@ -92,7 +92,6 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let request = BatchRequest {
         study,
         out: Some(out.to_owned()),
-        states: ["pos_e_m", "roll_deg"].map(str::to_owned).to_vec(),
         force,
         ..BatchRequest::default()
     };

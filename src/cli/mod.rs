@@ -11,7 +11,7 @@ use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use nav_sim_navigation::lanes::Level;
 use nav_sim_navigation::scenario::Scenario;
 use serde_json::json;
-pub(crate) use session::{Common, Format, Session};
+pub(crate) use session::{Common, Session};
 use std::env::consts::{ARCH, OS};
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
@@ -78,11 +78,6 @@ impl Command {
     }
 
     fn run(self, session: Session) -> Result<(), Failure> {
-        let has_csv = matches!(self, Self::Driven(Driven::Wv(_) | Driven::Compare(_)));
-        if session.common.format == Format::Csv && !has_csv {
-            let failure = Failure::input("--format csv: only wv and compare print CSV");
-            return Err(failure.hint("other commands write CSV files to --out"));
-        }
         let text = match self {
             Self::Driven(driven) => return driven.run(&session),
             Self::Trajectory(args) => match args.command {

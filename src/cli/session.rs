@@ -55,8 +55,6 @@ pub(crate) enum Format {
     #[default]
     Text,
     Json,
-    /// For wv (all scales of all signals) and compare
-    Csv,
 }
 
 /// Surroundings of every command on a terminal: flags, and the progress of the job that runs.
@@ -106,7 +104,6 @@ impl Session {
         self.result(match (self.common.format, text) {
             (Format::Json, _) => json(answer),
             (_, Some(text)) => text,
-            (Format::Csv, _) => answer.csv().unwrap_or_default(),
             _ if self.common.verbose => document.verbose(WIDTH),
             _ => document.terminal(WIDTH),
         });

@@ -8,7 +8,7 @@ use crate::io::fusion_files::{ImuFile, read_gnss, read_imu, read_initial};
 use crate::io::{contamination_file, curve_file, datasheet, scenario_file};
 use crate::parse;
 use crate::report::six_digits;
-use nav_sim_document::{Document, Note, Tone, seconds};
+use nav_sim_document::{Document, Note, Tone};
 use nav_sim_logs::Stamp;
 use nav_sim_navigation::fusion::alignment::moves;
 use nav_sim_navigation::gnss::FixSigma;
@@ -60,7 +60,7 @@ impl Command for CheckFiles {
     const NAME: &'static str = "check";
     const PLOT: bool = false;
 
-    fn inputs(&self) -> Result<Inputs> {
+    fn inputs(&self, _: Inputs) -> Result<Inputs> {
         Ok(Vec::new())
     }
 
@@ -127,53 +127,32 @@ fn drive(imu: &ImuFile, context: &Context<'_>) -> String {
 
 /// Reads a file as what it is, and says what was found.
 fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<String> {
-    Ok(match file_kind::of(path)? {
-        FileKind::Scenario => {
-            format!("a scenario of {} runs", scenario_file::read(path)?.run.runs)
-        }
+    let beside = path.parent().unwrap_or(Path::new(""));
+    let found = match file_kind::of(path)? {
+        FileKind::Scenario => scenario_file::read(path).map(|_| "a scenario")?,
         FileKind::Study => {
-            format!(
-                "a study of {} cells",
-                Study::read(path, &[])?
-                    .cells(path.parent().unwrap_or(Path::new("")))?
-                    .len()
-            )
+            let cells = Study::read(path, &[])?.cells(beside)?.len();
+            return Ok(format!("a study of {cells} cells"));
         }
-        FileKind::Model => {
-            let model = inputs::model(path, context)?.model;
-            let [accel, gyro] = [0, 3].map(|axis| model.axes[axis].labels().join(" + "));
-            let rate_hz = model.rate_hz;
-            format!("a noise model at {rate_hz} Hz, accel {accel}, gyro {gyro}")
-        }
+        FileKind::Model => inputs::model(path, context).map(|_| "a noise model")?,
         FileKind::Log => {
-            let log = inspect(path, Stamp::default())?;
-            let (format, channels) = (log.format, log.channels.len());
-            format!("{format} of {channels} channels (nav-sim inspect lists them)")
+            inspect(path, Stamp::default()).map(|_| "a log (nav-sim inspect lists its channels)")?
         }
         FileKind::CatalogueEntry => {
-            let sheet = datasheet::read(path)?;
-            let (name, figures) = (sheet.name.unwrap_or_default(), sheet.entries.len());
-            format!("a catalogue entry, {name}, of {figures} figures")
+            let name = datasheet::read(path)?.name.unwrap_or_default();
+            return Ok(format!("a catalogue entry, {name}"));
         }
         FileKind::Contamination => {
             // the rate only turns seconds into samples
-            format!(
-                "a contamination of {} operations",
-                contamination_file::find(&path.to_string_lossy(), rate_hz.unwrap_or(100.0))?
-                    .rules
-                    .len()
-            )
+            let found = contamination_file::find(&path.to_string_lossy(), rate_hz.unwrap_or(100.0));
+            found.map(|_| "a contamination")?
         }
-        FileKind::Curve => format!("{} wavelet-variance curves", curve_file::read(path)?.len()),
+        FileKind::Curve => curve_file::read(path).map(|_| "wavelet-variance curves")?,
         FileKind::Record => {
-            "a record that nav-sim wrote beside a result: nothing in it to be checked".to_owned()
+            "a record that nav-sim wrote beside a result: nothing in it to be checked"
         }
-        FileKind::Trajectory => {
-            let trajectory = inputs::trajectory(path, context)?;
-            let span = trajectory.end_s() - trajectory.start_s();
-            format!("a trajectory of {span} s")
-        }
-        FileKind::Initial => format!("an initial state at {} s", read_initial(path)?.t_s),
+        FileKind::Trajectory => inputs::trajectory(path, context).map(|_| "a trajectory")?,
+        FileKind::Initial => read_initial(path).map(|_| "an initial state")?,
         FileKind::Gnss => {
             // standard deviations that no file states are an option of fuse
             let given = FixSigma {
@@ -189,15 +168,9 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
             let (fixes, notes) =
                 read.or_else(|e| read_gnss(path, Some(&given), None, None).map_err(|_| e))?;
             tell(&notes, context);
-            let span = seconds(
-                fixes
-                    .first()
-                    .zip(fixes.last())
-                    .map_or(0.0, |(a, b)| b.t_s - a.t_s),
-            );
-            format!("{} GNSS fixes over {span} s{unsaid}", fixes.len())
+            return Ok(format!("{} GNSS fixes{unsaid}", fixes.len()));
         }
-        FileKind::Imu => drive(&read_imu(path, None, None)?, context),
+        FileKind::Imu => return Ok(drive(&read_imu(path, None, None)?, context)),
         FileKind::Recording => {
             let recordings = match inputs::recordings(&[path.to_owned()], rate_hz, context) {
                 Ok(recordings) => recordings,
@@ -222,7 +195,8 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
                 1 => "a static recording".to_owned(),
                 n => format!("{n} static recordings"),
             };
-            format!("read as {count}, {}", described.join("; "))
+            return Ok(format!("read as {count}, {}", described.join("; ")));
         }
-    })
+    };
+    Ok(found.to_owned())
 }

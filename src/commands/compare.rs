@@ -77,14 +77,14 @@ impl Command for Compare {
         vec!["".into(), ".html".into()]
     }
 
-    fn inputs(&self) -> Result<Inputs> {
+    fn inputs(&self, _: Inputs) -> Result<Inputs> {
         Ok(self
             .runs
             .iter()
             .chain([&self.reference])
             .flat_map(|run| RUN_FILES.map(|name| run.join(name)))
             .filter(|path| path.exists())
-            .map(|path| ("run", path))
+            .map(|path| ("run".to_owned(), path))
             .collect())
     }
 
@@ -244,7 +244,7 @@ fn compared(
             }
         }
     }
-    let label = Label::of(&run, candidate.origin.model.estimator.as_deref());
+    let label = Label::of(&run, candidate.origin.estimator.as_deref());
     let both = candidate
         .experiment
         .epochs
@@ -472,10 +472,6 @@ impl Answer for Comparison {
         })
     }
 
-    fn csv(&self) -> Option<String> {
-        Some(self.rows_csv())
-    }
-
     fn files(&self) -> Vec<OutputFile<'_>> {
         vec![
             OutputFile::whole("", json(self)),
@@ -499,13 +495,13 @@ impl Answer for Comparison {
                 "Mean over the outage of (ASEE ratio − 1)·100 against {}; {INTERVALS}.",
                 self.name_of_reference()
             ));
-            document.lead(self.table());
+            document.table(self.table());
         }
         document.chart(&self.chart(), CAPTION);
         if !self.outages.is_empty() {
             document.section("Consistency and errors");
             document.text("NEES (9 if right) and coverage over the outage; RMSE at its end against the reference, (ratio − 1)·100.");
-            document.table(&self.consistency_table());
+            document.table(self.consistency_table());
         }
         document
     }
@@ -718,17 +714,18 @@ mod tests {
             candidate("II/awv", -75.0, false),
         ];
         let outages = [(300.0, 390.0), (700.0, 790.0)];
-        let table = ratio_table(&all, &[1, 6], &outages).csv();
-        let rows: Vec<&str> = table.lines().collect();
+        let table = ratio_table(&all, &[1, 6], &outages).markdown();
+        let cells = |line: &str| line.split('|').map(str::trim).collect::<Vec<_>>().join(",");
+        let rows: Vec<String> = table.lines().map(cells).collect();
         assert_eq!(
             rows[0],
-            "scenario,outage,East AWV (%),East SR-AWV (%),roll AWV (%),roll SR-AWV (%)"
+            ",scenario,outage,East AWV (%),East SR-AWV (%),roll AWV (%),roll SR-AWV (%),"
         );
         assert_eq!(
-            rows[1],
-            "I,300–390 s,reference,+0.96 ± 0.50,reference,+0.96 ± 0.50"
+            rows[2],
+            ",I,300–390 s,reference,+0.96 ± 0.50,reference,+0.96 ± 0.50,"
         );
-        assert_eq!(rows[4], "II,700–790 s,-75.00 ± 0.50,,-75.00 ± 0.50,");
+        assert_eq!(rows[5], ",II,700–790 s,-75.00 ± 0.50,,-75.00 ± 0.50,,");
     }
 
     #[test]
@@ -739,13 +736,13 @@ mod tests {
             .map(|(k, run)| candidate(run, f64::from(k), false))
             .collect();
         separate(&mut all);
-        let table = ratio_table(&all, &[0], &[(1.0, 2.0), (3.0, 4.0)]).csv();
+        let table = ratio_table(&all, &[0], &[(1.0, 2.0), (3.0, 4.0)]).markdown();
         let rows: Vec<Vec<&str>> = table
             .lines()
-            .skip(1)
-            .map(|line| line.split(',').collect())
+            .skip(2)
+            .map(|line| line.split('|').map(str::trim).collect())
             .collect();
-        let names: Vec<&str> = rows.iter().step_by(2).map(|row| row[0]).collect();
+        let names: Vec<&str> = rows.iter().step_by(2).map(|row| row[1]).collect();
         assert_eq!(
             names,
             ["a/drive", "b/drive", "x/I_awv", "y/I_awv", "c", "c (2)"]

@@ -1,7 +1,6 @@
 //! `nav-sim datasheet`: models from data sheets, and the catalogue of IMUs.
 
-use crate::app::inputs::files;
-use crate::app::{Answer, Command, Context, Failure, Inputs, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
 use crate::io::datasheet::{CATALOGUE, Datasheet, Entry, Figure, Quantity, catalogued, read};
 use crate::io::model_file::{self, ModelFile};
 use crate::io::suggest::nearest;
@@ -9,7 +8,7 @@ use crate::parse;
 use nav_sim_document::{Document, Tone};
 use nav_sim_signal::imu::Sensor;
 use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// Make a noise model from the figures of a data sheet, in their own units: an assumption, not a calibration
@@ -46,7 +45,7 @@ pub enum DatasheetAnswer {
     /// The model.
     Model(Box<ModelFile>),
     /// The catalogue as JSON.
-    Catalogue(Vec<CataloguedUnit>),
+    Catalogue(Vec<Value>),
 }
 
 impl Command for DatasheetArgs {
@@ -59,16 +58,12 @@ impl Command for DatasheetArgs {
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
 
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(files("entry", &self.entry).collect())
-    }
-
     fn run(&self, context: &Context<'_>) -> Result<DatasheetAnswer> {
         if self.list {
             return Ok(DatasheetAnswer::Catalogue(
                 CATALOGUE
                     .iter()
-                    .map(|(name, _)| CataloguedUnit::named(name))
+                    .map(|(name, _)| catalogued_unit(name))
                     .collect::<Result<_>>()?,
             ));
         }
@@ -90,10 +85,6 @@ impl Command for DatasheetArgs {
             .flat_map(|sensor| lacking(&sheet, sensor))
             .chain(made.doubts)
             .for_each(|doubt| context.warn(doubt));
-        Sensor::ALL
-            .into_iter()
-            .flat_map(|sensor| left_out(&sheet, sensor))
-            .for_each(|note| context.remark(note));
         context.remark("an assumption, not a calibration");
         Ok(DatasheetAnswer::Model(Box::new(made.file)))
     }
@@ -121,7 +112,7 @@ impl Answer for DatasheetAnswer {
         match self {
             Self::Model(_) => None,
             Self::Catalogue(units) => {
-                let lines: Vec<String> = units.iter().map(CataloguedUnit::text).collect();
+                let lines: Vec<String> = units.iter().map(text).collect();
                 Some(lines.join("\n"))
             }
         }
@@ -224,65 +215,32 @@ fn lacking(sheet: &Datasheet, sensor: Sensor) -> impl Iterator<Item = String> {
         .map(move |(_, name, flag)| format!("{sensor}: no {name} is given (--{flag})"))
 }
 
-fn left_out(sheet: &Datasheet, sensor: Sensor) -> Vec<String> {
-    let name = sensor.name();
-    let offset = sheet.given(sensor, Figure::Offset).map(|offset| {
-        format!("{name}: the zero offset of ±{offset} is removed before use and not in the model")
-    });
-    let scale = sheet.value(sensor, Figure::Scale).map(|ppm| {
-        format!("{name}: the scale factor of {ppm} ppm is not in the model: run --scale-ppm")
-    });
-    offset.into_iter().chain(scale).collect()
-}
-
-/// A catalogued unit.
-#[derive(Serialize)]
-pub struct CataloguedUnit {
-    unit: &'static str,
-    name: Option<String>,
-    class: Option<String>,
-    figures: Vec<GivenFigure>,
-}
-
-/// A figure of its data sheet.
-#[derive(Serialize)]
-struct GivenFigure {
-    sensor: Sensor,
-    figure: &'static str,
-    given: String,
-    source: Option<String>,
-}
-
-impl CataloguedUnit {
-    fn named(name: &'static str) -> Result<Self> {
-        let sheet = named(name)?;
-        let figure = |e: Entry| GivenFigure {
-            sensor: e.sensor,
-            figure: e.figure.name(),
-            given: e.quantity.given,
-            source: e.source,
-        };
-        Ok(Self {
-            unit: name,
-            name: sheet.name,
-            class: sheet.class,
-            figures: sheet.entries.into_iter().map(figure).collect(),
+/// A catalogued unit with the figures of its data sheet.
+fn catalogued_unit(name: &str) -> Result<Value> {
+    let sheet = named(name)?;
+    let figure = |e: &Entry| {
+        json!({
+            "sensor": e.sensor,
+            "figure": e.figure.name(),
+            "given": e.quantity.given,
+            "source": e.source,
         })
-    }
+    };
+    let figures: Value = sheet.entries.iter().map(figure).collect();
+    Ok(json!({ "unit": name, "name": sheet.name, "class": sheet.class, "figures": figures }))
+}
 
-    fn text(&self) -> String {
-        let [class, name] =
-            [&self.class, &self.name].map(|text| text.as_deref().unwrap_or_default());
-        let figures = |sensor: Sensor| {
-            let shown: Vec<_> = self
-                .figures
-                .iter()
-                .filter(|f| f.sensor == sensor)
-                .map(|f| format!("{} {}", f.figure, f.given))
-                .collect();
-            format!("\n  {sensor:<5} {}", shown.join(", "))
-        };
-        let figures = Sensor::ALL.map(figures).concat();
-        format!("{:<12} {class:<12} {name}{figures}", self.unit)
-    }
+/// The unit, and a line of figures for each sensor.
+fn text(unit: &Value) -> String {
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    let figures = |sensor: Sensor| {
+        let own = unit["figures"].as_array().into_iter().flatten();
+        let own = own.filter(|f| f["sensor"] == sensor.name());
+        let shown: Vec<_> = own
+            .map(|f| text(&f["figure"]) + " " + &text(&f["given"]))
+            .collect();
+        format!("\n  {sensor:<5} {}", shown.join(", "))
+    };
+    let [name, class, title] = ["unit", "class", "name"].map(|key| text(&unit[key]));
+    format!("{name:<12} {class:<12} {title}") + &Sensor::ALL.map(figures).concat()
 }

@@ -1,7 +1,7 @@
 //! `nav-sim design`: the interval that recordings not made yet would give.
 
-use crate::app::inputs::{self, OutageFlag, files};
-use crate::app::{Answer, Command, Context, Failure, Inputs, Result};
+use crate::app::inputs::{self, OutageFlag};
+use crate::app::{Answer, Command, Context, Failure, Result};
 use crate::commands::calibrate::ESTIMATORS;
 use crate::commands::run::{NavigateInputs, TrueImu, navigate};
 use crate::io::draws_file::DrawsFile;
@@ -72,12 +72,6 @@ const LONGEST_H: f64 = 8766.0;
 impl Command for Design {
     type Answer = Designs;
     const NAME: &'static str = "design";
-
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(files("model", [&self.model])
-            .chain(files("trajectory", &self.trajectory))
-            .collect())
-    }
 
     fn run(&self, context: &Context<'_>) -> Result<Designs> {
         if self.hours.is_some_and(|hours| hours > LONGEST_H) {
@@ -235,7 +229,7 @@ fn destination_quantiles(
     outcomes
         .iter()
         .for_each(|outcome| outcome.put_into(&mut inputs.model));
-    let draws = DrawsFile::of(&outcomes.iter().collect::<Vec<_>>(), rate_hz);
+    let draws = DrawsFile::of(outcomes, rate_hz);
     inputs.model_draws = draws.and_then(|draws| draws.draws(&inputs.model));
     let found = navigate(inputs, scenario, outages, 0, &Context::default())?;
     let quantile = |o: &OutageSummary| {
@@ -422,10 +416,10 @@ impl Answer for Designs {
             document.note(Importance::Remark, text);
         }
         document.note(Importance::Remark, STATED);
-        document.lead(self.lead());
+        document.table(self.lead());
         if designs.iter().any(|d| !d.horizontal_p95.is_empty()) {
             document.section("What that is in navigation");
-            document.table(&Table::of(
+            document.table(Table::of(
                 self,
                 "/designs/*/horizontal_p95/*",
                 &[
@@ -439,26 +433,6 @@ impl Answer for Designs {
                 ],
             ));
         }
-        if designs.len() > 1 {
-            document.section("All parameters");
-            let plan = |(i, d): (usize, &DesignOutcome)| {
-                (
-                    format!("{} × {} h (± %)", d.recordings, d.hours),
-                    format!("../../../{i}/parameters/@/half_width_pct|not determined"),
-                )
-            };
-            let plans: Vec<_> = designs.iter().enumerate().map(plan).collect();
-            let mut columns = vec![("parameter", "{signals} {parameter}"), ("value", "value")];
-            columns.extend(
-                plans
-                    .iter()
-                    .map(|(title, key)| (title.as_str(), key.as_str())),
-            );
-            document.table(&Table::of(self, "/designs/0/parameters/*", &columns));
-        }
-        document.checked(
-            "against 150 calibrations of synthetic recordings, within four deviations of the scatter (27 %).",
-        );
         document
     }
 }

@@ -1,8 +1,7 @@
 //! `nav-sim inspect`: the channels of a log with their rates, gaps and spans.
 
-use crate::app::inputs::files;
 use crate::app::reading::LogRequest;
-use crate::app::{Answer, Command, Context, Inputs, Result};
+use crate::app::{Answer, Command, Context, Result};
 use crate::io::logs;
 use nav_sim_document::{Document, Importance, Table, Tone, six_digits};
 use nav_sim_logs::{Channel, Content, Error, Log, Stamp};
@@ -24,7 +23,7 @@ Examples:
   nav-sim inspect calib_data/formats/log.mcap --stamp log")]
 pub struct Inspect {
     /// Log
-    #[arg(value_name = "FILE")]
+    #[arg(id = "log", value_name = "FILE")]
     file: PathBuf,
     /// How it is read.
     #[command(flatten)]
@@ -35,10 +34,6 @@ impl Command for Inspect {
     type Answer = Inspection;
     const NAME: &'static str = "inspect";
     const PLOT: bool = false;
-
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(files("log", [&self.file]).collect())
-    }
 
     fn run(&self, _: &Context<'_>) -> Result<Inspection> {
         inspect(&self.file, self.log.stamp)
@@ -207,7 +202,7 @@ impl Answer for Inspection {
             ("jitter (s)", "jitter_s"),
             ("units", "units"),
         ];
-        document.lead(Table::of(self, "/channels/*", &columns));
+        document.table(Table::of(self, "/channels/*", &columns));
         if let Some(damage) = &self.damage {
             document.note(Importance::Warning, damage.as_str());
         }

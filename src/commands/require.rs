@@ -1,6 +1,6 @@
 //! The IMU that a limit needs, what a given one makes of it, and a ranking of several.
 
-use crate::app::inputs::{self, ScenarioArgs, files};
+use crate::app::inputs::{self, ScenarioArgs};
 use crate::app::{
     Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, refused,
 };
@@ -124,7 +124,7 @@ impl Command for Require {
         )
     }
 
-    fn inputs(&self) -> Result<Inputs> {
+    fn inputs(&self, mut given: Inputs) -> Result<Inputs> {
         if let (Ask::Window(outage), Some(start_s)) = (self.outage, self.start) {
             let Outage {
                 start_s: from,
@@ -141,11 +141,8 @@ impl Command for Require {
                 "without one, give a length in seconds",
             );
         }
-        Ok(files("trajectory", [&self.trajectory])
-            .chain(files("model", &self.model))
-            .chain(files("scenario", &self.settings.scenario))
-            .chain(files("gnss", &self.gnss))
-            .collect())
+        given.retain(|(role, _)| role != "catalogue");
+        Ok(given)
     }
 
     fn run(&self, context: &Context<'_>) -> Result<RequireAnswer> {
@@ -247,8 +244,8 @@ impl Requirements {
         let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
         let file = inputs::model(path, context)?;
         let mut scenario = self.scenario.clone();
-        inputs::expect_turn_on(&mut scenario.initial, &file, path, context);
-        inputs::make_turn_on(&mut scenario.imu, &file, path, context);
+        inputs::expect_turn_on(&mut scenario.initial, file.turn_on, path, context);
+        inputs::make_turn_on(&mut scenario.imu, file.turn_on, path, context);
         let missing = missing(&file.not_stated());
         if !missing.is_empty() {
             context.warn(format!(
@@ -340,9 +337,6 @@ const CURVE_S: [u32; 7] = [1, 3, 10, 30, 60, 120, 300];
 const LONGEST_S: f64 = 600.0;
 /// What confirms a figure of covariance analysis.
 const CONFIRM: &str = "confirm with nav-sim run --method both";
-/// Last line of each page.
-const CHECKED: &str = "covariance analysis against sampled runs: docs/validation.md.";
-
 /// Warns of an outage in which errors are beyond linear theory.
 fn note_beyond(beyond: Option<Outage>, document: &mut Document) {
     if let Some(Outage { start_s, end_s }) = beyond {
@@ -443,9 +437,6 @@ pub struct NeededImu {
     worst: Worst,
     /// The outage of the answer, where it is beyond linear theory.
     beyond_linear: Option<Outage>,
-    /// With equal shares.
-    #[serde(skip)]
-    imu: ImuParameters,
     #[serde(skip)]
     file: ModelFile,
 }
@@ -491,13 +482,6 @@ impl NeededImu {
         ];
         let mut document = Document::new("The IMU that a limit needs", Tone::Good, lines);
         note_beyond(self.beyond_linear, &mut document);
-        let (from_s, to_s) = self.imu.floor_s();
-        let floor = format!(
-            "bias instability: floor of the Allan deviation, here {} to {} s",
-            readable(from_s),
-            readable(to_s)
-        );
-        document.note(Importance::Detail, floor);
         document.section("Figures, at most");
         document.text("If alone: without any other error of the IMU. Others 10 × better: every other figure ten times smaller.");
         let columns = [
@@ -506,8 +490,7 @@ impl NeededImu {
             ("if alone", "alone"),
             ("others 10 × better", "others_10_times_better"),
         ];
-        document.lead(Table::of(self, "/figures/*", &columns));
-        document.checked(CHECKED);
+        document.table(Table::of(self, "/figures/*", &columns));
         document
     }
 }
@@ -646,7 +629,6 @@ impl Requirements {
             beyond_linear: self.beyond_linear(scenario, &model, outages[worst.place])?,
             question: self.question(outages),
             worst,
-            imu,
             file: ModelFile::new(model),
         };
         let mut provenance = known(json!({
@@ -663,29 +645,25 @@ impl Requirements {
                 .map(|f| (f.figure.to_owned(), f.allocated.into())),
         );
         needed.file.provenance = Some(provenance);
-        let stated = self.stated_turn_on();
-        needed.file.turn_on = (stated != TurnOn::default()).then_some(stated);
+        needed.file.turn_on = self.stated_turn_on();
         Ok(needed)
     }
 
     /// The scenario with a filter that expects the turn-on biases that `[imu]` states, as it expects those of a model file.
     fn with_stated_turn_on(&self) -> Scenario {
         let mut scenario = self.scenario.clone();
-        inputs::expected_turn_on(&mut scenario.initial, &self.stated_turn_on());
+        let (stated, silent) = (self.stated_turn_on(), Context::default());
+        inputs::expect_turn_on(&mut scenario.initial, stated, Path::new(""), &silent);
         scenario
     }
 
-    fn stated_turn_on(&self) -> TurnOn {
-        let sigma = |sensor| {
-            self.scenario
-                .imu
-                .turn_on_bias(sensor)
-                .map(|sigma| [sigma; 3])
-        };
-        TurnOn {
+    fn stated_turn_on(&self) -> Option<TurnOn> {
+        let sigma = |sensor| Some([self.scenario.imu.turn_on_bias(sensor)?; 3]);
+        let stated = TurnOn {
             accel_m_s2: sigma(Sensor::Accel),
             gyro_rad_s: sigma(Sensor::Gyro),
-        }
+        };
+        (stated != TurnOn::default()).then_some(stated)
     }
 
     /// Errors after outages of growing length, at the places that the outage asked for has, each as far as the trajectory
@@ -872,9 +850,9 @@ impl Requirements {
     /// A unit whose turn-on biases are there and expected; `model` is at the rate of the IMU.
     fn unit(&self, name: String, file: &ModelFile, model: Model) -> CatalogueUnit {
         let mut scenario = self.scenario.clone();
-        let stated = file.turn_on.unwrap_or_default();
-        inputs::expected_turn_on(&mut scenario.initial, &stated);
-        inputs::made_turn_on(&mut scenario.imu, &stated);
+        let (path, silent) = (Path::new(&name), Context::default());
+        inputs::expect_turn_on(&mut scenario.initial, file.turn_on, path, &silent);
+        inputs::make_turn_on(&mut scenario.imu, file.turn_on, path, &silent);
         CatalogueUnit {
             name,
             model,
@@ -1068,15 +1046,14 @@ impl GivenImu {
                 ("limit", "limit"),
                 ("longest outage within the limits", "outage/text"),
             ];
-            document.lead(Table::of(self, "/aidings/*", &columns));
+            document.table(Table::of(self, "/aidings/*", &columns));
         }
         document.section("Error against the length of an outage");
-        document.table(&Table::of(
+        document.table(Table::of(
             self,
             "/curves/*",
             &[("limit on", "quantity"), AFTER],
         ));
-        document.checked(CHECKED);
         document
     }
 }
@@ -1164,15 +1141,14 @@ impl Ranking {
             ("bridges", "outage/text"),
             ("{outage_s} s", "curves/0/points/*/value"),
         ];
-        document.lead(Table::of(self, "/units/*", &columns));
+        document.table(Table::of(self, "/units/*", &columns));
         document.section("Figures that are missing");
-        document.table(&Table::of(
+        document.table(Table::of(
             self,
             "/units/*",
             &[("unit", "unit"), ("not stated", "missing")],
         ));
         document.text(RULE);
-        document.checked(CHECKED);
         document
     }
 }

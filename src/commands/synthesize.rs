@@ -57,6 +57,9 @@ pub struct Synthesize {
     axes: Vec<ChannelSet>,
 }
 
+/// Samples of a recording, at most.
+const MOST: f64 = 1e9;
+
 /// Recordings whose models are drawn; their noise is drawn as they are written.
 #[derive(Debug, Serialize)]
 pub struct Synthesis {
@@ -94,15 +97,14 @@ impl Command for Synthesize {
     const PLOT: bool = false;
     const PAGE: bool = false;
 
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(self
+    fn inputs(&self, mut given: Inputs) -> Result<Inputs> {
+        let file = self
             .contaminate
             .iter()
             .map(PathBuf::from)
-            .filter(|path| path.exists())
-            .map(|path| ("contamination", path))
-            .chain([("model", self.model.clone())])
-            .collect())
+            .find(|path| path.exists());
+        given.extend(file.map(|path| ("contamination".to_owned(), path)));
+        Ok(given)
     }
 
     fn output_names(&self) -> Vec<Cow<'static, str>> {
@@ -118,11 +120,6 @@ impl Command for Synthesize {
                 "see the head of calib_data/consumer_mems.toml, or leave --spread out",
             );
         }
-        if file.turn_on.is_some() {
-            context.remark(format!(
-                "{shown}: its turn-on biases are not drawn: recordings are of noise about their mean"
-            ));
-        }
         let contamination = self
             .contaminate
             .as_deref()
@@ -134,17 +131,9 @@ impl Command for Synthesize {
             Some(s) => (s * rate_hz).round(),
             None => self.samples.unwrap_or(524_284) as f64,
         };
-        if samples < 2.0 {
+        if !(2.0..=MOST).contains(&samples) {
             return Err(Failure::input(format!(
-                "a recording needs at least 2 samples; these are {samples}"
-            )));
-        }
-        let bytes = samples * channels.len() as f64 * 8.0;
-        if bytes >= isize::MAX as f64 || Vec::<u8>::new().try_reserve_exact(bytes as usize).is_err()
-        {
-            let gigabytes = bytes / 1e9;
-            return Err(Failure::could_not(format!(
-                "{samples} samples need {gigabytes:.0} GB of memory"
+                "a recording has 2 to {MOST:e} samples; these are {samples}"
             )));
         }
         let mut synthesis = Synthesis {

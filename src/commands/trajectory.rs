@@ -1,8 +1,6 @@
 //! `nav-sim trajectory`: reference trajectories.
 
-use crate::app::{
-    Answer, Asked, Command, Context, Failure, Inputs, Out, OutputFile, Result, inputs,
-};
+use crate::app::{Answer, Asked, Command, Context, Failure, Out, OutputFile, Result, inputs};
 use crate::io::scenario_file;
 use crate::io::trajectory_file::{self, Instants, Options, parse_origin};
 use crate::parse;
@@ -63,7 +61,7 @@ Examples:
 #[derive(clap::Args, Debug)]
 struct Source {
     /// Motion profile (.toml) or table (.csv, .tsv, .txt, also .gz)
-    #[arg(value_name = "TRAJECTORY")]
+    #[arg(id = "trajectory", value_name = "TRAJECTORY")]
     path: PathBuf,
     /// Origin of local coordinates, if the file does not state it: latitude, longitude, height
     #[arg(long, value_name = "LAT_DEG,LON_DEG,H_M", value_parser = origin, allow_hyphen_values = true)]
@@ -87,10 +85,6 @@ impl Source {
         let read = trajectory_file::load(&self.path, &Options { origin })?;
         context.warn_each(&read.1);
         Ok(read)
-    }
-
-    fn input(&self) -> (&'static str, PathBuf) {
-        ("trajectory", self.path.clone())
     }
 }
 
@@ -134,10 +128,6 @@ impl Command for Convert {
     };
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
-
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(vec![self.source.input()])
-    }
 
     fn run(&self, context: &Context<'_>) -> Result<TrajectoryTable> {
         let (trajectory, _) = self.source.read(context)?;
@@ -185,10 +175,6 @@ impl Command for CheckTrajectory {
     const NAME: &'static str = "trajectory check";
     const PLOT: bool = false;
 
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(vec![self.source.input()])
-    }
-
     fn run(&self, context: &Context<'_>) -> Result<TrajectoryCheck> {
         let (trajectory, warnings) = self.source.read(context)?;
         let mut limits = LIMITS;
@@ -201,12 +187,6 @@ impl Command for CheckTrajectory {
         let name = self.source.path.display().to_string();
         for excess in beyond.iter().take(SAID) {
             context.warn(format!("{name}: {excess}"));
-        }
-        if beyond.len() > SAID {
-            let more = beyond.len() - SAID;
-            context.warn(format!(
-                "{name}: and {more} more stretches beyond limits (--format json lists all)"
-            ));
         }
         let closure = Closure::new(&trajectory, self.rate_hz, GravityModel::default())
             .map_err(|e| Failure::input(format!("{name}: {e}")).hint("give another --rate-hz"))?;
@@ -230,10 +210,8 @@ impl Command for CheckTrajectory {
             limits: motion(limits),
             beyond_limits: beyond.iter().map(ToString::to_string).collect(),
             warnings,
-            closure: Closed {
-                closure,
-                within_bounds: closure.within(&bounds),
-            },
+            within_bounds: closure.within(&bounds),
+            closure,
             bounds,
         })
     }
@@ -252,15 +230,9 @@ pub struct TrajectoryCheck {
     limits: Value,
     beyond_limits: Vec<String>,
     warnings: Vec<String>,
-    closure: Closed,
-    bounds: Bounds,
-}
-
-#[derive(Serialize)]
-struct Closed {
-    #[serde(flatten)]
     closure: Closure,
     within_bounds: bool,
+    bounds: Bounds,
 }
 
 impl Answer for TrajectoryCheck {
@@ -288,7 +260,7 @@ impl Answer for TrajectoryCheck {
             ("velocity (m/s)", "closure/velocity_m_s bounds/velocity_m_s"),
             ("attitude (rad)", "closure/attitude_rad bounds/attitude_rad"),
         ];
-        let c = &self.closure.closure;
+        let c = &self.closure;
         let text = format!(
             "{}: {} s from {} s, {} points\nclosure at {} Hz over {} s: {}\n{}",
             self.file,
@@ -297,7 +269,7 @@ impl Answer for TrajectoryCheck {
             self.points,
             c.rate_hz,
             c.duration_s,
-            if self.closure.within_bounds {
+            if self.within_bounds {
                 "within bounds"
             } else {
                 "BEYOND A BOUND"
@@ -309,8 +281,8 @@ impl Answer for TrajectoryCheck {
 
     fn unmet(&self) -> Option<Failure> {
         let (mut missed, mut hints) = (Vec::new(), Vec::new());
-        if !self.closure.within_bounds {
-            let (c, b) = (&self.closure.closure, &self.bounds);
+        if !self.within_bounds {
+            let (c, b) = (&self.closure, &self.bounds);
             missed.push(format!(
                 "closure at {} Hz is {:.3e} m, {:.3e} m/s, {:.3e} rad, beyond {:e} m, {:e} m/s or {:e} rad",
                 c.rate_hz,
@@ -381,13 +353,6 @@ impl Command for Record {
     const PLOT: bool = false;
     const PAGE: bool = false;
 
-    fn inputs(&self) -> Result<Inputs> {
-        Ok([self.source.input(), ("model", self.model.clone())]
-            .into_iter()
-            .chain(inputs::files("scenario", &self.scenario))
-            .collect())
-    }
-
     fn run(&self, context: &Context<'_>) -> Result<RecordedDrive> {
         let mut scenario = self
             .scenario
@@ -399,7 +364,7 @@ impl Command for Record {
         let file = inputs::model(&self.model, context)?;
         let model = continuous::at_rate(&file.model, scenario.imu.rate_hz)
             .map_err(|e| Failure::input(format!("{}: {e}", self.model.display())))?;
-        inputs::make_turn_on(&mut scenario.imu, &file, &self.model, context);
+        inputs::make_turn_on(&mut scenario.imu, file.turn_on, &self.model, context);
         let seed = context.seed_or(scenario.run.seed);
         // a recording is what IMU and receiver give: neither barometer nor wheel, no filter
         let scenario = Scenario {

@@ -1,6 +1,6 @@
 //! `nav-sim tune`: the smallest factors on the variances of a noise model that make its filter consistent with other truths.
 
-use crate::app::inputs::{self, SettingsArgs, files};
+use crate::app::inputs::{self, SettingsArgs};
 use crate::app::{
     Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Result, refused,
 };
@@ -9,7 +9,7 @@ use crate::io::model_file::{self, ModelFile, PROGRAM, known};
 use crate::parse;
 use crate::report::in_order;
 use nav_sim_calibration::derived_interval;
-use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds, short_names};
+use nav_sim_document::{Document, Table, Tone, readable, seconds, short_names};
 use nav_sim_navigation::ekf::{BeliefError, FilterStates};
 use nav_sim_navigation::metrics::{PerState, VerdictKind};
 use nav_sim_navigation::scenario::Scenario;
@@ -79,16 +79,12 @@ impl Command for Tune {
         help: "Model file to write",
     };
 
-    fn inputs(&self) -> Result<Inputs> {
+    fn inputs(&self, mut given: Inputs) -> Result<Inputs> {
         self.refuse_recordings()?;
         let draws = draws_file::beside(&self.model);
-        let draws = (self.intervals && draws.exists()).then_some(draws);
-        Ok(files("model", [&self.model])
-            .chain(files("draws", &draws))
-            .chain(files("truth", &self.truths))
-            .chain(files("trajectory", &self.trajectory))
-            .chain(files("scenario", &self.settings.file.scenario))
-            .collect())
+        let is_read = self.intervals && draws.exists();
+        given.extend(is_read.then(|| ("draws".to_owned(), draws)));
+        Ok(given)
     }
 
     fn run(&self, context: &Context<'_>) -> Result<TuneAnswer> {
@@ -101,7 +97,7 @@ impl Command for Tune {
         }
         let file = inputs::model(&self.model, context)?;
         let model = inputs::at_rate(&self.model, &file.model, scenario.imu.rate_hz, context)?;
-        inputs::expect_turn_on(&mut scenario.initial, &file, &self.model, context);
+        inputs::expect_turn_on(&mut scenario.initial, file.turn_on, &self.model, context);
         let truths = self.truths((&file, &model), &scenario, context)?;
         let (track, outages) = self.track(&scenario, &model, context)?;
         let found = self.tune(&scenario, &model, truths, &track, &outages);
@@ -148,7 +144,7 @@ impl Tune {
     ) -> Result<Truths> {
         let true_errors = |path: &Path, model: Model, turned_on: &ModelFile| {
             let (mut imu, gnss) = (scenario.imu.clone(), scenario.gnss.clone());
-            inputs::make_turn_on(&mut imu, turned_on, path, context);
+            inputs::make_turn_on(&mut imu, turned_on.turn_on, path, context);
             TrueErrors {
                 model,
                 imu,
@@ -237,8 +233,6 @@ impl Tune {
                 Failure::input("no built-in drive for this receiver")
                     .hint("give a trajectory with --trajectory")
             })?;
-            let text = "along a built-in drive with outages as long; --trajectory takes another";
-            context.remark(text.to_owned());
             return Ok((track, outages));
         };
         let trajectory = inputs::trajectory(path, context)?;
@@ -329,7 +323,6 @@ impl Tune {
             full: &full,
             filter: &tuned,
             aim: self.aim,
-            allow_smaller: false,
         };
         let factors = task.factors()?;
         let ones: Vec<Factor> = factors
@@ -669,27 +662,8 @@ impl Answer for TuneAnswer {
             None => Tone::Doubtful,
         };
         let mut document = Document::new("Factors on a noise model", tone, self.verdict());
-        if found == VerdictKind::Underconfident && self.aim == Aim::Worst {
-            let why = "no error exceeds its sigma in any truth; --for mean aims at the right NEES in the mean";
-            document.note(Importance::Remark, why);
-        }
-        if self
-            .of_run
-            .as_ref()
-            .is_some_and(|of_run| kind(of_run) == VerdictKind::Overconfident)
-        {
-            let states = self.filter_of_run;
-            document.note(
-                Importance::Remark,
-                format!("--filter {states} tunes the default of run"),
-            );
-        }
-        if self.is_drawn {
-            let counted = "errors count up to the upper end of the 95 % interval that run states";
-            document.note(Importance::Remark, counted);
-        }
         let truths: Vec<&str> = self.truths.iter().map(String::as_str).collect();
-        document.facts(&[("truths", short_names(&truths).join(", "))]);
+        document.text(&format!("truths: {}", short_names(&truths).join(", ")));
         document.section("Filters");
         let nees = format!("NEES ({NEES_DOF})");
         let columns = [
@@ -700,7 +674,7 @@ impl Answer for TuneAnswer {
             ("in", "place"),
             ("RMSE {after_s} s (m)", "outage_end/*/horizontal_rmse_m"),
         ];
-        document.lead(Table::of(self, "/filters/*", &columns));
+        document.table(Table::of(self, "/filters/*", &columns));
         document.text("RMSE/sigma: largest error over what the filter states. RMSE: horizontal, at the end of an outage.");
         document.section("Factors");
         let columns = [
@@ -708,8 +682,7 @@ impl Answer for TuneAnswer {
             ("factor on the variance", "on_variance"),
             ("on the standard deviation", "on_sigma"),
         ];
-        document.table(&Table::of(self, "/factors/*", &columns));
-        document.checked("covariance analysis against 2000 Monte-Carlo runs: docs/validation.md.");
+        document.table(Table::of(self, "/factors/*", &columns));
         document
     }
 
@@ -822,11 +795,11 @@ mod tests {
     #[test]
     fn the_colour_is_that_of_the_worst_word() {
         let mut tuned = result(FilterStates::Reduced15, consistency(1.0, 8.8));
-        assert_eq!(tuned.document().verdict.tone, Tone::Doubtful);
+        assert_eq!(tuned.document().tone, Tone::Doubtful);
         tuned.after.range[0] = 0.756;
         let document = tuned.document();
         assert!(
-            document.verdict.lines[1].contains("is underconfident: errors 0.756 to"),
+            document.verdict[1].contains("is underconfident: errors 0.756 to"),
             "{document:?}"
         );
         assert!(
@@ -835,12 +808,12 @@ mod tests {
         );
         tuned.factors[0].on_variance = 1.0;
         (tuned.before, tuned.after) = (consistency(1.0, 9.0), consistency(1.0, 9.0));
-        assert_eq!(tuned.document().verdict.tone, Tone::Good);
+        assert_eq!(tuned.document().tone, Tone::Good);
         (tuned.before.range, tuned.after.range) = ([0.8, 0.9], [0.8, 0.9]);
         let document = tuned.document();
         assert!(
-            document.verdict.tone == Tone::Doubtful
-                && document.verdict.lines[0].starts_with("no factor is needed")
+            document.tone == Tone::Doubtful
+                && document.verdict[0].starts_with("no factor is needed")
         );
     }
 

@@ -139,8 +139,6 @@ pub enum Mark {
     Line(Vec<(f64, f64)>, Stroke),
     /// The area between two curves (x, low, high).
     Band(Vec<(f64, f64, f64)>),
-    /// The same, darker, within another.
-    InnerBand(Vec<(f64, f64, f64)>),
     /// Points with error bars.
     Points(Vec<Interval>),
     /// A line at one value of y.
@@ -149,8 +147,6 @@ pub enum Mark {
     Zone(f64, f64),
     /// A dot with its name beside it, at (x, y); not in the legend.
     Place(f64, f64),
-    /// The same, with lines to both axes: a value that is read off a curve, such as N at 1 s of an Allan deviation.
-    Reading(f64, f64),
 }
 
 /// Something to see and its name in the legend. Series of one name, in all panels, are one entry there.

@@ -26,15 +26,6 @@ impl From<bool> for Tone {
     }
 }
 
-/// The answer to the question that was asked.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Banner {
-    /// Its colour.
-    pub tone: Tone,
-    /// One sentence each, of at most 120 characters, the answer first.
-    pub lines: Vec<String>,
-}
-
 /// Rank of a note among others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Importance {
@@ -60,25 +51,14 @@ pub struct Note {
 pub enum Block {
     /// The beginning of a section.
     Section(String),
-    /// A heading within a section.
-    Heading(String),
     /// A paragraph.
     Text(String),
-    /// Names and what they are, line by line.
-    Facts(Vec<(String, String)>),
-    /// A table; the lead is the one that a terminal shows.
-    Table {
-        /// The table.
-        table: Table,
-        /// Whether a terminal shows it without being asked for more.
-        is_lead: bool,
-    },
+    /// A table; a terminal shows the first one.
+    Table(Table),
     /// Charts, side by side where they are small, and what is to be seen in them.
     Charts(Vec<Chart>, String),
     /// Files beside the document: relative path and what is there.
     Links(Vec<(String, String)>),
-    /// A text as it stands in a file.
-    Code(String),
     /// What few want to see, under a title.
     Folded(String, Vec<Block>),
 }
@@ -88,8 +68,10 @@ pub enum Block {
 pub struct Document {
     /// Its title.
     pub title: String,
-    /// The answer.
-    pub verdict: Banner,
+    /// Colour of the answer.
+    pub tone: Tone,
+    /// The answer: one sentence each, of at most 120 characters, the most important first.
+    pub verdict: Vec<String>,
     /// What follows the verdict.
     pub blocks: Vec<Block>,
     notes: Vec<Note>,
@@ -102,13 +84,10 @@ impl Document {
         tone: Tone,
         lines: impl IntoIterator<Item = L>,
     ) -> Self {
-        let verdict = Banner {
-            tone,
-            lines: lines.into_iter().map(Into::into).collect(),
-        };
         Self {
             title: title.to_owned(),
-            verdict,
+            tone,
+            verdict: lines.into_iter().map(Into::into).collect(),
             blocks: Vec::new(),
             notes: Vec::new(),
         }
@@ -119,38 +98,14 @@ impl Document {
         self.blocks.push(Block::Section(title.to_owned()));
     }
 
-    /// Begins a part of a section.
-    pub fn heading(&mut self, title: &str) {
-        self.blocks.push(Block::Heading(title.to_owned()));
-    }
-
     /// Adds a paragraph.
     pub fn text(&mut self, words: &str) {
         self.blocks.push(Block::Text(words.to_owned()));
     }
 
-    /// Adds names and what they are.
-    pub fn facts(&mut self, facts: &[(&str, String)]) {
-        let owned = facts
-            .iter()
-            .map(|(name, value)| ((*name).to_owned(), value.clone()));
-        self.blocks.push(Block::Facts(owned.collect()));
-    }
-
-    /// Adds the table that a terminal shows.
-    pub fn lead(&mut self, table: Table) {
-        self.blocks.push(Block::Table {
-            table,
-            is_lead: true,
-        });
-    }
-
-    /// Adds a table.
-    pub fn table(&mut self, table: &Table) {
-        self.blocks.push(Block::Table {
-            table: table.clone(),
-            is_lead: false,
-        });
+    /// Adds a table; a terminal shows the first one.
+    pub fn table(&mut self, table: Table) {
+        self.blocks.push(Block::Table(table));
     }
 
     /// Adds a chart and what is to be seen in it.
@@ -169,22 +124,12 @@ impl Document {
         self.blocks.push(Block::Links(links.to_vec()));
     }
 
-    /// Adds a text as it stands in a file.
-    pub fn code(&mut self, text: &str) {
-        self.blocks.push(Block::Code(text.to_owned()));
-    }
-
     /// Adds what `inside` adds, folded under a title.
     pub fn folded(&mut self, title: &str, inside: impl FnOnce(&mut Self)) {
         let before = std::mem::take(&mut self.blocks);
         inside(self);
         let folded = std::mem::replace(&mut self.blocks, before);
         self.blocks.push(Block::Folded(title.to_owned(), folded));
-    }
-
-    /// Adds what the figures were checked against, and to which tolerance.
-    pub fn checked(&mut self, words: &str) {
-        self.text(&format!("Checked: {words}"));
     }
 
     /// Adds a note behind those of its importance, once.
@@ -207,11 +152,14 @@ impl Document {
         &self.notes
     }
 
-    /// Its charts below one another as an SVG picture.
+    /// Its charts below one another as an SVG picture, small ones where there are no others.
     #[must_use]
     pub fn svg(&self) -> String {
         let mut charts = Vec::new();
         collect(&self.blocks, &mut charts);
+        if charts.iter().any(|chart| chart.size == Size::Full) {
+            charts.retain(|chart| chart.size == Size::Full);
+        }
         svg(&self.title, &charts)
     }
 }
@@ -238,19 +186,16 @@ impl Document {
     /// The verdict, and as much of the lead table as a screen has room for.
     #[must_use]
     pub fn terminal(&self, width: usize) -> String {
-        let verdict = self.verdict.lines.join("\n");
-        let lead = self.blocks.iter().find_map(|block| match block {
-            Block::Table {
-                table,
-                is_lead: true,
-            } => Some(table),
+        let verdict = self.verdict.join("\n");
+        let first = self.blocks.iter().find_map(|block| match block {
+            Block::Table(table) => Some(table),
             _ => None,
         });
-        let Some(table) = lead else {
+        let Some(table) = first else {
             return verdict + "\n";
         };
         let mut shown = table.clone();
-        let room = LINES.saturating_sub(self.verdict.lines.len());
+        let room = LINES.saturating_sub(self.verdict.len());
         while shown.columns(width).lines().count() > room && shown.rows.len() > 1 {
             shown.rows.pop();
         }
@@ -266,7 +211,7 @@ impl Document {
     /// All that can be said without figures.
     #[must_use]
     pub fn verbose(&self, width: usize) -> String {
-        let mut text = self.verdict.lines.join("\n") + "\n";
+        let mut text = self.verdict.join("\n") + "\n";
         blocks(&self.blocks, width, &mut text);
         text
     }
@@ -285,15 +230,8 @@ fn blocks(all: &[Block], width: usize, text: &mut String) {
     for block in all {
         match block {
             Block::Section(title) => *text += &format!("\n{}\n", title.to_uppercase()),
-            Block::Heading(words) | Block::Text(words) => *text += &format!("\n{words}\n"),
-            Block::Facts(facts) => {
-                let lines = facts
-                    .iter()
-                    .map(|(name, value)| format!("\n  {name}: {value}"));
-                *text += &(lines.collect::<String>() + "\n");
-            }
-            Block::Table { table, .. } => *text += &format!("\n{}\n", table.columns(width)),
-            Block::Code(code) => *text += &format!("\n{}\n", code.trim_end()),
+            Block::Text(words) => *text += &format!("\n{words}\n"),
+            Block::Table(table) => *text += &format!("\n{}\n", table.columns(width)),
             Block::Folded(title, inside) => {
                 *text += &format!("\n{title}\n");
                 blocks(inside, width, text);
@@ -308,7 +246,7 @@ mod terminal_tests {
     use crate::{Document, Importance, Table, Tone};
 
     #[test]
-    fn a_screen_has_verdict_lead_and_three_notes() {
+    fn a_screen_has_verdict_first_table_and_three_notes() {
         let mut document = Document::new(
             "t",
             Tone::Undecided,
@@ -316,8 +254,8 @@ mod terminal_tests {
         );
         let mut table = Table::new(["row"]);
         (0..40).for_each(|k| table.row([k.to_string().into()]));
-        document.table(&Table::new(["other"]));
-        document.lead(table);
+        document.table(table);
+        document.table(Table::new(["other"]));
         for k in 0..3 {
             document.note(Importance::Detail, format!("detail {k}"));
             document.note(Importance::Remark, format!("remark {k}"));
@@ -354,7 +292,7 @@ impl Document {
     #[must_use]
     pub fn html(&self) -> String {
         let title = escape(&self.title);
-        let tone = match self.verdict.tone {
+        let tone = match self.tone {
             Tone::Good => "good",
             Tone::Undecided => "undecided",
             Tone::Doubtful => "doubtful",
@@ -362,7 +300,6 @@ impl Document {
         };
         let verdict = self
             .verdict
-            .lines
             .iter()
             .map(|line| escape(line))
             .collect::<Vec<_>>()
@@ -409,18 +346,8 @@ fn notes(notes: &[Note]) -> String {
 fn block(block: &Block, html: &mut String) {
     *html += &match block {
         Block::Section(title) => format!("<h2>{}</h2>\n", escape(title)),
-        Block::Heading(title) => format!("<h3>{}</h3>\n", escape(title)),
         Block::Text(words) => format!("<p>{}</p>\n", escape(words)),
-        Block::Facts(facts) => {
-            let fact = |(name, value): &(String, String)| {
-                format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value))
-            };
-            format!(
-                "<dl>\n{}</dl>\n",
-                facts.iter().map(fact).collect::<String>()
-            )
-        }
-        Block::Table { table, .. } => self::table(table),
+        Block::Table(table) => self::table(table),
         Block::Charts(charts, caption) => {
             // The head of a section stands for the title of its only chart.
             let head = |chart: &Chart| format!("<h2>{}</h2>\n", escape(&chart.title));
@@ -451,7 +378,6 @@ fn block(block: &Block, html: &mut String) {
                 links.iter().map(link).collect::<String>()
             )
         }
-        Block::Code(text) => format!("<pre>{}</pre>\n", escape(text)),
         Block::Folded(title, blocks) => {
             let mut inside = String::new();
             blocks.iter().for_each(|b| self::block(b, &mut inside));

@@ -29,8 +29,6 @@ pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
             .map(width)
     });
     let left = 10.0 + labels.fold(24.0, f64::max);
-    // the first of slanted names begins left of its place
-    let left = longest_name(chart, canvas).map_or(left, |longest| left.max(0.79 * longest));
     for (i, panel, range) in shown {
         let mut x = Ruler {
             range: x_range,
@@ -148,46 +146,29 @@ impl Sketch<'_> {
     fn x_axis(&self, is_last: bool, svg: &mut String) -> f64 {
         let (Frame { x, y, .. }, axis, font) = (&self.frame, &self.chart.x, self.canvas.font);
         let (bottom, top) = y.pixels;
-        let longest = longest_name(self.chart, self.canvas);
         for (value, label) in ticks(axis, x.range, self.canvas.labels) {
             let place = x.at(value);
-            if longest.is_none() {
-                let _ = writeln!(
-                    svg,
-                    "<path class=\"grid\" d=\"M{place:.1} {bottom:.1}V{top:.1}\"/>"
-                );
-            }
-            match (is_last, longest) {
-                (true, None) => text(svg, "tick", (place, bottom + font + 5.0), "middle", &label),
-                // a name that ends at its place, rising towards it
-                (true, Some(_)) => {
-                    let (x, y, label) = (place + 4.0, bottom + 16.0, escape(&label));
-                    let _ = writeln!(
-                        svg,
-                        "<text class=\"tick\" text-anchor=\"end\" transform=\"translate({x:.1} {y:.1}) rotate(-38)\">{label}</text>"
-                    );
-                }
-                _ => {}
-            }
-        }
-        let labels = longest.map_or(font + 9.0, |longest| 0.62 * longest + 22.0);
-        if is_last {
-            text(
+            let _ = writeln!(
                 svg,
-                "name",
-                (x.pixels.1, bottom + labels + font),
-                "end",
-                &axis.label,
+                "<path class=\"grid\" d=\"M{place:.1} {bottom:.1}V{top:.1}\"/>"
             );
+            if is_last {
+                text(svg, "tick", (place, bottom + font + 5.0), "middle", &label);
+            }
         }
-        labels + font + 8.0
+        let below = 2.0 * font + 9.0;
+        if is_last {
+            let place = (x.pixels.1, bottom + below);
+            text(svg, "name", place, "end", &axis.label);
+        }
+        below + 8.0
     }
 
     /// Names of places beside them.
     fn places(&self, svg: &mut String) {
         let Frame { x, y, .. } = &self.frame;
         for series in &self.panel.series {
-            let (Mark::Place(px, py) | Mark::Reading(px, py)) = series.mark else {
+            let Mark::Place(px, py) = series.mark else {
                 continue;
             };
             if !self.frame.shows(px, py) {
@@ -205,20 +186,11 @@ impl Sketch<'_> {
     }
 }
 
-/// Width of the longest of the names of an x axis, if it has names.
-fn longest_name(chart: &Chart, canvas: &Canvas) -> Option<f64> {
-    let Scale::Names(names) = &chart.x.scale else {
-        return None;
-    };
-    let widths = names.iter().map(|name| text_width(name, canvas.font));
-    Some(widths.fold(0.0, f64::max))
-}
-
 /// The values of a mark on both axes.
 fn values(mark: &Mark) -> (Vec<f64>, Vec<f64>) {
     match mark {
         Mark::Line(points, _) => points.iter().copied().unzip(),
-        Mark::Band(points) | Mark::InnerBand(points) => {
+        Mark::Band(points) => {
             let ends = points.iter().flat_map(|&(x, a, b)| [(x, a), (x, b)]);
             ends.unzip()
         }
@@ -230,7 +202,7 @@ fn values(mark: &Mark) -> (Vec<f64>, Vec<f64>) {
         }
         Mark::Level(y) => (Vec::new(), vec![*y]),
         Mark::Zone(low, high) => (Vec::new(), vec![*low, *high]),
-        Mark::Place(x, y) | Mark::Reading(x, y) => (vec![*x], vec![*y]),
+        Mark::Place(x, y) => (vec![*x], vec![*y]),
     }
 }
 
@@ -243,11 +215,9 @@ fn y_range(panel: &Panel) -> Option<(f64, f64)> {
     let is_log = panel.y.scale == Scale::Log;
     let main = panel.series.iter().flat_map(|s| match &s.mark {
         Mark::Points(points) if is_log => points.iter().map(|p| p.y).collect(),
-        Mark::Line(_, Stroke::Plain)
-        | Mark::Level(_)
-        | Mark::Points(_)
-        | Mark::Place(..)
-        | Mark::Reading(..) => values(&s.mark).1,
+        Mark::Line(_, Stroke::Plain) | Mark::Level(_) | Mark::Points(_) | Mark::Place(..) => {
+            values(&s.mark).1
+        }
         _ => Vec::new(),
     });
     let main = extremes(main.filter(|y| is_shown(*y, is_log)));
@@ -601,7 +571,7 @@ impl<'a> Legend<'a> {
         let mut entries: Vec<Entry<'a>> = Vec::new();
         for (panel, of_panel) in chart.panels.iter().enumerate() {
             for series in &of_panel.series {
-                let is_beside = matches!(series.mark, Mark::Place(..) | Mark::Reading(..));
+                let is_beside = matches!(series.mark, Mark::Place(..));
                 match entries.iter_mut().find(|e| e.name == series.name) {
                     _ if series.name.is_empty() || is_beside => {}
                     Some(entry) => entry.series.push(series),
@@ -704,10 +674,7 @@ fn swatch(mark: &Mark, (x, y): (f64, f64), svg: &mut String) {
         Mark::Line(_, stroke) => (stroke.class(), line),
         Mark::Level(_) => ("line level", line),
         Mark::Band(_) | Mark::Zone(..) => ("area", square),
-        Mark::InnerBand(_) => ("area inner", square),
-        Mark::Points(_) | Mark::Place(..) | Mark::Reading(..) => {
-            ("dot", format!("M{:.1} {y:.1}h0", x + 0.5 * SWATCH))
-        }
+        Mark::Points(_) | Mark::Place(..) => ("dot", format!("M{:.1} {y:.1}h0", x + 0.5 * SWATCH)),
     };
     let _ = write!(svg, "<path class=\"{class}\" d=\"{d}\"/>");
 }
@@ -747,7 +714,6 @@ impl Frame {
                 path(svg, stroke.class(), &self.line(points));
             }
             Mark::Band(points) => path(svg, "area", &self.band(points)),
-            Mark::InnerBand(points) => path(svg, "area inner", &self.band(points)),
             Mark::Points(points) => self.points(points, svg),
             Mark::Level(y) => path(svg, "line level", &self.span(*y)),
             Mark::Zone(low, high) => {
@@ -759,16 +725,6 @@ impl Frame {
                 );
             }
             Mark::Place(x, y) => path(svg, "dot", &format!("M{}h0", self.point(*x, *y))),
-            Mark::Reading(x, y) => {
-                let (left, bottom) = (self.x.pixels.0, self.y.pixels.0);
-                let (px, py) = (self.x.at(*x), self.y.at(*y));
-                path(
-                    svg,
-                    "line level",
-                    &format!("M{left:.1} {py:.1}H{px:.1}V{bottom:.1}"),
-                );
-                path(svg, "dot", &format!("M{px:.1} {py:.1}h0"));
-            }
         }
         *svg += "</g>\n";
     }
@@ -803,7 +759,14 @@ impl Frame {
     }
 
     fn points(&self, points: &[Interval], svg: &mut String) {
-        let shown = || points.iter().filter(|p| self.shows(p.x, p.y));
+        // more lie on one another
+        let every = points.len().div_ceil(self.most).max(1);
+        let shown = || {
+            points
+                .iter()
+                .step_by(every)
+                .filter(|p| self.shows(p.x, p.y))
+        };
         let with_bar = |p: &&Interval| !(p.low.is_nan() && p.high.is_nan());
         let bar = |p: &Interval| {
             let [low, high] =

@@ -7,7 +7,7 @@
 //! let mut document = Document::new("Drift", Tone::Good, ["met: p95 4.2 m after 60 s"]);
 //! let mut table = Table::new(["outage", "p95 (m)"]);
 //! table.row(["300–360 s".into(), Cell::number(4.2, "/outages/0/p95_m")]);
-//! document.lead(table);
+//! document.table(table);
 //! document.note(Importance::Remark, "the trajectory has one turn");
 //! assert!(document.terminal(100).starts_with("met: p95 4.2 m after 60 s\n"));
 //! assert!(document.html().contains("data-json=\"/outages/0/p95_m\">4.20</td>"));
@@ -29,8 +29,8 @@ mod table;
 mod document;
 
 pub use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Scale, Series, Size, Stroke};
-pub use document::{Banner, Block, Document, Importance, NOTES, Note, Tone};
+pub use document::{Block, Document, Importance, NOTES, Note, Tone};
 pub use draw::{escape, turns};
 pub use number::{percent, readable, seconds, short_names, shortest, six_digits, window};
-pub use picture::{Form, encode, svg};
+pub use picture::{FORMS, encode, svg};
 pub use table::{Cell, Table};

@@ -131,7 +131,7 @@ impl Table {
     /// let result = serde_json::json!({ "filters": [{ "name": "tuned", "ends": [{ "after_s": 60, "rmse_m": 4.2 }] }] });
     /// let columns = [("filter", "name"), ("RMSE {after_s} s", "ends/*/rmse_m"), ("cost", "cost|none")];
     /// let table = Table::of(&result, "/filters/*", &columns);
-    /// assert_eq!(table.csv(), "filter,RMSE 60 s,cost\ntuned,4.20,none\n");
+    /// assert_eq!(table.columns(80), "  filter  RMSE 60 s  cost\n  tuned        4.20  none");
     /// ```
     pub fn of(result: &impl Serialize, rows: &str, columns: &[(&str, &str)]) -> Self {
         let json = serde_json::to_value(result).unwrap_or_default();
@@ -169,7 +169,7 @@ impl Table {
     ///
     /// let result = serde_json::json!({ "nis": { "mean": 5.9, "dof": 6 } });
     /// let rows = [("NIS ({nis/dof} if right)", "nis/mean"), ("NEES", "nees/mean")];
-    /// assert_eq!(Table::of_keys(&result, &["", "mean"], &rows).csv(), ",mean\nNIS (6 if right),5.90\n");
+    /// assert_eq!(Table::of_keys(&result, &["", "mean"], &rows).columns(80), "                    mean\n  NIS (6 if right)  5.90");
     /// ```
     pub fn of_keys(result: &impl Serialize, head: &[&str], rows: &[(&str, &str)]) -> Self {
         let json = serde_json::to_value(result).unwrap_or_default();
@@ -359,35 +359,12 @@ impl Table {
         rows.join("\n")
     }
 
-    /// CSV with its head. A name that a spreadsheet would compute stands behind an apostrophe (CWE-1236).
-    #[must_use]
-    pub fn csv(&self) -> String {
-        let cell = |text: &String| {
-            let text = if is_formula(text) {
-                format!("'{text}")
-            } else {
-                text.clone()
-            };
-            match text.contains([',', '"', '\n', '\r']) {
-                true => format!("\"{}\"", text.replace('"', "\"\"")),
-                false => text,
-            }
-        };
-        let line = |line: &Vec<String>| line.iter().map(cell).collect::<Vec<_>>().join(",") + "\n";
-        self.lines().iter().map(line).collect()
-    }
-
     /// A `tabular` of LaTeX (package booktabs), the first column to the left.
     #[must_use]
     pub fn latex(&self) -> String {
         let line = |line: &Vec<String>| {
-            format!(
-                "{} \\\\\n",
-                line.iter()
-                    .map(|cell| latex_cell(cell))
-                    .collect::<Vec<_>>()
-                    .join(" & ")
-            )
+            let cells = line.iter().map(|cell| latex(cell));
+            cells.collect::<Vec<_>>().join(" & ") + " \\\\\n"
         };
         let layout = format!("l{}", "r".repeat(self.head.len().saturating_sub(1)));
         let body: String = self.lines()[1..].iter().map(line).collect();
@@ -396,12 +373,6 @@ impl Table {
             "\\begin{{tabular}}{{{layout}}}\n\\toprule\n{head}\\midrule\n{body}\\bottomrule\n\\end{{tabular}}\n"
         )
     }
-}
-
-/// Whether a text begins as a formula does and is no number.
-fn is_formula(text: &str) -> bool {
-    let number = text.split(' ').next().unwrap_or_default();
-    text.starts_with(['=', '+', '-', '@']) && text != "-" && number.parse::<f64>().is_err()
 }
 
 /// Characters of each column.
@@ -416,29 +387,11 @@ fn widths(lines: &[Vec<String>]) -> Vec<usize> {
     (0..lines[0].len()).map(|c| width(c).unwrap_or(0)).collect()
 }
 
-/// A cell in LaTeX: its numbers as numbers are set, the rest as text.
-fn latex_cell(text: &str) -> String {
-    let word = |word: &str| {
-        let number = word.trim_start_matches('(').trim_end_matches([')', ',']);
-        latex_number(number).map_or_else(|| latex(word), |set| word.replacen(number, &set, 1))
-    };
-    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
-}
-
-/// A number with a sign or a power of ten in LaTeX: a hyphen is no minus.
-fn latex_number(text: &str) -> Option<String> {
-    text.parse::<f64>()
-        .ok()
-        .filter(|number| number.is_finite())?;
-    match (text.split_once('e'), text.strip_prefix('-')) {
-        (Some((factor, power)), _) => Some(format!("${factor}\\times10^{{{power}}}$")),
-        (None, Some(size)) => Some(format!("$-${size}")),
-        (None, None) => None,
-    }
-}
-
-/// A text in LaTeX.
+/// A text in LaTeX, where a hyphen is no minus.
 fn latex(text: &str) -> String {
+    let (sign, rest) = text
+        .strip_prefix('-')
+        .map_or(("", text), |rest| ("$-$", rest));
     let letter = |c: char| match c {
         '&' | '%' | '$' | '#' | '_' | '{' | '}' => format!("\\{c}"),
         '\\' => "\\textbackslash{}".to_owned(),
@@ -450,7 +403,7 @@ fn latex(text: &str) -> String {
         '\n' | '\r' => " ".to_owned(),
         c => c.to_string(),
     };
-    text.chars().map(letter).collect()
+    sign.to_owned() + &rest.chars().map(letter).collect::<String>()
 }
 
 #[cfg(test)]
@@ -484,9 +437,6 @@ mod tests {
     #[test]
     fn tables_of_other_programs_are_escaped() {
         let table = table(&[vec!["run", "a, b"], vec!["x_1 & 5 %", "1 ± 2"]]);
-        assert_eq!(table.csv(), "run,\"a, b\"\nx_1 & 5 %,1 ± 2\n");
-        let names = ["=cmd|x", "@SUM(1)", "-2+3", "+a", "-2.5 ± 1", "-"].map(is_formula);
-        assert_eq!(names, [true, true, true, true, false, false]);
         let latex = table.latex();
         assert!(
             latex.starts_with("\\begin{tabular}{lr}\n\\toprule\nrun & a, b \\\\\n\\midrule\n"),
@@ -496,15 +446,8 @@ mod tests {
             latex.contains("x\\_1 \\& 5 \\% & 1 $\\pm$ 2 \\\\\n\\bottomrule"),
             "{latex}"
         );
-        let set = ["-1.67 ± 5e-4 (1.67)", "9.50, -2e-3", "a-4 -b 1e400"].map(latex_cell);
-        assert_eq!(
-            set,
-            [
-                "$-$1.67 $\\pm$ $5\\times10^{-4}$ (1.67)",
-                "9.50, $-2\\times10^{-3}$",
-                "a-4 -b 1e400"
-            ]
-        );
+        let set = ["-1.67 ± 0.50", "a-4 -b"].map(super::latex);
+        assert_eq!(set, ["$-$1.67 $\\pm$ 0.50", "a-4 -b"]);
     }
 
     /// Columns of 22 characters with their gap beside a key of 12: four take 100, five 122. Nine are three times three.

@@ -118,8 +118,8 @@ fn values(composite: &Composite) -> Vec<f64> {
 impl DrawsFile {
     /// Of some outcomes; none where one of them has no draws.
     #[must_use]
-    pub fn of(outcomes: &[&Outcome], rate_hz: f64) -> Option<Self> {
-        let signals = |outcome: &&Outcome| {
+    pub fn of(outcomes: &[Outcome], rate_hz: f64) -> Option<Self> {
+        let signals = |outcome: &Outcome| {
             let (inference, composite) = (outcome.inference.as_ref()?, &outcome.fit.composite);
             Some(SignalDraws {
                 signals: outcome.scope.name(),

@@ -478,15 +478,6 @@ impl ImuParameters {
         )
     }
 
-    /// Between which averaging times the Allan deviation of a bias is nowhere below its bias instability (s).
-    pub fn floor_s(&self) -> (f64, f64) {
-        Flicker {
-            floor: 1.0,
-            t_corr_s: self.t_corr_s,
-        }
-        .range_s()
-    }
-
     /// An intensity in the unit of datasheets.
     pub fn in_datasheets(which: usize, value: f64) -> f64 {
         match which {

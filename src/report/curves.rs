@@ -1,7 +1,7 @@
 //! Wavelet-variance curves as JSON: of signals (`wv`), and of fits (`<model>.wv.json`).
 
 use nav_sim_calibration::{Estimator, Group, Outcome, Replicate, Settings, implied, tau_s};
-use nav_sim_document::{Axis as ChartAxis, Mark, short_names};
+use nav_sim_document::{Mark, short_names};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::wavelet::interval;
 use serde::{Deserialize, Serialize};
@@ -219,7 +219,7 @@ pub(crate) struct ReplicateCurve {
 
 impl CurvesFile {
     /// The file of some outcomes and the groups they are of.
-    pub(crate) fn new(groups: &[Group], outcomes: &[&Outcome], settings: &Settings) -> Self {
+    pub(crate) fn new(groups: &[Group], outcomes: &[Outcome], settings: &Settings) -> Self {
         let replicates = |o: &Outcome| {
             groups
                 .iter()
@@ -279,19 +279,6 @@ fn fitted(outcome: &Outcome, replicates: &[Replicate], settings: &Settings) -> F
 }
 
 // Axes, points and bands of charts of wavelet variances.
-
-/// The axis of scales.
-pub(crate) fn scale_axis() -> ChartAxis {
-    ChartAxis::log("scale τ (s)")
-}
-
-/// The axis of wavelet variances of a sensor.
-pub(crate) fn variance_axis(sensor: Sensor) -> ChartAxis {
-    ChartAxis::log(match sensor {
-        Sensor::Accel => "wavelet variance (m²/s⁴)",
-        Sensor::Gyro => "wavelet variance (rad²/s²)",
-    })
-}
 
 /// Names of recordings, short and without the endings of their files: `run4` of `static/run4.csv.gz`.
 pub(crate) fn recording_names<'a>(files: impl IntoIterator<Item = &'a str>) -> Vec<String> {

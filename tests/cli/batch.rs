@@ -221,7 +221,7 @@ fn the_scheduler_says_which_shard() {
     };
     let output = slurm("2");
     assert!(output.status.success());
-    assert!(String::from_utf8_lossy(&output.stderr).contains("shard 1/2 (SLURM_ARRAY_TASK_ID=2)"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("shard 1/2"));
     assert_eq!(cells(&dir.join("out")).len(), CELLS / 2);
     assert!(slurm("1").status.success());
     assert_eq!(cells(&dir.join("out")).len(), CELLS);

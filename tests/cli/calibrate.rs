@@ -455,13 +455,6 @@ fn wv_prints_the_curves_of_every_signal() {
         digest.lines().count() <= 20 && digest.contains("gyro.x (rad/s)"),
         "{digest}"
     );
-    assert_eq!(text(&["--format", "csv"]).lines().count(), 1 + 4 * 13);
-    let stderr = refusal(
-        dir.path(),
-        &["check", "runs/run0.csv", "--format", "csv"],
-        2,
-    );
-    assert!(stderr.contains("only wv and compare print CSV"), "{stderr}");
 }
 
 #[test]

@@ -280,7 +280,7 @@ fn negative_values_are_refused_in_the_words_of_their_option() {
         ),
         (
             "compare a --reference b --format latex",
-            "--format='latex': not one of text, json, csv",
+            "--format='latex': not one of text, json",
         ),
         ("calibrate a --skip-s -5", "not a finite number ≥ 0"),
         (

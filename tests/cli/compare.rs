@@ -2,7 +2,7 @@
 
 use assert_cmd::Command;
 use nav_sim::app::{Answer, Input, Manifest};
-use nav_sim::commands::run::{ModelNote, Navigation, RunAnswer, RunOrigin};
+use nav_sim::commands::run::{Navigation, RunAnswer, RunOrigin};
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::{EpochSums, OutageRecord, RunRecord, RunResult};
@@ -74,9 +74,8 @@ fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest, &mut 
             ..Scenario::default()
         },
         spread: false,
-        model: ModelNote::default(),
+        estimator: None,
         independent_windows: None,
-        throughput_epochs_per_s: 1.0,
     };
     let inputs = vec![
         input("trajectory", "t.csv", b"t"),
@@ -87,6 +86,7 @@ fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest, &mut 
     change(&mut manifest, &mut origin);
     let answer = RunAnswer {
         navigation: Navigation::of_runs(result(factor), 7),
+        throughput_epochs_per_s: 1.0,
         origin,
         inputs,
         track: Vec::new(),

@@ -148,7 +148,7 @@ fn a_fusion_is_known_by_its_configuration_and_the_contents_of_its_files() {
     let configuration = &manifest["configuration"];
     assert_eq!(configuration["settings"]["outages"][0]["end_s"], 11.0);
     assert_eq!(
-        configuration["gnss_sigma_factor"],
+        configuration["gnss_sigma"][1],
         serde_json::json!([2.0, 1.0])
     );
     let same = [

@@ -57,15 +57,11 @@ fn a_fusion_directory_holds_what_the_interface_says() {
         "fuse rec/imu.csv rec/gnss.csv imu.toml --reference rec/reference.csv --outage 60:75 -o out --verbose",
     );
     assert!(
-        ran.stdout.contains("from levelling at rest until"),
+        ran.stdout.contains("levelled at rest until"),
         "{}",
         ran.stdout
     );
-    assert!(
-        ran.stdout.contains("from the course of the fix at"),
-        "{}",
-        ran.stdout
-    );
+    assert!(ran.stdout.contains("from the course"), "{}", ran.stdout);
     assert!(ran.stdout.contains(" 15 withheld"), "{}", ran.stdout);
     let out = place.path().join("out");
     let header = fs::read_to_string(out.join("solution.csv"))
@@ -552,7 +548,7 @@ fn useless_fusions_are_refused_or_said() {
         "fuse rec/imu.csv rec/gnss.csv imu.toml --initial rec/initial.toml -o out",
     );
     assert!(!ran.stderr.contains("warning"), "{}", ran.stderr);
-    let twice = "fuse rec/imu.csv rec/gnss.csv imu.toml --outage 60:70 --outage 65:75 -o out";
+    let twice = "fuse rec/imu.csv rec/gnss.csv imu.toml --outage 60:70 --outage 65:75 -o out -v";
     let ran = done(place.path(), twice);
     assert!(
         ran.stderr.contains("overlap or touch") && ran.stdout.contains("60–75 s"),

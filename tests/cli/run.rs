@@ -88,13 +88,12 @@ fn a_run_directory_holds_what_the_interface_says() {
         );
         assert!(verdict["ratio"].as_f64().unwrap() > 0.0, "{verdict}");
     }
-    assert!(manifest["throughput_epochs_per_s"].as_f64().unwrap() > 0.0);
     assert_eq!(manifest["configuration"]["run"]["seed"], 5);
     assert_eq!(
         manifest["inputs"][0]["blake3"],
         blake3::hash(DRIVE.as_bytes()).to_hex().as_str()
     );
-    assert_eq!(manifest["model"]["estimator"], "dr-awv");
+    assert_eq!(manifest["estimator"], "dr-awv");
     let epochs = fs::read_to_string(out.join("epochs.csv")).unwrap();
     assert_eq!(epochs.lines().count(), 62); // header, 0 … 60 s
     let fixes: Vec<&str> = epochs
@@ -605,11 +604,7 @@ fn check_knows_the_files_of_a_fusion_and_speaks_json() {
         .iter()
         .map(|f| f["found"].as_str().unwrap())
         .collect();
-    let expected = [
-        "an initial state at 0 s",
-        "60 GNSS fixes over 59 s",
-        "a trajectory of 60 s",
-    ];
+    let expected = ["an initial state", "60 GNSS fixes", "a trajectory"];
     assert_eq!(found, expected);
     let slow: String = (0..9)
         .map(|k| format!("{},46.5,6.5,{k}\n", 1000 * k))

@@ -76,7 +76,6 @@ COMMANDS = [
     ("corrupted", f"synthesize {MEMS} --replicates 3 --samples 8192 --axes x --contaminate section5-II --seed 2 -o @"),
     ("wv.json", "wv recordings --axes accel.x,gyro.z --format json"),
     ("wv_formats.json", "wv calib_data/formats/euroc.csv calib_data/formats/compressed.csv.gz --format json"),
-    ("wv.csv", "wv recordings --axes gyro.z --intervals large-sample --format csv"),
     ("dr_awv.toml", "calibrate recordings --seed 1 --bootstrap 50 --format json -o @"),
     ("sr_awv.toml", "calibrate corrupted --estimator sr-awv --model N1 --seed 1 --bootstrap 20 --format json -o @"),
     ("awv.toml", "calibrate recordings --estimator awv --model WN+RW --pool axes --axes accel --seed 1 --bootstrap 20"

@@ -4,8 +4,7 @@
 
 use nav_sim::app::Context;
 use nav_sim::calibration::{
-    Bootstrap, Estimator, ModelChoice, Outcome, Pool, Settings, calibrate, grouped, infer,
-    replicates,
+    Bootstrap, Estimator, ModelChoice, Pool, Settings, calibrate, grouped, infer, replicates,
 };
 use nav_sim::commands::run::{NavigateInputs, TrueImu, navigate};
 use nav_sim::io::draws_file::{Draws, DrawsFile};
@@ -64,7 +63,6 @@ impl World {
             &settings,
             Bootstrap { draws: 200, seed },
         );
-        let outcomes: Vec<&Outcome> = outcomes.iter().collect();
         let model = Model::pooled(
             settings.rate_hz,
             &outcomes[0].fit.composite,

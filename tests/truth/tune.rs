@@ -115,7 +115,6 @@ impl Drive {
             full: filter,
             filter,
             aim,
-            allow_smaller: false,
         };
         let factors = task.factors().unwrap();
         let consistency = task.consistency(filter, &factors).unwrap();

@@ -190,6 +190,8 @@ pub enum Cause {
     TooFewScales,
     /// A wavelet variance that is not positive has no logarithm, no weight, no meaning.
     NotPositive,
+    /// A process without a slope of its own in the Allan deviation.
+    NoSlope,
     /// Anything else.
     Other,
 }

@@ -20,7 +20,7 @@
 
 use super::least_squares::{Fit, outside, too_few_scales};
 use super::search::Termination;
-use crate::curve::CalibrationError;
+use crate::curve::{CalibrationError, Cause};
 use crate::model::ModelSpec;
 use crate::noise::{Composite, Kind, Process};
 use crate::wavelet::Curve;
@@ -100,9 +100,8 @@ fn term(kind: Kind, points: &[(f64, f64)]) -> Result<Process, CalibrationError> 
         Kind::Drift => SQRT_2 * at_one(1.0),
         Kind::Ar1 | Kind::GaussMarkov | Kind::Ma1 => {
             let code = kind.code();
-            return Err(CalibrationError::other(format!(
-                "{code} has no slope of its own in the Allan deviation: avlr cannot estimate it"
-            )));
+            let message = format!("{code} has no slope of its own in the Allan deviation");
+            return Err(CalibrationError::new(Cause::NoSlope, message));
         }
     };
     Process::new(kind, 0.0, value, 1.0).map_err(outside)

@@ -29,8 +29,7 @@ use serde_json::Map;
 use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use toml::{Table, Value};
 
 /// Run a study: a run whose values may be lists
@@ -68,9 +67,6 @@ pub struct BatchRequest {
     /// A key of [run] over that of the study, such as runs=10000 (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// States in the tables of the page (repeatable), or "all"
-    #[arg(long = "state", value_name = "STATE", default_values = ["pos_e_m", "roll_deg"])]
-    pub states: Vec<String>,
     /// Compute cells again whose request has changed
     #[arg(skip)]
     pub force: bool,
@@ -131,10 +127,9 @@ impl BatchRequest {
         if !study.run.contains_key("seed") {
             context.remark("no seed in the study: 1");
         }
-        let states = crate::commands::compare::states(&self.states)?;
-        let (share, from) = find_shard(self.shard, self.shards, variable)?;
+        let share = find_shard(self.shard, self.shards, variable)?;
         let merged = || {
-            let answer = results::merge(study, &cells, &place, &states, context)?;
+            let answer = results::merge(study, &cells, &place, context)?;
             answer.write(&place)?;
             Ok(Outcome::Merged(Box::new(answer)))
         };
@@ -158,12 +153,14 @@ impl BatchRequest {
         }
         let own = match share {
             Some(share) => {
-                context.remark(format!("shard {}/{} ({from})", share.0, share.1));
+                context.remark(format!("shard {}/{}", share.0, share.1));
                 shard(&units, share)
             }
             None => units.iter().collect(),
         };
-        let worked = work(&place, &own, context)?;
+        let left = || own.iter().filter(|unit| !place.has_unit(unit)).count();
+        let todo = left();
+        let failures = work(&place, &own, context)?;
         for cell in &cells {
             let firsts: Vec<u64> = units
                 .iter()
@@ -174,7 +171,6 @@ impl BatchRequest {
                 assemble(&place, cell, &firsts, context)?;
             }
         }
-        let failures = worked.failures.into_inner().unwrap_or_default();
         if let Some((name, failure)) = failures.first() {
             let more = match failures.len() - 1 {
                 0 => String::new(),
@@ -183,9 +179,9 @@ impl BatchRequest {
             return Err(Failure::could_not(format!("cell {name}: {failure}{more}"))
                 .or_hint_if(failure.advice()));
         }
-        let left = own.iter().filter(|unit| !place.has_unit(unit)).count();
+        let left = left();
         if left > 0 && !context.go_on() {
-            let is_resumable = worked.finished.into_inner() > 0;
+            let is_resumable = left < todo;
             return Ok(Outcome::Stopped { is_resumable, left });
         }
         let missing = cells.iter().filter(|cell| !place.is_done(cell));
@@ -619,16 +615,16 @@ impl Door {
         let asked = Asked::<Run>::named(&named_request(&run)?)?;
         let scenario = asked.request.scenario()?;
         let mut inputs = Vec::new();
-        for (role, path) in asked.request.inputs()? {
+        for (role, path) in asked.inputs()? {
             if !self.inputs.contains_key(&path) {
                 self.inputs.insert(
                     path.clone(),
-                    input::input(role, &path)
+                    input::input(&role, &path)
                         .map_err(|e| e.hint("paths are relative to the study's file"))?,
                 );
             }
             inputs.push(Input {
-                role: role.to_owned(),
+                role,
                 ..self.inputs[&path].clone()
             });
         }
@@ -896,54 +892,43 @@ fn shard<'a, 'b>(units: &'b [Unit<'a>], (index, count): (u64, u64)) -> Vec<&'b U
     own
 }
 
-/// What a process did.
-#[derive(Default)]
-struct Worked {
-    finished: AtomicUsize,
-    failures: Mutex<Vec<(String, Failure)>>,
-}
+/// Cells that cannot be computed, by their names.
+type Failures = Vec<(String, Failure)>;
 
 /// Computes the units that are not there and not in work elsewhere, small ones at once, until the context says stop.
-fn work(place: &Place<'_>, own: &[&Unit<'_>], context: &Context<'_>) -> Result<Worked> {
-    let (worked, front) = (Worked::default(), OfCells(context, Mutex::default()));
+fn work(place: &Place<'_>, own: &[&Unit<'_>], context: &Context<'_>) -> Result<Failures> {
+    let (mut failures, front) = (Failures::new(), OfCells(context, Mutex::default()));
     let todo: Vec<&&Unit<'_>> = own.iter().filter(|unit| !place.has_unit(unit)).collect();
     context.begin("runs", todo.iter().map(|unit| unit.cost()).sum());
     let at_once = |unit: &Unit<'_>| (128 * context.threads() as u64 / unit.runs.max(8)).max(1);
     let mut rest = todo.as_slice();
     while let (Some(first), true) = (rest.first(), context.go_on()) {
         let (now, later) = rest.split_at(rest.len().min(at_once(first) as usize));
-        now.par_iter()
-            .try_for_each(|unit| compute(place, unit, &worked, context, &front))?;
+        let computed = now
+            .par_iter()
+            .map(|unit| compute(place, unit, context, &front));
+        let computed: Vec<Failures> = computed.collect::<Result<_>>()?;
+        failures.extend(computed.into_iter().flatten());
         rest = later;
     }
     context.end();
-    Ok(worked)
+    Ok(failures)
 }
 
 /// Computes what is missing of a unit. A cell that cannot be computed is named; others go on.
 fn compute(
     place: &Place<'_>,
     unit: &Unit<'_>,
-    worked: &Worked,
     context: &Context<'_>,
     front: &OfCells<'_>,
-) -> Result<()> {
+) -> Result<Failures> {
+    let mut failures = Failures::new();
     let Some(_lock) = place.lock(unit)? else {
-        return Ok(());
+        return Ok(failures);
     };
-    let missing: Vec<&Cell> = unit
-        .cells
-        .iter()
-        .copied()
-        .filter(|cell| !place.has(unit, cell))
-        .collect();
-    let failed = |cell: &Cell, failure: Failure| {
-        worked
-            .failures
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .push((cell.name.clone(), failure));
-    };
+    let missing = unit.cells.iter().filter(|cell| !place.has(unit, cell));
+    let missing: Vec<&&Cell> = missing.collect();
+    let mut failed = |cell: &Cell, failure| failures.push((cell.name.clone(), failure));
     let contexts: Vec<Context<'_>> = missing.iter().map(|cell| context_of(cell, front)).collect();
     let mut prepared = Vec::new();
     for (cell, context) in missing.iter().zip(&contexts) {
@@ -963,7 +948,7 @@ fn compute(
         let runs: Vec<&PreparedRun<'_>> = pass.iter().map(|(_, run, _)| run).collect();
         let results = match columns(&runs, unit.first, unit.runs, context) {
             Ok(Some(results)) => results,
-            Ok(None) => return Ok(()),
+            Ok(None) => break,
             Err(failure) => {
                 pass.iter()
                     .for_each(|(cell, _, _)| failed(cell, failure.clone()));
@@ -981,10 +966,9 @@ fn compute(
             } else if let Some(result) = result {
                 write_part(&place.part(cell, unit.first), &result)?;
             }
-            worked.finished.fetch_add(1, Ordering::Relaxed);
         }
     }
-    Ok(())
+    Ok(failures)
 }
 
 /// Passes each warning of the cells on once; what they remark is for `--verbose`.
@@ -1104,15 +1088,15 @@ const SCHEDULERS: [(&str, Option<[&str; 3]>); 4] = [
     ("JOB_COMPLETION_INDEX", None),
 ];
 
-/// The shard of this process and where it comes from; none without a flag and a scheduler. `shards` is how many there are,
+/// The shard of this process; none without a flag and a scheduler. `shards` is how many there are,
 /// where the scheduler does not say.
 fn find_shard(
     flag: Option<(u64, u64)>,
     shards: Option<u64>,
     variable: &dyn Fn(&str) -> Option<String>,
-) -> Result<(Option<(u64, u64)>, String), Failure> {
+) -> Result<Option<(u64, u64)>> {
     if flag.is_some() {
-        return Ok((flag, "--shard".to_owned()));
+        return Ok(flag);
     }
     let number = |name: &str| -> Result<Option<u64>> {
         let text = variable(name);
@@ -1132,7 +1116,7 @@ fn find_shard(
         .transpose()?
     else {
         return match shards {
-            None | Some(1) => Ok((None, "no scheduler".to_owned())),
+            None | Some(1) => Ok(None),
             Some(n) => refused(
                 format!("--shards {n}: no scheduler says which of them this is"),
                 "give --shard i/n",
@@ -1154,7 +1138,7 @@ fn find_shard(
         );
     };
     match index.filter(|index| *index < count) {
-        Some(index) => Ok((Some((index, count)), format!("{name}={id}"))),
+        Some(index) => Ok(Some((index, count))),
         None => Err(
             Failure::input(format!("{name}={id} is not one of {count} shards")).hint(format!(
                 "number the tasks from 0 to {}",
@@ -1173,42 +1157,29 @@ mod tests {
         flag: Option<&str>,
         shards: Option<u64>,
         set: &[(&str, &str)],
-    ) -> Result<(u64, u64, String), String> {
+    ) -> Result<(u64, u64), String> {
         let set: HashMap<&str, &str> = set.iter().copied().collect();
         let variable = |name: &str| set.get(name).map(|v| (*v).to_owned());
         let flag = flag.map(|f| parse_shard(f).unwrap());
         find_shard(flag, shards, &variable)
-            .map(|(s, from)| (s.map_or((0, 1), |s| s), from))
-            .map(|((index, count), from)| (index, count, from))
+            .map(|shard| shard.unwrap_or((0, 1)))
             .map_err(|e| e.to_string())
     }
 
     #[test]
     fn schedulers_are_understood() {
-        let ok = |r: Result<(u64, u64, String), String>| r.unwrap();
-        assert_eq!(ok(found(None, None, &[])), (0, 1, "no scheduler".into()));
-        assert_eq!(
-            ok(found(Some("2/3"), None, &[("HQ_TASK_ID", "7")])),
-            (2, 3, "--shard".into())
-        );
-        assert_eq!(
-            ok(found(None, Some(8), &[("HQ_TASK_ID", "7")])),
-            (7, 8, "HQ_TASK_ID=7".into())
-        );
+        let ok = |r: Result<(u64, u64), String>| r.unwrap();
+        assert_eq!(ok(found(None, None, &[])), (0, 1));
+        assert_eq!(ok(found(Some("2/3"), None, &[("HQ_TASK_ID", "7")])), (2, 3));
+        assert_eq!(ok(found(None, Some(8), &[("HQ_TASK_ID", "7")])), (7, 8));
         let slurm = [
             ("SLURM_ARRAY_TASK_ID", "14"),
             ("SLURM_ARRAY_TASK_MIN", "10"),
             ("SLURM_ARRAY_TASK_STEP", "2"),
             ("SLURM_ARRAY_TASK_COUNT", "4"),
         ];
-        assert_eq!(
-            ok(found(None, None, &slurm)),
-            (2, 4, "SLURM_ARRAY_TASK_ID=14".into())
-        );
-        assert_eq!(
-            ok(found(None, Some(20), &slurm)),
-            (14, 20, "SLURM_ARRAY_TASK_ID=14".into())
-        );
+        assert_eq!(ok(found(None, None, &slurm)), (2, 4));
+        assert_eq!(ok(found(None, Some(20), &slurm)), (14, 20));
         assert_eq!(ok(found(None, Some(5), &[("PBS_ARRAY_INDEX", "0")])).0, 0);
         assert_eq!(
             ok(found(None, Some(5), &[("JOB_COMPLETION_INDEX", "4")])).0,
@@ -1223,7 +1194,7 @@ mod tests {
                 && parse_shard("1").is_err()
                 && parse_shard("-1/2").is_err()
         );
-        let error = |r: Result<(u64, u64, String), String>| r.unwrap_err();
+        let error = |r: Result<(u64, u64), String>| r.unwrap_err();
         assert!(error(found(None, None, &[("HQ_TASK_ID", "7")])).contains("not of how many"));
         assert!(
             error(found(None, Some(7), &[("HQ_TASK_ID", "7")])).contains("is not one of 7 shards")

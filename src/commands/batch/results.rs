@@ -16,6 +16,9 @@ use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
 
+/// States in the tables of the page: East position and roll.
+const SHOWN: [usize; 2] = [1, 6];
+
 const FILES: [&str; 3] = ["results.csv", "summary.json", "report.html"];
 
 /// The cells that are there, against their references.
@@ -52,7 +55,6 @@ pub(super) fn merge(
     study: &Study,
     cells: &[Cell],
     place: &Place<'_>,
-    states: &[usize],
     context: &Context<'_>,
 ) -> Result<StudyAnswer> {
     let fixed = study.fixed(cells);
@@ -103,7 +105,6 @@ pub(super) fn merge(
         answer.add(
             &read,
             read.iter().position(|(cell, _)| cell.name == reference),
-            states,
         )?;
     }
     answer.complete = answer.missing.is_empty();
@@ -112,23 +113,18 @@ pub(super) fn merge(
 
 impl StudyAnswer {
     /// Cells of one setting, against one of them.
-    fn add(
-        &mut self,
-        read: &[(&Cell, RunDirectory)],
-        reference: Option<usize>,
-        states: &[usize],
-    ) -> Result<()> {
+    fn add(&mut self, read: &[(&Cell, RunDirectory)], reference: Option<usize>) -> Result<()> {
         // without the reference each is alone
         let Some(i) = reference else {
             let mut alone = read.iter().map(std::slice::from_ref);
-            return alone.try_for_each(|one| self.add(one, Some(0), states));
+            return alone.try_for_each(|one| self.add(one, Some(0)));
         };
         let runs = read
             .iter()
             .enumerate()
             .map(|(k, (cell, found))| (cell.name.as_str(), found, k == i));
         let (cell, found) = &read[i];
-        let comparison = between(runs, (&cell.name, found), states.to_vec())?;
+        let comparison = between(runs, (&cell.name, found), SHOWN.to_vec())?;
         let is_compared = read.len() > 1;
         for ((cell, found), candidate) in read.iter().zip(&comparison.candidates) {
             let summary = &found.summary;
@@ -292,7 +288,7 @@ impl Answer for StudyAnswer {
             ("NEES", "nees"),
             ("verdict", "../../verdict/kind"),
         ];
-        document.lead(Table::of(self, "/cells/*/outages/*", &columns).with_keys(2));
+        document.table(Table::of(self, "/cells/*/outages/*", &columns).with_keys(2));
         document.charts(
             &self.charts(),
             "95 % quantile of the horizontal error at the end of the first outage.",
@@ -300,7 +296,7 @@ impl Answer for StudyAnswer {
         for comparison in &self.comparisons {
             document.section(&format!("ASEE relative to {}", comparison.reference));
             document.text("Mean over the outage of (ratio − 1)·100, with its 95 % interval.");
-            document.table(&comparison.table());
+            document.table(comparison.table());
         }
         document.section("Cells");
         let link = |cell: &CellSummary| {

@@ -1,10 +1,11 @@
 //! The document of a calibration.
 
+use super::Calibration;
 use crate::app::Input;
 use crate::commands::export::Quantity;
 use crate::io::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn, known};
 use crate::report::csv::merged;
-use crate::report::curves::{CurvesFile, FittedCurve, band, curve, recording_names, sensor_name};
+use crate::report::curves::{FittedCurve, band, curve, recording_names, sensor_name};
 use crate::report::in_order;
 use nav_sim_calibration::{
     Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Miss,
@@ -23,22 +24,9 @@ use nav_sim_signal::noise::{
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// The fits of a calibration, all of them or those of one estimator, and the findings about the recordings.
-pub(crate) struct ShownCalibration<'a> {
-    /// The JSON of the command.
-    pub json: Value,
-    /// The outcomes of the fits, in the same order.
-    pub outcomes: Vec<&'a Outcome>,
-    pub curves: CurvesFile,
-    pub diagnoses: &'a [Diagnosis],
-    pub turn_on: Vec<&'a TurnOnSpread>,
-    pub beginnings: &'a Beginnings,
-    pub settings: &'a Settings,
-}
-
-impl ShownCalibration<'_> {
-    pub(crate) fn document(&self) -> Document {
-        let json = &self.json;
+impl Calibration {
+    pub(super) fn page(&self) -> Document {
+        let (json, curves) = (&self.json(), self.curves());
         let title = format!(
             "Stochastic calibration, {}",
             in_order(self.outcomes.iter().map(|o| o.estimator.name())).join(", ")
@@ -53,41 +41,23 @@ impl ShownCalibration<'_> {
         let policy = policy();
         let columns = [
             (policy.as_str(), "{../../name} {name} ({unit})"),
-            ("value", "value"),
-            (interval, "interval"),
+            ("value", "value|not observed"),
+            (interval, "ci95|not determined"),
             ("averages of", "averages"),
         ];
-        let figures = Table::of(json, "/fits/*/figures/*", &columns);
-        if self.outcomes.len() > 2 {
-            let columns = [
-                ("fit", "name"),
-                ("N", "figures/N/value"),
-                ("95 %", "figures/N/interval"),
-                ("B", "figures/B/value"),
-                ("K", "figures/K/value"),
-                (
-                    "units",
-                    "{figures/N/unit}, {figures/B/unit}, {figures/K/unit}",
-                ),
-            ];
-            document.lead(Table::of(json, "/fits/*", &columns));
-            document.table(&figures);
-        } else {
-            document.lead(figures);
-        }
+        document.table(Table::of(json, "/fits/*/figures/*", &columns));
         for (importance, note) in self.notes() {
             document.note(importance, note);
         }
-        for (index, (outcome, fitted)) in self.outcomes.iter().zip(&self.curves.curves).enumerate()
-        {
+        for (index, (outcome, fitted)) in self.outcomes.iter().zip(&curves.curves).enumerate() {
             document.section(&format!("{} · {}", group_name(fitted), outcome.spec));
             document.chart(
-                &chart(fitted, outcome, self.diagnoses, self.settings.rate_hz),
+                &chart(fitted, outcome, &self.diagnoses, self.settings.rate_hz),
                 CAPTION,
             );
-            document.table(&parameters(outcome));
+            document.table(parameters(outcome));
             if outcome.ranking.is_some() {
-                document.heading("Candidate models");
+                document.section("Candidate models");
                 let columns = [
                     ("model", "model"),
                     ("WVIC", "wvic"),
@@ -97,7 +67,7 @@ impl ShownCalibration<'_> {
                     ("J-test p", "j_test_p_value"),
                     ("chosen", "chosen"),
                 ];
-                document.table(&Table::of(
+                document.table(Table::of(
                     json,
                     &format!("/fits/{index}/ranking/*"),
                     &columns,
@@ -117,24 +87,21 @@ impl ShownCalibration<'_> {
             ("J-test p", "j_p_value"),
             ("signals alike: p", "spread_p_value"),
         ];
-        document.table(&Table::of(json, "/fits/*", &columns));
+        document.table(Table::of(json, "/fits/*", &columns));
         if self.diagnoses.iter().any(is_abnormal) {
-            recordings_section(json, &mut document);
-        }
-        if !self.turn_on.is_empty() {
-            document.section("Turn-on bias");
+            document.section("Abnormal recordings");
             let columns = [
-                ("sensor", "../../sensor"),
-                ("axis", "axis"),
-                ("recordings", "recordings"),
-                ("spread of the means (SI)", "spread"),
-                ("by noise alone", "noise"),
+                ("recording", "file"),
+                ("sensor", "sensor"),
+                ("verdict", "verdict"),
+                ("noise: p", "noise/p_value"),
+                ("scales (s)", "noise/tau_s"),
+                ("outliers: p", "outliers/p_value"),
+                ("scales (s)", "outliers/tau_s"),
+                ("drift: p", "drift/p_value"),
             ];
-            document.table(&Table::of(json, "/turn_on/*/axes/*", &columns));
+            document.table(Table::of(json, "/replicates/*", &columns).without_unknown());
         }
-        document.checked(
-            "wavelet variances of models to 1e-13 of an independent implementation, the optimum to 1e-6 of an exhaustive search",
-        );
         document
     }
 
@@ -160,13 +127,13 @@ impl ShownCalibration<'_> {
         self.outcomes
             .iter()
             .map(|o| fit_line(o, &fit_name(o, &self.outcomes), self.settings.rate_hz))
-            .chain(recordings_line(&self.outcomes, self.diagnoses))
+            .chain(recordings_line(&self.outcomes, &self.diagnoses))
             .collect()
     }
 
     /// Notes, the most important first.
     fn notes(&self) -> Vec<(Importance, String)> {
-        let (settings, fits) = (self.settings, &self.outcomes);
+        let (settings, fits) = (&self.settings, &self.outcomes);
         let mut notes = Vec::new();
         let mut note = |importance, place: &str, text: String| {
             notes.push((importance, format!("{place}: {text}")));
@@ -179,7 +146,7 @@ impl ShownCalibration<'_> {
             note(Importance::Warning, "gyro", text);
         }
         for sensor in Sensor::ALL {
-            for text in recording_notes(sensor, fits, self.diagnoses, settings) {
+            for text in recording_notes(sensor, fits, &self.diagnoses, settings) {
                 note(Importance::Warning, sensor.name(), text);
             }
         }
@@ -190,7 +157,7 @@ impl ShownCalibration<'_> {
             };
             note(importance, found.sensor.name(), turn_on_remark(found));
         }
-        if let Some((head, text)) = beginnings(self.beginnings) {
+        if let Some((head, text)) = beginnings(&self.beginnings) {
             note(Importance::Remark, head, text);
         }
         for outcome in fits {
@@ -226,43 +193,16 @@ fn too_loud(outcome: &Outcome, rate_hz: f64) -> Option<f64> {
     (outcome.scope.sensor == Sensor::Gyro && n > MOST_DEG_SQRT_H).then_some(n)
 }
 
-/// The recordings beside one another, and the change of each fit without one of them.
-fn recordings_section(json: &Value, document: &mut Document) {
-    document.section("Abnormal recordings");
-    let columns = [
-        ("recording", "file"),
-        ("sensor", "sensor"),
-        ("verdict", "verdict"),
-        ("noise: p", "noise/p_value"),
-        ("scales (s)", "noise/tau_s"),
-        ("outliers: p", "outliers/p_value"),
-        ("scales (s)", "outliers/tau_s"),
-        ("drift: p", "drift/p_value"),
-    ];
-    document.table(&Table::of(json, "/replicates/*", &columns).without_unknown());
-}
-
 /// A row a parameter.
 fn parameters(outcome: &Outcome) -> Table {
     let model = &outcome.fit.composite;
     let mut table = Table::new(["parameter (SI, of a sample)", "value", "95 % interval"]);
     for (of, value) in model.parameters() {
-        // phi is told by its distance from 1
-        let digits = |x: f64| {
-            if of.parameter.is_shape() {
-                format!("{x:.6}")
-            } else {
-                readable(x)
-            }
-        };
-        let interval = interval_of(intervals(outcome), of).map(|i| match i.absent {
-            None => [i.low, i.high].map(digits).join(" … "),
-            Some(_) => "not determined".to_owned(),
-        });
-        table.row(
-            std::iter::once(model.name_of(of).into())
-                .chain([digits(value), interval.unwrap_or_default()].map(Cell::figures)),
-        );
+        let mut known = intervals(outcome).iter().filter(|i| i.absent.is_none());
+        let ends = known.find(|i| i.of == of);
+        let ends = ends.map(|i| format!("{:.5e} … {:.5e}", i.low, i.high));
+        let value = format!("{value:.5e}");
+        table.row([model.name_of(of), value, ends.unwrap_or_default()].map(Cell::from));
     }
     table
 }
@@ -284,30 +224,21 @@ fn group_name(fitted: &FittedCurve) -> String {
 
 /// The Allan deviation, with N, B and K where they are read off it, and the ratio of the wavelet variance to that of the model.
 fn chart(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_hz: f64) -> Chart {
-    let FittedCurve {
-        tau_s,
-        wv,
-        ci_low,
-        ci_high,
-        implied,
-        ..
-    } = fitted;
     // a scale is two averages long, the wavelet variance half the Allan variance
-    let averages_s: Vec<f64> = tau_s.iter().map(|tau_s| 0.5 * tau_s).collect();
-    let allan = |wv: &[f64]| wv.iter().map(|nu| (2.0 * nu).sqrt()).collect::<Vec<f64>>();
-    let ratio = |wv: &[f64]| -> Vec<f64> {
-        wv.iter()
-            .zip(implied)
-            .map(|(nu, model)| nu / model)
-            .collect()
+    let averages_s: Vec<f64> = fitted.tau_s.iter().map(|tau_s| 0.5 * tau_s).collect();
+    let curve_of = |wv: &[f64], of: &dyn Fn(f64, usize) -> f64| -> Vec<f64> {
+        (0..wv.len()).map(|i| of(wv[i], i)).collect()
     };
-    let data = |[mid, low, high]: [Vec<f64>; 3]| {
+    let data = |of: &dyn Fn(f64, usize) -> f64| {
+        let [low, high] = [&fitted.ci_low, &fitted.ci_high].map(|wv| curve_of(wv, of));
+        let mid = curve(&averages_s, &curve_of(&fitted.wv, of));
         [
             Series::new("data, 95 %", Colour::Ink, band(&averages_s, &low, &high)),
-            Series::line("data, 95 %", Colour::Ink, curve(&averages_s, &mid)),
+            Series::line("data, 95 %", Colour::Ink, mid),
         ]
     };
-    let line = |wv: &[f64]| curve(&averages_s, &allan(wv));
+    let allan = |nu: f64, _: usize| (2.0 * nu).sqrt();
+    let line = |wv: &[f64]| curve(&averages_s, &curve_of(wv, &allan));
     let mut upper = recordings(fitted, diagnoses, line);
     upper.extend(
         fitted
@@ -317,8 +248,8 @@ fn chart(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_
             .zip(PROCESSES.into_iter().cycle())
             .map(|((name, wv), hue)| Series::dashed(name, Colour::Hue(hue), line(wv))),
     );
-    upper.extend(data([wv, ci_low, ci_high].map(|wv| allan(wv))));
-    upper.push(Series::line("model", Colour::REAL, line(implied)));
+    upper.extend(data(&allan));
+    upper.push(Series::line("model", Colour::REAL, line(&fitted.implied)));
     if let Some(practical) = outcome.practical(rate_hz) {
         let (pair, minimum) = (practical.parameters.walk, practical.parameters.minimum);
         let read = [
@@ -331,23 +262,14 @@ fn chart(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_
         upper.extend(
             read.into_iter()
                 .flatten()
-                .map(|(name, x, y)| Series::new(name, Colour::RIGHT, Mark::Reading(x, y))),
+                .map(|(name, x, y)| Series::new(name, Colour::RIGHT, Mark::Place(x, y))),
         );
     }
-    let mut lower = data([wv, ci_low, ci_high].map(|wv| ratio(wv))).to_vec();
+    let mut lower = data(&|nu, i| nu / fitted.implied[i]).to_vec();
     lower.push(Series::new("model", Colour::REAL, Mark::Level(1.0)));
-    let panels = [
-        (
-            1.4,
-            ChartAxis::log(&format!("Allan deviation ({})", fitted.sensor.unit())),
-            upper,
-        ),
-        (
-            0.5,
-            ChartAxis::log("data / model").including(0.8, 1.25),
-            lower,
-        ),
-    ];
+    let deviation = ChartAxis::log(&format!("Allan deviation ({})", fitted.sensor.unit()));
+    let ratio = ChartAxis::log("data / model").including(0.8, 1.25);
+    let panels = [(1.4, deviation, upper), (0.5, ratio, lower)];
     let panels = panels.map(|(height, axis, series)| Panel {
         height,
         ..Panel::new(axis, series)
@@ -363,8 +285,8 @@ fn chart(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_
 
 /// Hues of processes: those that neither model nor recordings have.
 const PROCESSES: [usize; 5] = [0, 2, 3, 4, 5];
-/// Hues of abnormal recordings.
-const ABNORMAL: [usize; 2] = [6, 7];
+/// First of the two hues of abnormal recordings.
+const ABNORMAL: usize = 6;
 
 /// Thin lines, grey but for the abnormal ones.
 fn recordings(
@@ -393,7 +315,7 @@ fn recordings(
                 None => Series::thin("recordings", Colour::Soft, points),
                 Some(k) => Series::line(
                     &format!("{name} (abnormal)"),
-                    Colour::Hue(ABNORMAL[k % ABNORMAL.len()]),
+                    Colour::Hue(ABNORMAL + k % 2),
                     points,
                 ),
             }
@@ -439,7 +361,7 @@ fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
 }
 
 /// `2 of 6 recordings are abnormal: run4 (accel outliers), run5 (accel noise, gyro noise)`; none of a single recording.
-fn recordings_line(outcomes: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<String> {
+fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> Option<String> {
     let names = in_order(diagnoses.iter().map(|d| d.name.as_str()));
     let count = names.len();
     if count == 0 {
@@ -510,7 +432,7 @@ fn beginnings(found: &Beginnings) -> Option<(&'static str, String)> {
 }
 
 /// `accel.x`, with the estimator where there are several.
-fn fit_name(outcome: &Outcome, outcomes: &[&Outcome]) -> String {
+fn fit_name(outcome: &Outcome, outcomes: &[Outcome]) -> String {
     match outcomes.iter().filter(|o| o.scope == outcome.scope).count() {
         1 => outcome.scope.name(),
         _ => format!("{} {}", outcome.scope.name(), outcome.estimator),
@@ -582,11 +504,6 @@ fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
             continue;
         };
         let [time, longest] = [time_s, longest_s].map(duration);
-        if time_s * rate_hz < 1.0 {
-            notes.push(format!(
-                "{label}: correlation time {time} is below a sample, as of white noise"
-            ));
-        }
         // Before its peak the curve of an AR1 rises as that of a random walk does: without the peak only sigma2 is known.
         if PEAK * time_s > longest_s {
             notes.push(format!(
@@ -629,7 +546,7 @@ fn undetermined(interval: &ParameterInterval, why: &Undetermined, labels: &[Stri
 /// Notes on the recordings of a sensor: on those that are abnormal, on what all have in common.
 fn recording_notes(
     sensor: Sensor,
-    outcomes: &[&Outcome],
+    outcomes: &[Outcome],
     diagnoses: &[Diagnosis],
     settings: &Settings,
 ) -> Vec<String> {
@@ -673,7 +590,7 @@ fn recording_notes(
 fn trim_note(
     sensor: Sensor,
     abnormal: usize,
-    outcomes: &[&Outcome],
+    outcomes: &[Outcome],
     settings: &Settings,
 ) -> Option<String> {
     if !settings.estimators.contains(&Estimator::DrAwv) {
@@ -775,7 +692,7 @@ fn fit_record(outcome: &Outcome, settings: &Settings) -> Value {
 /// replicates of one noise differ as much at some scale; `parameter_spread` are laws of model files; `missed` are the
 /// scales at which curve and model differ by more than four standard deviations; `zero` are the processes whose amplitude
 /// is zero, `at_end` those whose correlation time lies at the end of its range.
-pub(super) fn fit_json(outcome: &Outcome, all: &[&Outcome], settings: &Settings) -> Value {
+fn fit_json(outcome: &Outcome, all: &[Outcome], settings: &Settings) -> Value {
     let (fit, rate_hz) = (&outcome.fit, settings.rate_hz);
     let (inference, ranking) = (outcome.inference.as_ref(), outcome.ranking.as_ref());
     let labels = fit.composite.labels();
@@ -859,12 +776,8 @@ fn intervals(outcome: &Outcome) -> &[ParameterInterval] {
     outcome.inference.as_ref().map_or(&[], |i| &i.intervals)
 }
 
-fn interval_of(intervals: &[ParameterInterval], of: ParameterRef) -> Option<&ParameterInterval> {
-    intervals.iter().find(|i| i.of == of)
-}
-
 /// The means of one sensor, by the model of one estimator; where a bias is seen both probabilities are below `level`.
-pub(super) fn turn_on_json(found: &TurnOnSpread) -> Value {
+fn turn_on_json(found: &TurnOnSpread) -> Value {
     json!({
         "sensor": found.sensor,
         "estimator": found.estimator,
@@ -881,25 +794,20 @@ pub(super) fn turn_on_json(found: &TurnOnSpread) -> Value {
     })
 }
 
-/// A figure of a model, in the unit of data sheets, or why the data do not show it. `ends`: the 95 % interval where draws were
-/// made, if they determine it; `averages`: averaging times at which it is the largest part.
+/// A figure of a model in the unit of data sheets, where the data show it; `ci95`: its interval, where it is determined;
+/// `averages`: averaging times at which it counts.
 fn figure(
-    (name, unit): (String, &str),
-    value: Result<f64, &str>,
-    ends: Option<Option<[f64; 2]>>,
-    averages: String,
+    name: &str,
+    unit: &str,
+    value: Option<f64>,
+    ci95: Option<[f64; 2]>,
+    averages: &str,
 ) -> Value {
     json!({
         "name": name,
-        "value": value.ok(),
-        "ci95": ends.flatten().filter(|_| value.is_ok()),
+        "value": value,
+        "ci95": ci95.filter(|_| value.is_some()),
         "unit": unit,
-        "interval": match (value, ends) {
-            (Err(why), _) => why.to_owned(),
-            (_, None) => String::new(),
-            (_, Some(None)) => "not determined".to_owned(),
-            (_, Some(Some(ends))) => ends.map(readable).join(" … "),
-        },
         "averages": averages,
     })
 }
@@ -911,30 +819,28 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
         .map_or_else(BTreeMap::new, |p| practical_figures(outcome, &p));
     let model = &outcome.fit.composite;
     for (index, (process, label)) in model.processes.iter().zip(model.labels()).enumerate() {
-        let Some((letter, name, unit, parameter, convert)) =
-            further_figure(process, outcome.scope.sensor)
-                .filter(|_| !outcome.fit.zero.contains(&index))
-        else {
+        let found = further_figure(process, outcome.scope.sensor);
+        let is_zero = outcome.fit.zero.contains(&index);
+        let Some((letter, name, unit, parameter, convert)) = found.filter(|_| !is_zero) else {
             continue;
         };
         let own = |of: ParameterRef| of.process == index && of.parameter == parameter;
-        let interval = intervals(outcome).iter().find(|i| own(i.of)).map(|i| {
+        let mut known = intervals(outcome).iter().filter(|i| i.absent.is_none());
+        let ends = known.find(|i| own(i.of)).map(|i| {
             let mut ends = [i.low, i.high].map(|end| convert(end, rate_hz));
             ends.sort_by(f64::total_cmp);
-            i.absent.is_none().then_some(ends)
+            ends
         });
         let value = model.parameters().find(|(of, _)| own(*of));
-        let figure = figure(
-            (format!("{label} {name}"), unit),
-            value.map(|(_, value)| convert(value, rate_hz)).ok_or(""),
-            interval,
-            averages(outcome, index, rate_hz),
-        );
+        let value = value.map(|(_, value)| convert(value, rate_hz));
         let key = match letter {
             "T" => format!("T_{label}"),
             letter => letter.to_owned(),
         };
-        figures.insert(key, figure);
+        figures.insert(
+            key,
+            figure(&format!("{label} {name}"), unit, value, ends, "–"),
+        );
     }
     figures
 }
@@ -946,61 +852,53 @@ fn practical_figures(outcome: &Outcome, practical: &Practical) -> BTreeMap<Strin
         Sensor::Accel => ["velocity random walk N", "accel. random walk K"],
         Sensor::Gyro => ["angle random walk N", "rate random walk K"],
     };
-    let figure =
-        |name: &str, quantity: Quantity, value: Result<f64, &str>, ends: Option<[f64; 2]>, at| {
-            let (unit, factor) = quantity.sheet(sensor);
-            let ends = outcome
-                .inference
-                .is_some()
-                .then_some(ends.map(|ends| ends.map(|end| end * factor)));
-            figure((name.to_owned(), unit), value.map(|x| x * factor), ends, at)
-        };
-    let crossover = pair.crossover_s().map(duration);
     let none = format!("none up to {}", duration(practical.range_s));
+    let crossover = pair.crossover_s().map(duration);
     let to = crossover
         .as_ref()
         .map_or(String::new(), |t| format!("up to {t}"));
-    let from = crossover.map_or(none.clone(), |t| {
-        format!(
-            "from {t}{}",
-            practical
-                .walk_until_s
-                .map(|t| format!(" to {}", duration(t)))
-                .unwrap_or_default()
-        )
-    });
+    let until = practical
+        .walk_until_s
+        .map(|t| format!(" to {}", duration(t)));
+    let from = crossover.map(|t| format!("from {t}{}", until.unwrap_or_default()));
     let minimum = practical.parameters.minimum;
-    let floor = minimum.map_or(none, |m| format!("floor at {}", duration(m.tau_s)));
-    let named = [
+    let floor = minimum.map(|m| format!("floor at {}", duration(m.tau_s)));
+    let (n, b) = (pair.density, minimum.map(|m| m.bias_instability()));
+    let k = practical.walk_is_observed().then_some(pair.walk);
+    let rows = [
         (
             "N",
-            figure(white, Quantity::Density, Ok(pair.density), ends.density, to),
+            white,
+            Quantity::Density,
+            Some(n),
+            ends.density,
+            Some(to),
         ),
         (
             "B",
-            figure(
-                "bias instability B",
-                Quantity::Bias,
-                minimum.map(|m| m.bias_instability()).ok_or("not reached"),
-                ends.instability,
-                floor,
-            ),
+            "bias instability B",
+            Quantity::Bias,
+            b,
+            ends.instability,
+            floor,
         ),
-        (
-            "K",
-            figure(
-                walk,
-                Quantity::Walk,
-                practical
-                    .walk_is_observed()
-                    .then_some(pair.walk)
-                    .ok_or("not observed"),
-                ends.walk,
-                from,
-            ),
-        ),
+        ("K", walk, Quantity::Walk, k, ends.walk, from),
     ];
-    named.map(|(key, figure)| (key.to_owned(), figure)).into()
+    let row = |(key, name, quantity, value, ends, averages): (
+        _,
+        &str,
+        Quantity,
+        Option<f64>,
+        Option<[f64; 2]>,
+        Option<String>,
+    )| {
+        let (unit, factor) = quantity.sheet(sensor);
+        let ends = ends.map(|ends| ends.map(|end| end * factor));
+        let averages = averages.as_ref().unwrap_or(&none);
+        let figure = figure(name, unit, value.map(|x| x * factor), ends, averages);
+        (str::to_owned(key), figure)
+    };
+    rows.map(row).into()
 }
 
 /// Letter, name and unit of what a process is known by beside N and K, the parameter that it follows from, and how, at a
@@ -1039,43 +937,6 @@ fn further_figure(process: &Process, sensor: Sensor) -> Option<FurtherFigure> {
     })
 }
 
-/// Averaging times at which a process is the largest part of the model's wavelet variance.
-fn averages(outcome: &Outcome, index: usize, rate_hz: f64) -> String {
-    let model = &outcome.fit.composite;
-    let part = |process: &Process, level: u32| match process.haar_wv(level) / model.haar_wv(level) {
-        part if part.is_finite() => part,
-        // Of nothing nothing is a part.
-        _ => 0.0,
-    };
-    let largest_at = |level: u32| {
-        model
-            .processes
-            .iter()
-            .map(|p| part(p, level))
-            .enumerate()
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(i, _)| i)
-    };
-    let levels = outcome.counted_levels();
-    let leads = || levels.iter().filter(|l| largest_at(**l) == Some(index));
-    let time = |level: &u32| duration(0.5 * tau_s(*level, rate_hz));
-    match (leads().next(), leads().next_back()) {
-        (Some(first), Some(last)) if first == last => time(first),
-        (Some(first), Some(last)) => format!("{} – {}", time(first), time(last)),
-        _ => {
-            format!(
-                "none ({} at most)",
-                percent(
-                    levels
-                        .iter()
-                        .map(|l| part(&model.processes[index], *l))
-                        .fold(0.0, f64::max)
-                )
-            )
-        }
-    }
-}
-
 // The model file of a calibration.
 
 /// The facts of a calibration for its model files.
@@ -1089,12 +950,25 @@ pub(crate) struct CalibrationNote {
     pub inputs: Vec<Input>,
 }
 
-impl CalibrationNote {
-    /// The model file of one estimator. Channels of no group are missing in it. `curves`: BLAKE3, in hexadecimal, of the
-    /// file of curves that goes beside it.
-    pub(crate) fn model_file(&self, shown: &ShownCalibration<'_>, curves: &str) -> ModelFile {
-        let (outcomes, settings) = (&shown.outcomes, shown.settings);
-        let mut file = ModelFile::new(model_of(outcomes.iter().copied(), settings.rate_hz));
+impl Calibration {
+    /// What the command prints as JSON.
+    pub(super) fn json(&self) -> Value {
+        let fit = |o| fit_json(o, &self.outcomes, &self.settings);
+        json!({
+            "schema_version": 1,
+            "rate_hz": self.settings.rate_hz,
+            "model": self.settings.model.to_string(),
+            "fits": self.outcomes.iter().map(fit).collect::<Value>(),
+            "replicates": self.diagnoses,
+            "turn_on": self.turn_on.iter().map(turn_on_json).collect::<Value>(),
+        })
+    }
+
+    /// The model file of the fits, which are of one estimator. Channels of no group are missing in it. `curves`: BLAKE3, in
+    /// hexadecimal, of the file of curves that goes beside it.
+    pub(super) fn model_file(&self, curves: &str) -> ModelFile {
+        let (outcomes, rate_hz) = (&self.outcomes, self.settings.rate_hz);
+        let mut file = ModelFile::new(model_of(outcomes, rate_hz));
         file.missing = Channel::ALL.to_vec();
         for outcome in outcomes {
             for channel in outcome.scope.channels() {
@@ -1103,20 +977,19 @@ impl CalibrationNote {
             }
         }
         file.spread = spread(outcomes);
-        let mut provenance = self.provenance(outcomes, settings, curves);
+        let mut provenance = self.provenance(curves);
         let mut remarks = toml::Table::new();
         let mut turn_on = TurnOn::default();
-        for found in &shown.turn_on {
+        for found in &self.turn_on {
             let sensor = found.sensor;
             remarks.insert(sensor.name().to_owned(), turn_on_remark(found).into());
-            let sigmas = found.sigmas().map(|sigmas| {
-                Axis::ALL.map(
-                    |axis| match file.missing.contains(&Channel { sensor, axis }) {
-                        true => 0.0,
-                        false => sigmas[axis as usize],
-                    },
-                )
-            });
+            let is_missing = |axis| file.missing.contains(&Channel { sensor, axis });
+            let sigma = |sigmas: [f64; 3], axis| match is_missing(axis) {
+                true => 0.0,
+                false => sigmas[axis as usize],
+            };
+            let sigmas = found.sigmas();
+            let sigmas = sigmas.map(|sigmas| Axis::ALL.map(|axis| sigma(sigmas, axis)));
             match sensor {
                 Sensor::Accel => turn_on.accel_m_s2 = sigmas,
                 Sensor::Gyro => turn_on.gyro_rad_s = sigmas,
@@ -1130,10 +1003,11 @@ impl CalibrationNote {
         file
     }
 
-    fn provenance(&self, outcomes: &[&Outcome], settings: &Settings, curves: &str) -> toml::Table {
+    fn provenance(&self, curves: &str) -> toml::Table {
+        let (outcomes, settings, note) = (&self.outcomes, &self.settings, &self.note);
         let estimator = outcomes.first().map_or(Estimator::Given, |o| o.estimator);
         let is_robust = estimator.is_robust();
-        let fit = |outcome: &&Outcome| known(fit_record(outcome, settings));
+        let fit = |outcome: &Outcome| known(fit_record(outcome, settings));
         // TOML integers are signed; larger seeds go as text.
         let seed =
             |seed: u64| i64::try_from(seed).map_or_else(|_| json!(seed.to_string()), Into::into);
@@ -1144,19 +1018,19 @@ impl CalibrationNote {
             "model": settings.model.to_string(),
             "weighting": settings.weighting.name(),
             "fit_range_s": settings.fit_range.map(|range| [range.from_s, range.to_s]),
-            "seed": self.seed.map(seed),
+            "seed": note.seed.map(seed),
             "efficiency": is_robust.then(|| settings.tuning.efficiency()),
             "fits": outcomes.iter().map(fit).collect::<Vec<_>>(),
-            "inputs": self.inputs,
+            "inputs": note.inputs,
             "curves_blake3": curves,
         }));
-        table.extend(self.reading.clone());
+        table.extend(note.reading.clone());
         table
     }
 }
 
 /// The laws by which the parameters of recordings differ; none where none is known to.
-fn spread(outcomes: &[&Outcome]) -> Option<Spread> {
+fn spread(outcomes: &[Outcome]) -> Option<Spread> {
     let mut spread = Spread::default();
     for outcome in outcomes {
         let (composite, labels) = (&outcome.fit.composite, outcome.fit.composite.labels());

@@ -1,6 +1,6 @@
 //! Calibration: from static recordings, or directories of them, to a noise model for each sensor or axis.
 
-use super::document::{CalibrationNote, ShownCalibration, fit_json, turn_on_json};
+use super::document::CalibrationNote;
 use crate::app::reading::note_report;
 use crate::app::{Context, Failure, refused};
 use crate::io::recordings::{FileReport, ReadOptions, Report};
@@ -16,7 +16,6 @@ use nav_sim_signal::names::UnknownName;
 use nav_sim_signal::noise::Model;
 use nav_sim_signal::wavelet::{Curve, Tuning, default_levels};
 use rayon::prelude::*;
-use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -250,35 +249,16 @@ impl Calibration {
         )
     }
 
-    /// The fits of one estimator, or all of them.
-    pub(crate) fn shown(&self, estimator: Option<Estimator>) -> ShownCalibration<'_> {
-        let is_shown = |own: Estimator| estimator.is_none_or(|chosen| chosen == own);
-        let outcomes: Vec<&Outcome> = self
-            .outcomes
-            .iter()
-            .filter(|o| is_shown(o.estimator))
-            .collect();
-        let fits = outcomes
-            .iter()
-            .map(|o| fit_json(o, &outcomes, &self.settings));
-        let turn_on = self.turn_on.iter().filter(|t| is_shown(t.estimator));
-        let turn_on: Vec<&TurnOnSpread> = turn_on.collect();
-        ShownCalibration {
-            json: json!({
-                "schema_version": 1,
-                "rate_hz": self.settings.rate_hz,
-                "model": self.settings.model.to_string(),
-                "fits": fits.collect::<Vec<_>>(),
-                "replicates": self.diagnoses,
-                "turn_on": turn_on.iter().map(|t| turn_on_json(t)).collect::<Vec<_>>(),
-            }),
-            diagnoses: &self.diagnoses,
-            turn_on,
-            curves: CurvesFile::new(&self.groups, &outcomes, &self.settings),
-            outcomes,
-            beginnings: &self.beginnings,
-            settings: &self.settings,
-        }
+    /// The fits of one estimator, with the findings about all recordings.
+    pub(crate) fn of(&self, estimator: Estimator) -> Self {
+        let mut one = self.clone();
+        one.outcomes.retain(|o| o.estimator == estimator);
+        one.turn_on.retain(|t| t.estimator == estimator);
+        one
+    }
+
+    pub(crate) fn curves(&self) -> CurvesFile {
+        CurvesFile::new(&self.groups, &self.outcomes, &self.settings)
     }
 }
 
@@ -424,13 +404,9 @@ fn shortest(report: &Report, scales: Option<u32>, context: &Context<'_>) {
         found[found.len() / 2],
     );
     if scales < usual {
-        context.warn(if scales < used { format!(
-                "{recording}: its {samples} samples have {scales} scales; the longer ones, up to {used} scales, are \
-                 averaged over the longer recordings alone"
-            ) } else { format!(
-                "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there \
-                 would be more (half of them have {usual}): leave it out for those"
-            ) });
+        context.warn(format!(
+            "{recording}: its {samples} samples have {scales} scales, half of the recordings have {usual}; the average has {used}"
+        ));
     }
 }
 

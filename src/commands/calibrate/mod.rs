@@ -28,9 +28,8 @@ pub(crate) use document::CalibrationNote;
 pub use measure::{Calibration, CalibrationOptions, EstimatorChoice, calibrate};
 pub(crate) use measure::{Measured, measure, visit, without_warm_up};
 
-use crate::app::inputs::{files, listed};
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
-use crate::app::{Answer, Command, Context, Inputs, Out, OutputFile, Result, refused};
+use crate::app::{Answer, Command, Context, Out, OutputFile, Result, refused};
 use crate::io::draws_file::DrawsFile;
 use crate::io::input;
 use crate::io::model_file::ModelFile;
@@ -64,6 +63,7 @@ Examples:
 pub struct Calibrate {
     /// Recordings, or directories of recordings
     #[arg(
+        id = "recording",
         value_name = "INPUT",
         required_unless_present = "curve",
         conflicts_with = "curve"
@@ -146,12 +146,6 @@ impl Command for Calibrate {
         }
     }
 
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(files("curve", &self.curve)
-            .chain(listed("recording", &self.inputs)?)
-            .collect())
-    }
-
     fn run(&self, context: &Context<'_>) -> Result<Calibration> {
         let settings = self.settings()?;
         let mut calibration = match &self.curve {
@@ -189,13 +183,13 @@ impl Command for Calibrate {
 
 impl Serialize for Calibration {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.shown(None).json.serialize(serializer)
+        self.json().serialize(serializer)
     }
 }
 
 impl Answer for Calibration {
     fn document(&self) -> Document {
-        self.shown(None).document()
+        self.page()
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {
@@ -257,30 +251,14 @@ impl Calibrate {
 
     fn structure(&self) -> Result<ModelChoice> {
         let chosen: ModelChoice = self.model.parse().map_err(unknown_model)?;
-        if self.estimator != EstimatorChoice::One(Estimator::Avlr) {
-            return Ok(chosen);
-        }
-        if self.tuning.fitted().is_some() {
+        let is_avlr = self.estimator == EstimatorChoice::One(Estimator::Avlr);
+        if is_avlr && self.tuning.fitted().is_some() {
             return refused(
                 "--scales FROM:TO with --estimator avlr: slopes are read where they are found",
                 "--estimator gmwm fits the same curve over a range",
             );
         }
-        let without = match &chosen {
-            ModelChoice::Given(spec) => spec
-                .kinds()
-                .iter()
-                .find(|k| k.shape().is_some())
-                .map(|k| k.code()),
-            ModelChoice::Auto => Some("the AR1 of auto"),
-        };
-        let Some(name) = without else {
-            return Ok(chosen);
-        };
-        refused(
-            format!("--estimator avlr: {name} has no slope of its own in the Allan deviation"),
-            "--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm",
-        )
+        Ok(chosen)
     }
 }
 
@@ -326,11 +304,9 @@ impl Calibration {
         (model_name, stem): (String, String),
         inflated: Option<(&Model, &str)>,
     ) -> Vec<OutputFile<'static>> {
-        let shown = self.shown(Some(estimator));
-        let curves = report::json(&shown.curves);
-        let mut model = self
-            .note
-            .model_file(&shown, &input::hash_of(curves.as_bytes()));
+        let shown = self.of(estimator);
+        let curves = report::json(&shown.curves());
+        let mut model = shown.model_file(&input::hash_of(curves.as_bytes()));
         let mut draws = DrawsFile::of(&shown.outcomes, self.settings.rate_hz);
         if let Some((inflated, how)) = inflated {
             draws = None;
@@ -342,7 +318,7 @@ impl Calibration {
                 ..ModelFile::new(inflated.clone())
             };
         }
-        let page = shown.document();
+        let page = shown.page();
         let named = |ending: &str, text| OutputFile::whole(format!("{stem}{ending}"), text);
         let draws = draws.map(|draws| {
             let text = serde_json::to_string(&draws).expect("plain structs are always JSON");

@@ -4,18 +4,16 @@ use super::FEWEST;
 use super::ranking::Score;
 use crate::app::Failure;
 use nav_sim_calibration::{
-    CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, Pool, Replicate, Settings,
+    CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, Replicate, Settings,
     Verdict, calibrate, diagnose, grouped, model_of,
 };
 use nav_sim_navigation::ekf::{Belief, BeliefError, FilterStates};
 use nav_sim_navigation::monte_carlo;
 use nav_sim_navigation::scenario::Scenario;
-use nav_sim_navigation::sensors::imu::{Truth, TruthError};
+use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_navigation::simulation::lincov::{
-    Aim, Factor, FilterPass, Task, Track, TrueErrors, TruthSide, scaled,
-};
-use nav_sim_navigation::simulation::{Experiment, ExperimentError};
+use nav_sim_navigation::simulation::lincov::{Factor, Track, scaled};
+use nav_sim_navigation::simulation::{ExperimentError, RunResult};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::noise::Model;
@@ -42,14 +40,11 @@ pub enum Inflation {
     /// Nothing.
     #[default]
     None,
-    /// One factor on the variances of each sensor, so that the filter is honest, in the mean, for the models of the
-    /// single recordings that it was calibrated on.
-    Tuned,
     /// All standard deviations ten times: the rule of thumb.
     Tenfold,
 }
 
-nav_sim_signal::named!(Inflation { None = "none", Tuned = "tuned", Tenfold = "x10" });
+nav_sim_signal::named!(Inflation { None = "none", Tenfold = "x10" });
 
 impl Candidate {
     /// The estimator's model as it is, in the default filter of 15 states.
@@ -74,10 +69,6 @@ impl Candidate {
             n2(Estimator::DrAwv),
             Self {
                 filter: FilterStates::Full,
-                ..n2(Estimator::Awv)
-            },
-            Self {
-                inflation: Inflation::Tuned,
                 ..n2(Estimator::Awv)
             },
             Self {
@@ -121,6 +112,21 @@ impl Candidate {
             }
         }
         all
+    }
+
+    /// The calibrated model, inflated.
+    pub(crate) fn inflated(&self, model: &Model) -> Model {
+        match self.inflation {
+            Inflation::None => model.clone(),
+            Inflation::Tenfold => {
+                let on_variance = 100.0;
+                let factor = |sensor| Factor {
+                    sensor,
+                    on_variance,
+                };
+                scaled(model, &Sensor::ALL.map(factor))
+            }
+        }
     }
 
     /// Whether another one has the same model, before any inflation.
@@ -205,50 +211,20 @@ pub struct Unit {
     pub replicates: Vec<(Channel, Replicate)>,
 }
 
-/// All recordings and how models are made of them.
+/// All recordings and how models are made of them. Estimators and model of the settings count nothing: those of the
+/// candidates do.
 #[derive(Debug)]
 pub struct Laboratory {
-    units: Vec<Unit>,
-    settings: Settings,
-    /// The noise of each recording alone, as it was met: N2 fitted to the classical wavelet variance of each axis.
-    models: Vec<Model>,
+    /// The recordings.
+    pub units: Vec<Unit>,
+    /// How models are fitted.
+    pub settings: Settings,
 }
 
 /// The groups of recordings that were calibrated, their fits, and how these were made.
 type Calibrated = (Vec<Group>, Vec<Outcome>, Settings);
 
 impl Laboratory {
-    /// Estimators and model of the settings count nothing: those of the candidates do.
-    ///
-    /// # Errors
-    /// When a curve is too short for N2.
-    pub fn new(units: Vec<Unit>, settings: Settings) -> Result<Self, Failure> {
-        let mut laboratory = Self {
-            units,
-            settings,
-            models: Vec::new(),
-        };
-        let own = |unit: &Unit| {
-            let (_, outcomes, settings) = laboratory
-                .fit(
-                    &[unit],
-                    Estimator::Awv,
-                    &ModelChoice::Given(ModelSpec::n2()),
-                    Some(Pool::Axes),
-                )
-                .map_err(|e| {
-                    Failure::from(e).within(&format!("the noise of {} alone", unit.name))
-                })?;
-            Ok(model_of(&outcomes, settings.rate_hz))
-        };
-        laboratory.models = laboratory
-            .units
-            .par_iter()
-            .map(own)
-            .collect::<Result<_, Failure>>()?;
-        Ok(laboratory)
-    }
-
     /// Calibrates a candidate on all recordings but one, before any inflation. An estimator of single recordings takes
     /// that after the one left out (the first, where none is), so that each is taken once.
     ///
@@ -264,7 +240,7 @@ impl Laboratory {
         } else {
             self.others(without).map(|k| &self.units[k]).collect()
         };
-        self.fit(&of_units, candidate.estimator, &candidate.model, None)
+        self.fit(&of_units, candidate.estimator, &candidate.model)
     }
 
     /// The recordings but one.
@@ -280,7 +256,7 @@ impl Laboratory {
     pub(crate) fn judges(&self) -> Result<Vec<usize>, CalibrationError> {
         let n2 = ModelChoice::Given(ModelSpec::n2());
         let all: Vec<&Unit> = self.units.iter().collect();
-        let (groups, outcomes, settings) = self.fit(&all, Estimator::DrAwv, &n2, None)?;
+        let (groups, outcomes, settings) = self.fit(&all, Estimator::DrAwv, &n2)?;
         let mut diagnoses = diagnose(&groups, &outcomes, &settings);
         diagnoses.retain(|diagnosis| diagnosis.verdict != Verdict::Normal);
         let is_abnormal = |name: &String| diagnoses.iter().any(|d| d.name == *name);
@@ -303,19 +279,13 @@ impl Laboratory {
         units: &[&Unit],
         estimator: Estimator,
         model: &ModelChoice,
-        pool: Option<Pool>,
     ) -> Result<Calibrated, CalibrationError> {
         let settings = Settings {
             estimators: vec![estimator],
             model: model.clone(),
             ..self.settings.clone()
         };
-        // an estimator of single recordings cannot pool axes
-        let pool = if estimator.is_single() {
-            Pool::Axes
-        } else {
-            pool.unwrap_or(settings.pool())
-        };
+        let pool = settings.pool();
         let groups = grouped(
             units
                 .iter()
@@ -343,13 +313,12 @@ pub struct Drive {
 /// One recording left out.
 #[derive(Debug, Clone)]
 pub struct Fold {
-    /// Scores of the candidates, in their order: on windows of the recording, or what is expected where it is shorter
-    /// than the trajectory.
-    pub scores: Vec<Score>,
-    /// As covariance analysis expects them where the recording's own N2 makes the errors.
-    pub expected: Vec<Score>,
-    /// Windows that were navigated; 0 where the recording is shorter than the trajectory.
+    /// The recording.
+    pub recording: String,
+    /// Windows of it that were navigated.
     pub windows: u64,
+    /// Scores of the candidates, in their order.
+    pub scores: Vec<Score>,
 }
 
 impl Drive {
@@ -398,7 +367,8 @@ impl Drive {
     /// takes every candidate along the trajectory `runs` times. `progress` is told how many runs are done.
     ///
     /// # Errors
-    /// When a model cannot be made, has no such filter, or rates do not fit together.
+    /// When a model cannot be made, has no such filter, rates do not fit together, or the recording is shorter than the
+    /// trajectory.
     pub fn leave_out(
         &self,
         laboratory: &Laboratory,
@@ -407,35 +377,19 @@ impl Drive {
         candidates: &[Candidate],
         runs: u64,
         progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<Fold, Failure> {
+    ) -> Result<Vec<Score>, Failure> {
         let beliefs = self.beliefs(candidates, &self.models(laboratory, Some(k), candidates)?)?;
-        let expected = self.expected(&beliefs, &laboratory.models[k]);
-        recordings.retain(|r| self.independent_windows(r.len()) >= 1.0);
-        let sampled = match monte_carlo::run(
-            &self.experiment(Truth::Static(&recordings), &beliefs),
-            runs,
-            progress,
-        ) {
-            Ok(results) => Some(
-                results
-                    .iter()
-                    .map(|r| Score::of_runs(&r.runs, r.outages.len()))
-                    .collect(),
-            ),
-            // none is as long as the trajectory, or lacks its last sample
-            Err(ExperimentError::Truth(TruthError::TooShort { .. })) => None,
-            Err(_) if recordings.is_empty() => None,
-            Err(e) => return Err(e.into()),
-        };
-        if sampled.is_none() {
-            progress(runs);
+        if recordings.len() > 1 {
+            recordings.retain(|r| self.independent_windows(r.len()) >= 1.0);
         }
-        let windows = if sampled.is_some() { runs } else { 0 };
-        Ok(Fold {
-            scores: sampled.unwrap_or_else(|| expected.clone()),
-            expected,
-            windows,
-        })
+        let truth = Truth::Static(&recordings);
+        let (trajectory, outages) = (&self.trajectory, &self.outages);
+        let experiment = self
+            .scenario
+            .experiment(trajectory, truth, &beliefs, outages, self.seed);
+        let results = monte_carlo::run(&experiment, runs, progress)?;
+        let score = |r: &RunResult| Score::of(&r.runs, outages.len());
+        Ok(results.iter().map(score).collect())
     }
 
     /// The model of every candidate, of all recordings but one, inflated as it says.
@@ -463,58 +417,10 @@ impl Drive {
                     model_of(&outcomes, settings.rate_hz)
                 }
             };
-            models.push(self.inflated(laboratory, without, candidate, &model)?);
+            models.push(candidate.inflated(&model));
             made.push((candidate, model));
         }
         Ok(models)
-    }
-
-    /// A candidate's calibrated model, inflated as it says; tuned for the recordings but one.
-    ///
-    /// # Errors
-    /// When the noise of a recording cannot be described, or a model has no filter.
-    pub(crate) fn inflated(
-        &self,
-        laboratory: &Laboratory,
-        without: Option<usize>,
-        candidate: &Candidate,
-        model: &Model,
-    ) -> Result<Model, Failure> {
-        match candidate.inflation {
-            Inflation::None => Ok(model.clone()),
-            Inflation::Tenfold => {
-                let on_variance = 100.0;
-                Ok(scaled(
-                    model,
-                    &Sensor::ALL.map(|sensor| Factor {
-                        sensor,
-                        on_variance,
-                    }),
-                ))
-            }
-            Inflation::Tuned => {
-                let truths = laboratory
-                    .others(without)
-                    .map(|k| laboratory.models[k].clone().into());
-                let full = self.scenario.with_full_noise();
-                let full = |model: &Model| full.belief(model, &self.outages, &self.track);
-                let task = Task {
-                    model,
-                    truths: &truths.collect::<Vec<TrueErrors>>(),
-                    drawn: None,
-                    track: &self.track,
-                    full: &full,
-                    // a reduced filter is made so that it is as honest as the full one
-                    filter: &full,
-                    aim: Aim::Mean,
-                    allow_smaller: true,
-                };
-                Ok(scaled(
-                    model,
-                    &task.factors().map_err(|source| unfit(candidate, source))?,
-                ))
-            }
-        }
     }
 
     /// What each candidate's filter believes.
@@ -527,25 +433,6 @@ impl Drive {
                 .map_err(|source| unfit(candidate, source))
         };
         candidates.par_iter().zip(models).map(belief).collect()
-    }
-
-    /// Every filter on the same fixes.
-    fn experiment<'a>(&'a self, truth: Truth<'a>, beliefs: &'a [Belief]) -> Experiment<'a> {
-        let (trajectory, outages) = (&self.trajectory, &self.outages);
-        self.scenario
-            .experiment(trajectory, truth, beliefs, outages, self.seed)
-    }
-
-    /// Every filter where a model makes the errors.
-    fn expected(&self, beliefs: &[Belief], truth: &Model) -> Vec<Score> {
-        let sources = TruthSide::together(&TruthSide::sources(
-            &self.experiment(Truth::Model(truth), beliefs),
-            truth,
-        ));
-        let score = |belief: &Belief| {
-            Score::expected(&FilterPass::new(&self.track, belief).errors_at_ends(&sources))
-        };
-        beliefs.par_iter().map(score).collect()
     }
 }
 

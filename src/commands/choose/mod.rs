@@ -7,7 +7,7 @@
 //! raise by claiming more, or less, than it knows. The recording is the unit of every interval, not the window:
 //! windows of one recording share its noise. [`Ranking`] compares candidates pair by pair, recording by recording.
 
-use crate::app::inputs::{self, SettingsArgs, files, listed};
+use crate::app::inputs::{self, SettingsArgs};
 use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
 use crate::app::{Answer, Command, Context, Inputs, Out, OutputFile, Result, refused};
 use crate::commands::calibrate::{
@@ -24,7 +24,7 @@ use nav_sim_document::{
 };
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_signal::imu::{Channel, Recording};
+use nav_sim_signal::imu::Recording;
 use nav_sim_signal::noise::Model;
 use ranking::{Mean, Placed, Ranking};
 use serde::Serialize;
@@ -53,7 +53,7 @@ Examples:
       --estimator awv --model N1,WN+RW --filter 15,full -o out/models --format json")]
 pub struct Choose {
     /// Static recordings, three or more files, or directories of them
-    #[arg(required = true, value_name = "RECORDINGS")]
+    #[arg(id = "recording", required = true, value_name = "RECORDINGS")]
     inputs: Vec<PathBuf>,
     /// Trajectory: motion profile (.toml) or table (.csv)
     #[arg(long, value_name = "FILE")]
@@ -72,13 +72,12 @@ pub struct Choose {
     /// [default: 15, and full with awv]
     #[arg(long, value_name = "STATES", value_delimiter = ',')]
     filter: Vec<FilterStates>,
-    /// How models are inflated: none, tuned (consistent in the mean for the models of the single recordings), x10 (ten
-    /// times the standard deviations) [default: none, and all three with awv]
+    /// How models are inflated: none, x10 (ten times the standard deviations) [default: none, and both with awv]
     #[arg(long, value_name = "HOW", value_delimiter = ',')]
     inflate: Vec<Inflation>,
-    /// Runs on each recording (default: two for each window that fits side by side, 16 to 64)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
-    runs: Option<u64>,
+    /// Runs on each recording
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    runs: u64,
     /// What DR-AWV drops at each end of each scale: a number, or a share such as 30%
     #[arg(long, value_name = "A", default_value_t)]
     trim: Trim,
@@ -149,12 +148,8 @@ impl Command for Choose {
         ],
     };
 
-    fn inputs(&self) -> Result<Inputs> {
-        self.candidates()?;
-        Ok(files("trajectory", [&self.trajectory])
-            .chain(listed("recording", &self.inputs)?)
-            .chain(files("scenario", &self.settings.file.scenario))
-            .collect())
+    fn inputs(&self, given: Inputs) -> Result<Inputs> {
+        self.candidates().map(|_| given)
     }
 
     /// Files are read twice, so that no more than a few are in memory.
@@ -208,18 +203,14 @@ impl Command for Choose {
             );
         }
         let units = units(&measured);
-        let samples: Vec<usize> = units.iter().map(samples_in).collect();
-        let laboratory = Laboratory::new(units, measured.settings)?;
-        let drive = Drive::new(&trajectory, scenario, outages.clone(), rate_hz, seed)?;
-        let runs_on = |k: &usize| {
-            // two on each window that lies in the recording side by side; whole batches
-            let windows = drive.independent_windows(samples[*k]);
-            self.runs
-                .unwrap_or(((2.0 * windows / 8.0).ceil() as u64 * 8).clamp(16, 64))
+        let laboratory = Laboratory {
+            units,
+            settings: measured.settings,
         };
+        let drive = Drive::new(&trajectory, scenario, outages.clone(), rate_hz, seed)?;
         let judges = laboratory.judges()?;
-        context.begin("runs", judges.iter().map(runs_on).sum());
-        let mut folds: Vec<(String, Fold)> = Vec::new();
+        context.begin("runs", judges.len() as u64 * self.runs);
+        let mut folds = Vec::new();
         for k in &judges {
             let file = &files[*k];
             let (read, _) = recordings::read(std::slice::from_ref(&file.path), &reading)?;
@@ -229,22 +220,22 @@ impl Command for Choose {
                 .map(|recording| without_warm_up(recording, options.skip_warm_up).0)
                 .collect();
             let advance = |n| context.advance(n);
-            folds.push((
-                file.file.clone(),
-                drive.leave_out(&laboratory, *k, read, &candidates, runs_on(k), &advance)?,
-            ));
+            let (recording, windows) = (file.file.clone(), self.runs);
+            let scores = drive
+                .leave_out(&laboratory, *k, read, &candidates, windows, &advance)
+                .map_err(|e| e.within(&recording))?;
+            folds.push(Fold {
+                recording,
+                windows,
+                scores,
+            });
         }
         context.end();
         let ranking = Ranking::new(&candidates, &folds);
         let winner = &candidates[ranking.candidates[0].index];
         // an estimator of single recordings never wins: this is of all of them
         let (groups, outcomes, settings) = laboratory.calibrate(winner, None)?;
-        let model = drive.inflated(
-            &laboratory,
-            None,
-            winner,
-            &model_of(&outcomes, settings.rate_hz),
-        )?;
+        let model = winner.inflated(&model_of(&outcomes, settings.rate_hz));
         let mut calibration = Calibration::new(
             groups,
             outcomes,
@@ -351,18 +342,6 @@ fn units(measured: &Measured) -> Vec<Unit> {
     measured.report.files.iter().map(unit).collect()
 }
 
-/// Samples of a recording that were measured: a warm-up that is left out is not among them.
-fn samples_in(unit: &Unit) -> usize {
-    let of_channel = |channel: Channel| {
-        unit.replicates
-            .iter()
-            .filter(|(of_channel, _)| *of_channel == channel)
-            .map(|(_, r)| r.samples)
-            .sum::<usize>()
-    };
-    Channel::ALL.into_iter().map(of_channel).max().unwrap_or(0)
-}
-
 // The ranking of candidates as a document.
 
 impl Ranking {
@@ -417,11 +396,8 @@ impl ChoiceMade {
             .iter()
             .map(|o| window(o.start_s, o.end_s))
             .collect();
-        document.facts(&[
-            ("trajectory", self.trajectory.clone()),
-            ("outages", ends.join(", ")),
-            ("seed", self.seed.to_string()),
-        ]);
+        let (trajectory, ends, seed) = (&self.trajectory, ends.join(", "), self.seed);
+        document.text(&format!("along {trajectory}, outages {ends}, seed {seed}"));
         let columns = [
             ("candidate", "candidate"),
             ("", "place"),
@@ -432,17 +408,15 @@ impl ChoiceMade {
             ("95 %", "nees/ci95"),
             ("RMSE (m)", "rmse_m"),
         ];
-        document.lead(Table::of(&json, "/candidates/*", &columns));
+        document.table(Table::of(&json, "/candidates/*", &columns));
         document.chart(&self.chart(), CAPTION);
         let columns = [
             ("candidate", "candidate"),
             ("RMSE (m)", "rmse_m"),
-            ("to the best (%)", "difference/rmse_pct/value"),
-            ("95 %", "difference/rmse_pct/ci95"),
             ("believed (m)", "believed_m"),
             ("coverage (0.95)", "coverage"),
         ];
-        document.table(&Table::of(&json, "/candidates/*", &columns));
+        document.table(Table::of(&json, "/candidates/*", &columns));
         let columns = [
             ("recording left out", "recording"),
             ("candidate", "../../candidate"),
@@ -452,7 +426,7 @@ impl ChoiceMade {
             ("RMSE (m)", "rmse_m"),
         ];
         let folds = Table::of(&json, "/candidates/*/folds/*", &columns);
-        document.folded("Recording by recording", |inside| inside.table(&folds));
+        document.folded("Recording by recording", |inside| inside.table(folds));
         document
     }
 
@@ -482,15 +456,6 @@ impl ChoiceMade {
                 format!("no candidate describes {names}: look at it with nav-sim calibrate")
             }
         });
-        warn(&ranking.decisive, &|names| {
-            format!("without any one of {names} another candidate would win")
-        });
-        if folds.iter().any(|fold| fold.windows == 0) {
-            document.note(
-                Importance::Remark,
-                "recordings shorter than the trajectory are judged by covariance analysis, their own N2 as truth",
-            );
-        }
     }
 
     /// Log scores against the best, a row a candidate.

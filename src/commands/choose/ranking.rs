@@ -1,7 +1,6 @@
 //! Candidates beside one another, recording by recording.
 
 use super::candidates::{Candidate, Fold};
-use nav_sim_navigation::simulation::lincov::Judged;
 use nav_sim_navigation::simulation::{NEES_DOF, OutageRecord, RunRecord};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
@@ -29,8 +28,6 @@ pub struct Difference {
     pub log_score: Mean,
     /// The same interval, true of all candidates together at 95 % (Bonferroni).
     pub joint95: (f64, f64),
-    /// Its horizontal RMSE above the winner's (%), mean of the logarithms of the ratios.
-    pub rmse_pct: Mean,
 }
 
 /// A candidate on one recording.
@@ -38,13 +35,11 @@ pub struct Difference {
 pub struct FoldScore {
     /// The recording that was left out.
     pub recording: String,
-    /// Windows of it; 0 where it is shorter than the trajectory, and the score is the expected one.
+    /// Windows of it.
     pub windows: u64,
     /// How it did.
     #[serde(flatten)]
     pub score: Score,
-    /// As covariance analysis expects it where the recording's own N2 makes the errors.
-    pub expected: Score,
 }
 
 /// A candidate with its place.
@@ -69,8 +64,7 @@ pub struct Placed {
     /// Mean NEES at the ends of outages; 9 is right.
     pub nees: Mean,
     /// Share of the ends within the filter's 95 % ellipsoid.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub coverage: Option<f64>,
+    pub coverage: f64,
     /// Beside the winner.
     pub difference: Difference,
     /// Recording by recording.
@@ -86,8 +80,6 @@ pub struct Ranking {
     pub tied: Vec<String>,
     /// The candidates.
     pub candidates: Vec<Placed>,
-    /// Recordings without which another candidate would win.
-    pub decisive: Vec<String>,
     /// Recordings that no candidate describes: the least NEES of all is above 18 where 9 is right.
     pub undescribed: Vec<String>,
     /// Whether the data tell the winner from any other that may be chosen.
@@ -99,11 +91,11 @@ impl Ranking {
     ///
     /// # Panics
     /// Without a candidate that may be chosen, or without a recording.
-    pub fn new(candidates: &[Candidate], folds: &[(String, Fold)]) -> Self {
+    pub fn new(candidates: &[Candidate], folds: &[Fold]) -> Self {
         let eligible: Vec<usize> = (0..candidates.len())
             .filter(|c| candidates[*c].is_eligible())
             .collect();
-        let all: Vec<&Fold> = folds.iter().map(|(_, fold)| fold).collect();
+        let all: Vec<&Fold> = folds.iter().collect();
         let winner = best(&eligible, &all).expect("one may be chosen, of one recording at least");
         let rivals = eligible.len().saturating_sub(1).max(1);
         let mut placed: Vec<Placed> = (0..candidates.len())
@@ -114,12 +106,7 @@ impl Ranking {
                 .cmp(&a.eligible)
                 .then(b.log_score.value.total_cmp(&a.log_score.value))
         });
-        let without = |left_out: usize| {
-            let mut rest = all.clone();
-            rest.remove(left_out);
-            best(&eligible, &rest).is_some_and(|other| other != winner)
-        };
-        let named = |k: usize| folds[k].0.clone();
+        let named = |k: usize| folds[k].recording.clone();
         let fails = |k: &usize| !all[*k].scores.iter().any(|s| s.all.nees <= FAILS);
         let tells = folds.len() >= FEWEST && placed.iter().any(|p| p.eligible && !p.tied);
         let tied = placed.iter().skip(1).filter(|p| p.place == "tied");
@@ -127,10 +114,6 @@ impl Ranking {
             winner: placed[0].candidate.clone(),
             tied: tied.map(|p| p.candidate.clone()).collect(),
             candidates: placed,
-            decisive: (0..folds.len())
-                .filter(|k| without(*k))
-                .map(named)
-                .collect(),
             undescribed: (0..folds.len()).filter(fails).map(named).collect(),
             tells,
         }
@@ -149,19 +132,13 @@ fn best(eligible: &[usize], folds: &[&Fold]) -> Option<usize> {
         .filter(|_| !folds.is_empty())
 }
 
-fn place(
-    c: usize,
-    candidate: &Candidate,
-    winner: usize,
-    rivals: usize,
-    folds: &[(String, Fold)],
-) -> Placed {
-    let scores = || folds.iter().map(|(_, fold)| &fold.scores[c]);
+fn place(c: usize, candidate: &Candidate, winner: usize, rivals: usize, folds: &[Fold]) -> Placed {
+    let scores = || folds.iter().map(|fold| &fold.scores[c]);
     let per_recording = |value: &dyn Fn(&Score) -> f64| scores().map(value).collect::<Vec<f64>>();
     let paired = |value: &dyn Fn(&Score) -> f64| -> Vec<f64> {
         folds
             .iter()
-            .map(|(_, f)| value(&f.scores[c]) - value(&f.scores[winner]))
+            .map(|f| value(&f.scores[c]) - value(&f.scores[winner]))
             .collect()
     };
     let density = paired(&|s| s.all.log_score);
@@ -171,13 +148,11 @@ fn place(
     );
     let root_mean_square =
         |values: Vec<f64>| (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
-    let fold = |(recording, fold): &(String, Fold)| FoldScore {
-        recording: recording.clone(),
+    let fold = |fold: &Fold| FoldScore {
+        recording: fold.recording.clone(),
         windows: fold.windows,
         score: fold.scores[c].clone(),
-        expected: fold.expected[c].clone(),
     };
-    let coverage: Option<Vec<f64>> = scores().map(|s| s.coverage).collect();
     // where nothing is known of the difference, nothing tells them apart
     let is_worse = joint95.1 < 0.0 || log_score.value == f64::NEG_INFINITY;
     let (eligible, tied) = (candidate.is_eligible(), c == winner || !is_worse);
@@ -196,30 +171,9 @@ fn place(
         rmse_m: root_mean_square(per_recording(&|s| s.all.rmse_m)),
         believed_m: root_mean_square(per_recording(&|s| s.all.believed_m)),
         nees: positive(interval(&per_recording(&|s| s.all.nees), 0.05)),
-        coverage: coverage.map(|all| all.iter().sum::<f64>() / all.len() as f64),
-        difference: Difference {
-            log_score,
-            joint95,
-            rmse_pct: rmse_ratio_pct(c, winner, folds),
-        },
+        coverage: mean(scores().map(|s| s.coverage)),
+        difference: Difference { log_score, joint95 },
         folds: folds.iter().map(fold).collect(),
-    }
-}
-
-/// The RMSE over all recordings against that of the winner (%). The interval is that of the mean of what each recording adds to the
-/// logarithm of the ratio (its derivative with respect to the recording's weight).
-fn rmse_ratio_pct(c: usize, winner: usize, folds: &[(String, Fold)]) -> Mean {
-    let square = |candidate: usize, fold: &Fold| fold.scores[candidate].all.rmse_m.powi(2);
-    let mean = |candidate: usize| {
-        folds.iter().map(|(_, f)| square(candidate, f)).sum::<f64>() / folds.len() as f64
-    };
-    let (own, best) = (mean(c), mean(winner));
-    let added = |(_, f): &(String, Fold)| 0.5 * (square(c, f) / own - square(winner, f) / best);
-    let spread = interval(&folds.iter().map(added).collect::<Vec<_>>(), 0.05);
-    let percent = |more: f64| 100.0 * (0.5 * (own / best).ln() + more).exp_m1();
-    Mean {
-        value: percent(0.0),
-        ci95: (percent(spread.ci95.0), percent(spread.ci95.1)),
     }
 }
 
@@ -262,54 +216,19 @@ mod ranking_tests {
                 nees: 9.0,
                 log_score,
             },
-            coverage: Some(0.95),
+            coverage: 0.95,
             diverged: 0,
             outages: Vec::new(),
         };
-        let scores: Vec<Score> = scores.iter().map(score).collect();
         Fold {
-            expected: scores.clone(),
-            scores,
+            recording: "a".to_owned(),
             windows: 16,
+            scores: scores.iter().map(score).collect(),
         }
     }
 
-    /// What stands beside one another agrees: the ratio is that of the RMSE shown, though the mean of the recordings' own
-    /// ratios is on the other side (RMSE 10 and 1 against 9 and 2: √(101/85) = 1.09, the geometric mean 0.745). Of two recordings the
-    /// interval by hand: each adds ½(100/50.5 − 81/42.5) = ±0.0372 to the logarithm, so that a half width is
-    /// t √(2 · 0.0372² (1/2 + 1)) with t = 12.706 of one degree of freedom. What is positive has positive intervals.
     #[test]
-    fn the_ratio_of_the_rmse_is_that_of_the_rmse_shown() {
-        let with = |rmse_m: [f64; 2]| {
-            let scores = rmse_m
-                .map(|rmse_m| {
-                    let mut score = fold(&[0.0]).scores[0].clone();
-                    score.all.rmse_m = rmse_m;
-                    score
-                })
-                .to_vec();
-            Fold {
-                expected: scores.clone(),
-                scores,
-                ..fold(&[])
-            }
-        };
-        let folds = [
-            ("a".to_owned(), with([10.0, 9.0])),
-            ("b".to_owned(), with([1.0, 2.0])),
-        ];
-        let Mean { value, ci95 } = rmse_ratio_pct(0, 1, &folds);
-        assert!(
-            (value - 100.0 * ((101.0_f64 / 85.0).sqrt() - 1.0)).abs() < 1e-9,
-            "{value}"
-        );
-        let added = 0.5 * (100.0 / 50.5 - 81.0 / 42.5);
-        let half = 12.706_204_7 * (2.0 * f64::powi(added, 2) * 1.5).sqrt();
-        let high = 100.0 * ((101.0_f64 / 85.0).sqrt() * half.exp() - 1.0);
-        assert!(
-            (ci95.1 / high - 1.0).abs() < 1e-6 && ci95.0 > -100.0,
-            "{ci95:?} {high}"
-        );
+    fn the_interval_of_what_is_positive_is_positive() {
         let nees = positive(Mean {
             value: 30.0,
             ci95: (-20.0, 80.0),
@@ -325,11 +244,11 @@ mod ranking_tests {
             .iter()
             .map(|e| Candidate::new(*e, "WN".parse().unwrap()))
             .collect();
-        let folds: Vec<(String, Fold)> = folds
-            .iter()
-            .enumerate()
-            .map(|(k, s)| (format!("r{k}"), fold(s)))
-            .collect();
+        let named = |(k, scores): (usize, &&[f64])| Fold {
+            recording: format!("r{k}"),
+            ..fold(scores)
+        };
+        let folds: Vec<Fold> = folds.iter().enumerate().map(named).collect();
         Ranking::new(&candidates, &folds)
     }
 
@@ -373,7 +292,6 @@ mod ranking_tests {
             ],
         );
         assert_eq!((found.candidates[0].index, found.tells), (1, false));
-        assert_eq!(found.decisive, ["r3"]);
         assert!(found.candidates.iter().all(|c| c.tied));
     }
 
@@ -413,9 +331,8 @@ pub struct Score {
     /// Over all outages; the log score is minus infinity (null) where a run diverged.
     #[serde(flatten)]
     pub all: EndScore,
-    /// Share of errors within the filter's 95 % ellipsoid of the nine states; none where nothing is sampled.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub coverage: Option<f64>,
+    /// Share of errors within the filter's 95 % ellipsoid of the nine states.
+    pub coverage: f64,
     /// Runs that diverged; they are in no mean.
     pub diverged: usize,
     /// Outage by outage.
@@ -437,13 +354,12 @@ pub struct EndScore {
 
 impl Score {
     /// Of runs with so many outages.
-    pub(crate) fn of_runs(runs: &[RunRecord], outages: usize) -> Self {
+    pub(crate) fn of(runs: &[RunRecord], outages: usize) -> Self {
         let kept: Vec<&[OutageRecord]> = runs
             .iter()
             .filter(|r| !r.diverged)
             .map(|r| r.outages.as_slice())
             .collect();
-        let diverged = runs.len() - kept.len();
         let end = |i: usize| {
             let mean =
                 |value: &dyn Fn(&OutageRecord) -> f64| mean(kept.iter().map(|run| value(&run[i])));
@@ -454,45 +370,21 @@ impl Score {
                 log_score: mean(&|o| o.log_density_end),
             }
         };
+        let outages: Vec<EndScore> = (0..outages).map(end).collect();
+        let over = |value: &dyn Fn(&EndScore) -> f64| mean(outages.iter().map(value));
         let limit = ChiSquared::new(NEES_DOF as f64).map_or(f64::NAN, |law| law.inverse_cdf(0.95));
         let inside = |o: &OutageRecord| f64::from(u8::from(o.nees_end <= limit));
-        let coverage = mean(kept.iter().flat_map(|run| run.iter()).map(inside));
-        let mut score = Self {
-            coverage: Some(coverage),
-            diverged,
-            ..Self::of_ends((0..outages).map(end).collect())
-        };
-        if diverged > 0 {
-            score.all.log_score = f64::NEG_INFINITY;
-        }
-        score
-    }
-
-    /// As covariance analysis expects it.
-    pub(crate) fn expected(ends: &[Judged]) -> Self {
-        let end = |end: &Judged| {
-            let found = end.consistency();
-            EndScore {
-                rmse_m: found.rmse[0].hypot(found.rmse[1]),
-                believed_m: found.sigma[0].hypot(found.sigma[1]),
-                nees: found.nees,
-                log_score: found.log_density,
-            }
-        };
-        Self::of_ends(ends.iter().map(end).collect())
-    }
-
-    fn of_ends(outages: Vec<EndScore>) -> Self {
-        let mean = |value: &dyn Fn(&EndScore) -> f64| mean(outages.iter().map(value));
+        let diverged = runs.len() - kept.len();
+        let density = if diverged > 0 { f64::NEG_INFINITY } else { 0.0 };
         Self {
             all: EndScore {
-                rmse_m: mean(&|o| o.rmse_m.powi(2)).sqrt(),
-                believed_m: mean(&|o| o.believed_m.powi(2)).sqrt(),
-                nees: mean(&|o| o.nees),
-                log_score: mean(&|o| o.log_score),
+                rmse_m: over(&|o| o.rmse_m.powi(2)).sqrt(),
+                believed_m: over(&|o| o.believed_m.powi(2)).sqrt(),
+                nees: over(&|o| o.nees),
+                log_score: over(&|o| o.log_score) + density,
             },
-            coverage: None,
-            diverged: 0,
+            coverage: mean(kept.iter().flat_map(|run| run.iter()).map(inside)),
+            diverged,
             outages,
         }
     }

@@ -3,10 +3,7 @@
 //! [`Export::new`] fits the pair that the target knows ([`noise::practical`](nav_sim_signal::noise::practical)) to the model's
 //! noisiest axis, states by how much the two differ, and [`Export::text`] writes it in the target's own syntax (`targets.rs`).
 
-use crate::app::inputs::files;
-use crate::app::{
-    Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, refused,
-};
+use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Refuse, Result, refused};
 use crate::io::model_file::{self, ModelFile};
 use crate::parse::{one_of, seconds_range};
 use nav_sim_calibration::percent;
@@ -18,7 +15,7 @@ use nav_sim_signal::noise::practical::{
 use nav_sim_signal::noise::{Composite, Kind};
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use serde_json::json;
 use std::path::PathBuf;
 
 mod targets;
@@ -59,26 +56,8 @@ fn horizon(text: &str) -> Result<Horizon, String> {
     Ok(Horizon { from_s, to_s })
 }
 
-/// An export as it is printed and written; SI units in its JSON.
-#[derive(Serialize)]
-pub struct ExportAnswer {
-    schema_version: u32,
-    target: &'static str,
-    model: String,
-    rate_hz: f64,
-    policy: &'static str,
-    horizon_s: [f64; 2],
-    entries: Vec<Entry>,
-    sensors: BTreeMap<&'static str, SensorExport>,
-    warnings: Vec<String>,
-    #[serde(skip)]
-    summary: Vec<String>,
-    #[serde(skip)]
-    text: String,
-}
-
 impl Command for ExportArgs {
-    type Answer = ExportAnswer;
+    type Answer = Export;
     const NAME: &'static str = "export";
     const OUT: Out = Out::File {
         name: "parameters.txt",
@@ -87,46 +66,48 @@ impl Command for ExportArgs {
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
 
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(files("model", [&self.model]).collect())
-    }
-
-    fn run(&self, _: &Context<'_>) -> Result<ExportAnswer> {
+    fn run(&self, _: &Context<'_>) -> Result<Export> {
         let file = model_file::read(&self.model)?;
-        let shown = self.model.display().to_string();
+        let model = self.model.display().to_string();
         let export = Export::new(&file, self.target, self.policy, self.horizon)
-            .map_err(|failure| failure.within(&shown))?;
-        Ok(ExportAnswer {
-            schema_version: 1,
-            target: self.target.name,
-            rate_hz: export.rate_hz,
-            policy: self.policy.name(),
-            horizon_s: [self.horizon.from_s, self.horizon.to_s],
-            entries: export.filled(&[]).0,
-            warnings: export.doubts(),
-            summary: export.summary(),
-            text: export.text(&shown),
-            model: shown,
-            sensors: export.sensors.map(|s| (s.sensor.name(), s)).into(),
-        })
+            .map_err(|failure| failure.within(&model))?;
+        Ok(Export { model, ..export })
     }
 }
 
-impl Answer for ExportAnswer {
+impl Serialize for Export {
+    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let [accel, gyro] = &self.sensors;
+        json!({
+            "schema_version": 1,
+            "target": self.target.name,
+            "model": self.model,
+            "rate_hz": self.rate_hz,
+            "policy": self.policy.name(),
+            "horizon_s": [self.horizon.from_s, self.horizon.to_s],
+            "entries": self.filled(&[]).0,
+            "sensors": { "accel": accel, "gyro": gyro },
+            "warnings": self.doubts(),
+        })
+        .serialize(to)
+    }
+}
+
+impl Answer for Export {
     fn document(&self) -> Document {
-        let mut document = Document::new(self.target, Tone::Good, [""; 0]);
-        let mut note = |importance, lines: &[String]| {
+        let mut document = Document::new(self.target.name, Tone::Good, [""; 0]);
+        let mut note = |importance, lines: Vec<String>| {
             lines
-                .iter()
+                .into_iter()
                 .for_each(|line| document.note(importance, line));
         };
-        note(Importance::Remark, &self.summary);
-        note(Importance::Warning, &self.warnings);
+        note(Importance::Remark, self.summary());
+        note(Importance::Warning, self.doubts());
         document
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {
-        vec![OutputFile::whole("", self.text.clone() + "\n")]
+        vec![OutputFile::whole("", self.text(&self.model) + "\n")]
     }
 }
 
@@ -173,6 +154,8 @@ struct SensorExport {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Export {
     target: Target,
+    /// Name of the model.
+    model: String,
     /// Sample rate of the model, for values per sample (Hz).
     rate_hz: f64,
     policy: Policy,
@@ -270,6 +253,7 @@ impl Export {
         }
         Ok(Self {
             target,
+            model: String::new(),
             rate_hz,
             policy,
             horizon,

@@ -3,19 +3,15 @@
 use super::{Cause, FuseAnswer};
 use crate::report::trajectory::track_map;
 use crate::report::{reduction_doubt, reduction_line, tone};
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use nav_sim_document::{
-    Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke, Table, readable,
-    seconds, window,
+    Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, readable, seconds,
+    window,
 };
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::frames::NavState;
 use nav_sim_navigation::fusion::{ClocksApart, Finding, FixRecord, Row, Solution};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
-use std::path::Path;
-
-const CHECKED: &str =
-    "solutions of simulated recordings are consistent with their covariance, smoothed ones too.";
 
 impl FuseAnswer {
     /// Verdict, figures, charts and notes.
@@ -26,7 +22,8 @@ impl FuseAnswer {
             tone(summary.verdict.kind),
             self.verdict(),
         );
-        document.facts(&self.facts());
+        document.text(&self.span());
+        document.text(&format!("start: {}", summary.initial.how.join("; ")));
         let outages: Vec<_> = summary
             .outcome
             .outages
@@ -44,7 +41,6 @@ impl FuseAnswer {
         }
         document.section("Fixes");
         document.chart(&innovations(solution, &outages), FIXES);
-        document.checked(CHECKED);
         if let Some(quality) = &self.reduction {
             match reduction_doubt(quality) {
                 Some(doubt) => document.note(Importance::Warning, doubt),
@@ -95,18 +91,9 @@ impl FuseAnswer {
         }
     }
 
-    fn facts(&self) -> Vec<(&str, String)> {
+    /// `0–900 s, 90000 IMU samples at 100.00 Hz, 15 states`
+    fn span(&self) -> String {
         let summary = &self.summary;
-        let name = |path: &str| {
-            Path::new(path)
-                .file_name()
-                .map_or_else(String::new, |n| n.to_string_lossy().into())
-        };
-        let mut facts: Vec<_> = self
-            .inputs
-            .iter()
-            .map(|i| (i.role.as_str(), name(&i.path)))
-            .collect();
         let (samples, rate_hz) = (summary.imu_samples, summary.imu_rate_hz);
         let span = window(summary.start_s, summary.end_s);
         let states = summary.filter_states - summary.turn_on_states;
@@ -114,12 +101,7 @@ impl FuseAnswer {
             0 => String::new(),
             n => format!(" + {n} turn-on"),
         };
-        facts.push((
-            "solution",
-            format!("{span}, {samples} IMU samples at {rate_hz:.2} Hz, {states}{turn_on} states"),
-        ));
-        facts.push(("start", summary.initial.how.join("; ")));
-        facts
+        format!("{span}, {samples} IMU samples at {rate_hz:.2} Hz, {states}{turn_on} states")
     }
 
     /// Consistency and errors, of the filter and smoothed.
@@ -156,27 +138,12 @@ impl FuseAnswer {
                 "reference/rmse/yaw_deg smoothed/reference/rmse/yaw_deg",
             ),
         ];
-        let of_outage = |k: usize| {
-            ["fix", "reference"].map(|end| {
-                let place = format!("{{outages/{k}/start_s}}–{{outages/{k}/end_s}} s");
-                (
-                    format!("end of outage {place}: error from the {end} (m)"),
-                    format!("outages/{k}/end_from_{end}/horizontal_m -"),
-                )
-            })
-        };
-        let outages = 0..self.summary.outcome.outages.len();
-        let ends: Vec<_> = outages.flat_map(of_outage).collect();
-        let rows: Vec<_> = rows
-            .into_iter()
-            .chain(ends.iter().map(|(title, keys)| (&**title, &**keys)))
-            .collect();
         let table = Table::of_keys(self, &["", "filter", "smoothed"], &rows);
-        document.lead(table.without_unknown());
+        document.table(table.without_unknown());
         let mut table = |title: &str, table: Table| {
             if !table.is_empty() {
-                document.heading(title);
-                document.table(&table.without_unknown());
+                document.section(title);
+                document.table(table.without_unknown());
             }
         };
         let columns = [
@@ -339,12 +306,6 @@ fn cause(cause: &Cause) -> String {
 
 // A fusion drawn: track, position, errors, innovations.
 
-/// Points of a curve that is smooth: more do not show.
-const MOST: usize = 120;
-/// Fixes of one fate in a panel: more lie on one another.
-const MOST_FIXES: usize = 1000;
-/// Points of a line on the map.
-const MOST_PLACES: usize = 400;
 /// Velocities of a reference that are known worse than this are not drawn: its positions jump (m/s).
 const UNEVEN: f64 = 0.5;
 
@@ -359,49 +320,10 @@ fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let place = |row: &Row| {
         let NavState { lat, lon, h, .. } = row.state;
         let moved = ned_difference(solution.rows[0].state.place(), [lat, lon, h]);
-        DVec2::new(moved.y, moved.x)
+        [moved.y, moved.x]
     };
-    let error = |row: &Row| {
-        row.error
-            .map(|e| DVec2::new(e.values[1], e.values[0]))
-            .unwrap_or(DVec2::NAN)
-    };
-    let track = |rows: &[Row], point: &dyn Fn(&Row) -> DVec2| -> Vec<(f64, [f64; 2])> {
-        rows.iter()
-            .step_by(rows.len().div_ceil(MOST_PLACES).max(1))
-            .map(|row| (row.t_s, point(row).into()))
-            .collect()
-    };
-    let mut chart = track_map("solution", &track(&solution.rows, &place), "Track", outages);
-    let line = |track: Vec<(f64, [f64; 2])>| track.into_iter().map(|(_, p)| p.into()).collect();
-    let mut series = Vec::new();
-    // the lines lie on one another but for metres: wide beneath narrow beneath dashed, all are seen
-    if solution.rows.iter().any(|row| row.error.is_some()) {
-        series.push(Series::new(
-            "reference",
-            Colour::Ink,
-            Mark::Line(
-                line(track(&solution.rows, &|row| place(row) - error(row))),
-                Stroke::Bold,
-            ),
-        ));
-    }
-    let drawn = &mut chart.panels[0].series;
-    series.append(drawn);
-    series.extend(
-        solution
-            .smoothed
-            .iter()
-            .map(|rows| line(track(rows, &place)))
-            .map(|line| Series::dashed("smoothed", SMOOTHED, line)),
-    );
-    *drawn = series;
-    chart
-}
-
-/// Some of many rows, for curves that are smooth.
-fn thinned(rows: &[Row]) -> impl Iterator<Item = &Row> {
-    rows.iter().step_by(rows.len().div_ceil(MOST).max(1))
+    let track = solution.rows.iter().map(|row| (row.t_s, place(row)));
+    track_map("solution", &track.collect::<Vec<_>>(), "Track", outages)
 }
 
 /// Rows of the filter, and smoothed ones: names of what is stated and of the error, colours. A panel has room for three
@@ -425,7 +347,7 @@ fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
         series.push(Series::dashed(
             stated,
             believed,
-            thinned(rows)
+            rows.iter()
                 .map(|row| (row.t_s, row.sigma[0].hypot(row.sigma[1])))
                 .collect(),
         ));
@@ -459,7 +381,7 @@ fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
                 stated,
                 believed,
                 Mark::Band(
-                    thinned(rows)
+                    rows.iter()
                         .map(|row| (row.t_s, -row.sigma[i], row.sigma[i]))
                         .collect(),
                 ),
@@ -485,13 +407,8 @@ const FATES: [(bool, &str, Colour); 2] = [
 /// A series for each fate of fixes.
 fn fixes(fixes: &[FixRecord], value: &dyn Fn(&FixRecord) -> f64) -> Vec<Series> {
     let of_fate = |(fate, name, colour): (bool, &str, Colour)| {
-        let of_fate: Vec<&FixRecord> = fixes.iter().filter(|f| f.used == fate).collect();
-        let every = of_fate.len().div_ceil(MOST_FIXES).max(1);
-        let points = of_fate
-            .into_iter()
-            .step_by(every)
-            .map(|f| (f.t_s, value(f), f64::NAN));
-        let points: Vec<_> = points.collect();
+        let of_fate = fixes.iter().filter(|f| f.used == fate);
+        let points: Vec<_> = of_fate.map(|f| (f.t_s, value(f), f64::NAN)).collect();
         (!points.is_empty()).then(|| Series::points(name, colour, points))
     };
     FATES.into_iter().filter_map(of_fate).collect()

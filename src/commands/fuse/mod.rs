@@ -2,10 +2,8 @@
 
 mod document;
 
-use crate::app::inputs::files;
 use crate::app::{
-    Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Refuse, Result, inputs,
-    refused,
+    Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, inputs, refused,
 };
 use crate::commands::run::reduction_of;
 use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
@@ -14,17 +12,18 @@ use crate::io::trajectory_file::{self, load_reference};
 use crate::parse::{self, numbers};
 use crate::report::json;
 use glam::{DMat3, DQuat, DVec3};
-use nav_sim_document::{Document, Importance, seconds, shortest, window};
+use nav_sim_document::{Document, shortest, window};
 use nav_sim_navigation::earth::{GravityModel, radii};
 use nav_sim_navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
 use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
 use nav_sim_navigation::fusion::mounting::{self, Mounting};
 use nav_sim_navigation::fusion::{
-    Assessment, ClocksApart, Correlation, Displaced, Finding, Found, FusionError, Heading,
-    Levelling, Outcome, Recorded, Row, Settings, Solution, Start, Weighed, WheelSpeed, Whiteness,
-    aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier, fuse, fuse_correlated,
-    interval_s, outcome, rest_of_origin, rough_origin, vehicle_velocities, wheel_ratio,
+    Assessment, ClocksApart, Correlation, Displaced, Finding, FixRecord, Found, FusionError,
+    Heading, Levelling, Outcome, Recorded, Row, Settings, Solution, Start, Weighed, WheelSpeed,
+    Whiteness, aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier, fuse,
+    fuse_correlated, interval_s, outcome, rest_of_origin, rough_origin, vehicle_velocities,
+    wheel_ratio,
 };
 use nav_sim_navigation::gnss::{FixSigma, GnssFix};
 use nav_sim_navigation::linalg::median;
@@ -46,7 +45,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 
 impl Command for Fuse {
@@ -58,14 +57,10 @@ impl Command for Fuse {
     };
     const PLOT: bool = false;
 
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(files("imu", [&self.imu])
-            .chain(files("gnss", [&self.gnss]))
-            .chain(files("model", [&self.model]))
-            .chain(files("initial", self.initial_file()))
-            .chain(files("odometer", &self.odometer))
-            .chain(files("reference", &self.reference))
-            .collect())
+    fn inputs(&self, mut given: Inputs) -> Result<Inputs> {
+        let initial = self.initial_file();
+        given.extend(initial.map(|path| ("initial".to_owned(), path.clone())));
+        Ok(given)
     }
 
     fn run(&self, context: &Context<'_>) -> Result<FuseAnswer> {
@@ -417,18 +412,14 @@ pub struct FuseAnswer {
     /// Quality of the model reduced to the filter's states, where it loses something.
     #[serde(skip)]
     pub reduction: Option<ReductionQuality>,
-    /// Files by their roles.
-    #[serde(skip)]
-    inputs: Vec<Input>,
     /// Settings, for the manifest.
     #[serde(skip)]
     configuration: Value,
 }
 
 /// A drive that was read.
-struct Drive {
-    request: Fuse,
-    settings: Settings,
+struct Drive<'a> {
+    request: &'a Fuse,
     imu: Vec<ImuIncrement>,
     imu_rate_hz: f64,
     gnss: Vec<GnssFix>,
@@ -437,95 +428,54 @@ struct Drive {
     expected: InitialSettings,
     initial: Option<Start>,
     reference: Option<Reference>,
-    configuration: Value,
 }
 
-impl Drive {
+impl<'a> Drive<'a> {
     /// Reads the files of a request.
     ///
     /// # Errors
     /// A setting out of range, a file that cannot be used.
-    fn read(request: &Fuse, context: &Context<'_>) -> Result<Self> {
-        let settings = request.settings();
-        let (unsaid, gnss_sigma_factor) = request.gnss_sigma.unwrap_or((None, [1.0; 2]));
-        let [position, velocity] = gnss_sigma_factor;
+    fn read(request: &'a Fuse, context: &Context<'_>) -> Result<Self> {
+        let (unsaid, [position, velocity]) = request.gnss_sigma.unwrap_or((None, [1.0; 2]));
         let topic = |k: usize| {
-            request
-                .topic
-                .get(k)
-                .map(String::as_str)
-                .filter(|t| !t.is_empty())
+            let topic = request.topic.get(k).map(String::as_str);
+            topic.filter(|t| !t.is_empty())
         };
         let imu = read_imu(&request.imu, request.columns.as_deref(), topic(0))?;
-        let (mut gnss, remarks) = read_gnss(
-            &request.gnss,
-            unsaid.as_ref(),
-            imu.samples
-                .first()
-                .zip(imu.samples.last())
-                .map(|(first, last)| (first.t_s, last.t_s)),
-            topic(1),
-        )?;
+        let ends = imu.samples.first().zip(imu.samples.last());
+        let span = ends.map(|(first, last)| (first.t_s, last.t_s));
+        let (mut gnss, remarks) = read_gnss(&request.gnss, unsaid.as_ref(), span, topic(1))?;
         for fix in &mut gnss {
             *fix = fix.with_sigmas_times(position, velocity);
             fix.t_s -= request.gnss_delay_s;
         }
         for note in imu.remarks.into_iter().chain(remarks) {
-            match note.importance {
-                Importance::Warning => context.warn(note.text),
-                _ => context.remark(note.text),
-            }
+            context.note(note.importance, note.text);
         }
         let wheel = request
             .odometer
             .as_deref()
-            .map_or_else(|| Ok(Vec::new()), read_wheel)?;
+            .map(read_wheel)
+            .transpose()?
+            .unwrap_or_default();
         let initial = request
             .initial_file()
             .map(|path| read_initial(path))
             .transpose()?;
         let model = inputs::model(&request.model, context)?;
-        if (model.model.rate_hz / imu.rate_hz - 1.0).abs() > 0.01 {
-            let (from, to) = (model.model.rate_hz, imu.rate_hz);
-            context.detail(format!(
-                "the model was converted from {from} Hz to {to:.3} Hz"
-            ));
-        }
-        let mut expected = request.expected(
-            initial
-                .as_ref()
-                .map(|start| start.sigma.clone())
-                .unwrap_or_default(),
-        );
-        inputs::expect_turn_on(&mut expected, &model, &request.model, context);
+        let of_file = initial.as_ref().map(|start| start.sigma.clone());
+        let mut expected = request.expected(of_file.unwrap_or_default());
+        inputs::expect_turn_on(&mut expected, model.turn_on, &request.model, context);
         expected.validate().refuse()?;
         let options = trajectory_file::Options::default();
-        let reference = request
-            .reference
-            .as_deref()
-            .map(|path| load_reference(path, &options))
-            .transpose()?;
-        let reference = reference.map(|(reference, warnings)| {
+        let reference = request.reference.as_deref().map(|path| {
+            let (reference, warnings) = load_reference(path, &options)?;
             context.warn_each(&warnings);
-            reference
+            Ok::<_, Failure>(reference)
         });
-        let mut configuration = json!({
-            "settings": settings,
-            "filter": request.filter,
-            "initial": expected,
-            "gnss_sigma": unsaid,
-            "gnss_sigma_factor": gnss_sigma_factor,
-            "gnss_correlation": request.gnss_correlation,
-            "heading": request.given_heading(),
-            "gnss_delay_s": request.gnss_delay_s,
-        });
-        let aiding = request.aiding();
-        if !aiding.is_none() {
-            configuration["aiding"] = json!(aiding);
-        }
+        let reference = reference.transpose()?;
         Ok(Self {
-            request: request.clone(),
-            settings,
+            request,
             imu: imu.samples,
             imu_rate_hz: imu.rate_hz,
             gnss,
@@ -534,7 +484,6 @@ impl Drive {
             expected,
             initial,
             reference,
-            configuration,
         })
     }
 
@@ -549,7 +498,18 @@ impl Drive {
             gnss: &self.gnss,
             aids: &[],
         };
-        let mut settings = self.settings.clone();
+        let mut settings = self.request.settings();
+        let aiding = self.request.aiding();
+        let configuration = json!({
+            "settings": settings,
+            "filter": self.request.filter,
+            "initial": self.expected,
+            "gnss_sigma": self.request.gnss_sigma,
+            "gnss_correlation": self.request.gnss_correlation,
+            "heading": self.request.given_heading(),
+            "gnss_delay_s": self.request.gnss_delay_s,
+            "aiding": aiding,
+        });
         let (belief, reduction) = belief(
             (&self.model.model, self.request.filter, &self.expected),
             self.imu_rate_hz,
@@ -607,7 +567,6 @@ impl Drive {
             !is_early
         });
         // the start and the mounting are found without: they are what the vehicle's axes come from
-        let aiding = self.request.aiding();
         self.check_wheel(&recorded, &settings.outages)?;
         let aids = vehicle_velocities(&recorded, &self.wheel, &aiding, &settings.outages);
         recorded.aids = &aids;
@@ -635,24 +594,17 @@ impl Drive {
             settings: &settings,
             is_given: self.initial.is_some(),
         };
-        let cause = is_unexplained
-            .then(|| {
-                scene.cause(&Recorded {
-                    gnss: &weighed.gnss,
-                    ..recorded
-                })
-            })
-            .flatten()
-            .map(|cause| cause.after(delay_s));
-        let kind = if cause.is_some() {
-            verdict.max(VerdictKind::Doubtful)
-        } else {
-            verdict
+        let gnss = &weighed.gnss;
+        let cause = is_unexplained.then(|| scene.cause(&Recorded { gnss, ..recorded }));
+        let cause = cause.flatten().map(|cause| cause.after(delay_s));
+        let kind = match cause {
+            Some(_) => verdict.max(VerdictKind::Doubtful),
+            None => verdict,
         };
-        let evidence = findings
+        let grave = findings
             .into_iter()
-            .filter_map(|(verdict, finding)| (verdict > VerdictKind::Consistent).then_some(finding))
-            .collect();
+            .filter(|(verdict, _)| *verdict > VerdictKind::Consistent);
+        let evidence = grave.map(|(_, finding)| finding).collect();
         let constants = belief
             .groups
             .iter()
@@ -674,17 +626,10 @@ impl Drive {
             imu_samples: weighed.solution.samples,
             imu_rate_hz: self.imu_rate_hz,
             start_s: start.t_s,
-            end_s: weighed
-                .solution
-                .rows
-                .last()
-                .map_or(start.t_s, |row| row.t_s),
+            end_s: rows.last().map_or(start.t_s, |row| row.t_s),
             filter_states: belief.states,
             turn_on_states: 3 * constants,
-            initial: Initial::new(
-                &start,
-                self.request.initial_file().map(|path| path.as_path()),
-            ),
+            initial: Initial::new(&start, self.request.initial_file()),
             mounting: mounting.as_ref().map(Into::into),
             horizontal_sigma_rms_m: (squares.sum::<f64>() / rows.len() as f64).sqrt(),
             gnss_correlation: fix_correlation(&weighed),
@@ -695,13 +640,12 @@ impl Drive {
             solution: weighed.solution,
             summary,
             reduction,
-            inputs: context.inputs().to_vec(),
-            configuration: self.configuration,
+            configuration,
         })
     }
 }
 
-impl Drive {
+impl Drive<'_> {
     /// Brings fixes to the clock of the IMU where the two have nothing in common and no delay is given; by how much (s).
     fn common_origin(&mut self) -> Result<Option<f64>> {
         let recorded = Recorded {
@@ -1064,14 +1008,10 @@ struct MountingRow {
 
 impl Initial {
     /// The start, from the data or from a file.
-    fn new(start: &Start, file: Option<&Path>) -> Self {
-        let how = match (&start.found, file) {
-            (Some(found), _) => how(start, found),
-            (None, file) => file
-                .iter()
-                .map(|file| format!("as {} says", file.display()))
-                .collect(),
-        };
+    fn new(start: &Start, file: Option<&PathBuf>) -> Self {
+        let stated = file.map(|file| format!("as {} says", file.display()));
+        let found = start.found.as_ref().map(|found| how(start, found));
+        let how = found.unwrap_or(stated.into_iter().collect());
         let state = STATE.into_iter().zip(values(&start.state)).collect();
         Self {
             t_s: start.t_s,
@@ -1087,41 +1027,18 @@ fn how(start: &Start, found: &Found) -> Vec<String> {
     let [.., roll, pitch, yaw] = values(&start.state);
     let [tilt_sigma, _, yaw_sigma] = start.sigma.att_sigma_deg;
     let level = match found.level {
-        Levelling::AtRest(until_s) => {
-            format!("from levelling at rest until {until_s:.2} s, carried on by the gyroscopes")
-        }
-        Levelling::InMotion(seconds) => {
-            format!(
-                "from accelerations over the {seconds:.1} s after it (no better static window before)"
-            )
-        }
+        Levelling::AtRest(until_s) => format!("levelled at rest until {until_s:.2} s"),
+        Levelling::InMotion(seconds) => format!("from accelerations over {seconds:.1} s"),
     };
-    let (speed, sigma) = (start.state.v_n.truncate().length(), found.course_sigma_deg);
-    let reversing = if found.is_reversing {
-        ", reversing"
-    } else {
-        ""
+    let source = match (found.is_given, found.is_reversing) {
+        (true, _) => "as given",
+        (_, true) => "from the course in reverse",
+        _ => "from the course",
     };
-    let t_s = start.t_s;
-    let source = if found.is_given {
-        "as given".to_owned()
-    } else {
-        format!(
-            "from the course of the fix at {} s ({speed:.1} m/s{reversing})",
-            seconds(t_s)
-        )
-    };
-    let mut how = vec![
+    vec![
         format!("roll {roll:.2}°, pitch {pitch:.2}° ± {tilt_sigma:.2}° {level}"),
-        format!("heading {yaw:.1}° ± {sigma:.1}° {source}"),
-        "biases start at zero".to_owned(),
-    ];
-    how.extend(found.moved_deg.map(|moved| {
-        format!(
-            "heading ± {yaw_sigma:.1}°: the fixes of the next minute move it by {moved:+.0}° (wind, slip)"
-        )
-    }));
-    how
+        format!("heading {yaw:.1}° ± {yaw_sigma:.1}° {source}"),
+    ]
 }
 
 impl From<&Mounting> for MountingRow {
@@ -1249,19 +1166,15 @@ fn directory(answer: &FuseAnswer) -> Vec<OutputFile<'static>> {
     let FuseAnswer {
         solution, summary, ..
     } = answer;
-    let title = answer
-        .inputs
-        .first()
-        .map_or("solution", |imu| imu.path.as_str());
     let smoothed = solution.smoothed.as_deref();
     let contents = [
         Some(solution_csv(&solution.rows)),
         Some(innovations_csv(solution)),
         Some(errors_csv(&solution.rows)),
-        Some(kml(&solution.rows, "solution", title)),
+        Some(kml(&solution.rows, "solution")),
         smoothed.map(solution_csv),
         smoothed.map(errors_csv),
-        smoothed.map(|rows| kml(rows, "smoothed solution", title)),
+        smoothed.map(|rows| kml(rows, "smoothed solution")),
         Some(json(summary)),
     ];
     FILES
@@ -1271,105 +1184,104 @@ fn directory(answer: &FuseAnswer) -> Vec<OutputFile<'static>> {
         .collect()
 }
 
-fn header(groups: &[(&str, &[&str])]) -> String {
-    let names = groups
-        .iter()
-        .flat_map(|(prefix, names)| names.iter().map(move |n| format!("{prefix}{n}")));
-    std::iter::once("t_s".to_owned())
-        .chain(names)
-        .collect::<Vec<_>>()
-        .join(",")
-        + "\n"
-}
+const TIME: Columns = ("", &["t_s"], Some(6));
 
-/// A number with as many digits as its size deserves: 1e-10 degrees are 0.01 mm.
-fn fixed(x: f64, digits: usize) -> String {
-    if x.is_finite() && x.abs() < 1e15 {
-        format!("{x:.digits$}")
-    } else {
-        shortest(x)
-    }
+/// Columns of a table: prefix and names, and with how many digits; none: four after the first, and a power of ten.
+type Columns = (&'static str, &'static [&'static str], Option<usize>);
+
+/// Rows as CSV with as many digits as their size deserves, 1e-10 degrees are 0.01 mm; NaN is an empty cell.
+fn table(columns: &[Columns], rows: impl Iterator<Item = Vec<f64>>) -> String {
+    let columns: Vec<(String, Option<usize>)> = columns
+        .iter()
+        .flat_map(|(prefix, names, digits)| {
+            names
+                .iter()
+                .map(move |name| (format!("{prefix}{name}"), *digits))
+        })
+        .collect();
+    let head = columns.iter().map(|(name, _)| name.clone());
+    let cell = |(x, (_, digits)): (f64, &(String, Option<usize>))| match digits {
+        _ if x.is_nan() => String::new(),
+        Some(digits) if x.abs() < 1e15 => format!("{x:.digits$}"),
+        None => format!("{x:.4e}"),
+        _ => shortest(x),
+    };
+    let rows = rows.map(|row| row.into_iter().zip(&columns).map(cell).collect());
+    let lines = std::iter::once(head.collect()).chain(rows);
+    lines
+        .map(|cells: Vec<String>| cells.join(",") + "\n")
+        .collect()
 }
 
 /// `solution.csv` and `smoothed.csv`: states, their standard deviations (those of latitude and longitude in degrees), bias
 /// estimates, the horizontal standard deviations in metres, and those of the biases.
 fn solution_csv(rows: &[Row]) -> String {
-    let mut text = header(&[
-        ("", &STATE),
-        ("sd_", &STATE),
-        ("", &BIAS_NAMES),
-        ("sd_", &["n_m", "e_m"]),
-        ("sd_", &BIAS_NAMES),
-    ]);
-    for row in rows {
-        let (state, sd) = (values(&row.state), &row.sigma);
-        let r = radii(row.state.lat.sin());
-        let sd_lat = sd[0] / (r.meridian + row.state.h) / DEG;
-        let sd_lon = sd[1] / ((r.transverse + row.state.h) * row.state.lat.cos()) / DEG;
-        let digits = [10, 10, 5, 6, 6, 6, 7, 7, 7];
-        let mut cells = vec![fixed(row.t_s, 6)];
-        cells.extend(state.iter().zip(digits).map(|(x, d)| fixed(*x, d)));
-        cells.extend([sd_lat, sd_lon].map(|x| format!("{x:.4e}")));
-        cells.extend(sd[2..].iter().map(|x| fixed(*x, 6)));
-        cells.extend(
-            row.bias
-                .iter()
-                .flat_map(|b| b.to_array())
-                .map(|x| fixed(x, 9)),
-        );
-        cells.extend(sd[..2].iter().map(|x| fixed(*x, 6)));
-        cells.extend(
-            row.bias_sigma
-                .iter()
-                .flat_map(|b| b.to_array())
-                .map(|x| fixed(x, 9)),
-        );
-        text += &(cells.join(",") + "\n");
-    }
-    text
+    const COLUMNS: [Columns; 10] = [
+        TIME,
+        ("", STATE.split_at(2).0, Some(10)),
+        ("", &["h_m"], Some(5)),
+        ("", STATE.split_at(6).0.split_at(3).1, Some(6)),
+        ("", STATE.split_at(6).1, Some(7)),
+        ("sd_", STATE.split_at(2).0, None),
+        ("sd_", STATE.split_at(2).1, Some(6)),
+        ("", &BIAS_NAMES, Some(9)),
+        ("sd_", &["n_m", "e_m"], Some(6)),
+        ("sd_", &BIAS_NAMES, Some(9)),
+    ];
+    let row = |row: &Row| {
+        let (NavState { lat, h, .. }, sd) = (row.state, &row.sigma);
+        let r = radii(lat.sin());
+        let sd_lat = sd[0] / (r.meridian + h) / DEG;
+        let sd_lon = sd[1] / ((r.transverse + h) * lat.cos()) / DEG;
+        let [bias, bias_sigma] =
+            [row.bias, row.bias_sigma].map(|b| b.map(|b| b.to_array()).concat());
+        let state = values(&row.state);
+        [
+            &[row.t_s],
+            &state[..],
+            &[sd_lat, sd_lon],
+            &sd[2..],
+            &bias,
+            &sd[..2],
+            &bias_sigma,
+        ]
+        .concat()
+    };
+    table(&COLUMNS, rows.iter().map(row))
 }
 
-/// `innovations.csv`: every fix; 1 where it was used, and why not where it was not.
+/// `innovations.csv`: every fix; 1 where it was used.
 fn innovations_csv(solution: &Solution) -> String {
-    let mut text = header(&[
-        ("", &["used", "status"]),
-        ("", &REPORTED_NAMES[..6]),
-        ("sd_", &REPORTED_NAMES[..6]),
-        ("", &["nis", "dof"]),
-    ]);
-    for fix in &solution.fixes {
-        let status = if fix.used { "used" } else { "withheld" };
-        let mut cells = vec![
-            fixed(fix.t_s, 6),
-            u8::from(fix.used).to_string(),
-            status.to_owned(),
-        ];
-        for list in [&fix.innovation, &fix.sigma] {
-            cells.extend((0..6).map(|i| list.get(i).map_or_else(String::new, |x| fixed(*x, 6))));
-        }
-        cells.extend([fixed(fix.nis, 4), fix.innovation.len().to_string()]);
-        text += &(cells.join(",") + "\n");
-    }
-    text
+    const MEASURED: &[&str] = REPORTED_NAMES.split_at(6).0;
+    const COLUMNS: [Columns; 6] = [
+        TIME,
+        ("", &["used"], Some(0)),
+        ("", MEASURED, Some(6)),
+        ("sd_", MEASURED, Some(6)),
+        ("", &["nis"], Some(4)),
+        ("", &["dof"], Some(0)),
+    ];
+    let six = |list: &[f64]| [0, 1, 2, 3, 4, 5].map(|i| list.get(i).copied().unwrap_or(f64::NAN));
+    let row = |fix: &FixRecord| {
+        let (used, dof) = (f64::from(u8::from(fix.used)), fix.innovation.len() as f64);
+        let [innovation, sigma] = [&fix.innovation, &fix.sigma].map(|list| six(list));
+        [&[fix.t_s, used], &innovation[..], &sigma, &[fix.nis, dof]].concat()
+    };
+    table(&COLUMNS, solution.fixes.iter().map(row))
 }
 
 fn errors_csv(rows: &[Row]) -> String {
-    let mut text = header(&[("err_", &REPORTED_NAMES), ("", &["nees"])]);
-    for (row, error) in rows.iter().filter_map(|row| Some((row, row.error?))) {
-        let cells: Vec<String> = error.values.iter().map(|x| fixed(*x, 6)).collect();
-        let _ = writeln!(
-            text,
-            "{},{},{}",
-            fixed(row.t_s, 6),
-            cells.join(","),
-            fixed(error.nees, 4)
-        );
-    }
-    text
+    const COLUMNS: [Columns; 3] = [
+        TIME,
+        ("err_", &REPORTED_NAMES, Some(6)),
+        ("", &["nees"], Some(4)),
+    ];
+    let row = |row: &Row| Some([&[row.t_s], &row.error?.values[..], &[row.error?.nees]].concat());
+    table(&COLUMNS, rows.iter().filter_map(row))
 }
 
 /// The way as a line on the map, a point a second at most.
-fn kml(rows: &[Row], name: &str, title: &str) -> String {
+fn kml(rows: &[Row], name: &str) -> String {
     let mut line = String::new();
     let mut last = f64::NEG_INFINITY;
     for (k, row) in rows.iter().enumerate() {
@@ -1383,13 +1295,11 @@ fn kml(rows: &[Row], name: &str, title: &str) -> String {
             last = row.t_s;
         }
     }
-    let title = title.replace('&', "&amp;").replace('<', "&lt;");
     let points = line.trim_end();
     format!(
         r#"<?xml version="1.0" encoding="UTF-8"?>
 <kml xmlns="http://www.opengis.net/kml/2.2">
 <Document>
-<name>{title}</name>
 <Placemark>
 <name>{name}</name>
 <Style><LineStyle><color>ff0050ff</color><width>3</width></LineStyle></Style>

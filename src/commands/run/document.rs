@@ -53,13 +53,12 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     page.charts(&states(epochs, &windows), STATES_SHOWN);
     page.section("Consistency");
     page.chart(&nees(epochs, summary), CONSISTENCY);
-    page.table(&consistency(answer));
+    page.table(consistency(answer));
     budgets(answer, &shown, &mut page);
-    provenance(answer, &mut page);
-    page.checked(
-        "The filter's standard deviations agree to 2e-4 with an independent implementation; the NEES of filters whose model is right \
-         with chi-square at p = 0.001.",
-    );
+    let configuration = toml::to_string_pretty(&answer.origin.configuration);
+    page.folded("Configuration", |page| {
+        page.text(&configuration.unwrap_or_default())
+    });
     page
 }
 
@@ -129,7 +128,7 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
     let summary = &answer.navigation.summary;
     if summary.outages.is_empty() {
         page.section("Accuracy over the run");
-        page.lead(Table::of(
+        page.table(Table::of(
             answer,
             "/accuracy/rmse_mean/*",
             &[
@@ -155,18 +154,7 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
         ("error/σ", "verdict/ratio"),
         ("in", "verdict/worst_state"),
     ];
-    page.lead(Table::of(answer, "/outages/*", &columns).without_unknown());
-    let columns = [
-        ("outage", "{start_s}–{end_s} s"),
-        ("re-convergence, median (s)", "reconvergence_s/p50"),
-        ("p50 (m) from", "horizontal_error_end_m/p50_ci95/0"),
-        ("to", "horizontal_error_end_m/p50_ci95/1"),
-        ("RMSE pos_e_m from", "rmse_end_ci95/pos_e_m/0"),
-        ("to", "rmse_end_ci95/pos_e_m/1"),
-        ("ASEE pos_e_m from", "asee_end_ci95/pos_e_m/0"),
-        ("to", "asee_end_ci95/pos_e_m/1"),
-    ];
-    page.table(&Table::of(answer, "/outages/*", &columns).without_unknown());
+    page.table(Table::of(answer, "/outages/*", &columns).without_unknown());
     let columns = [
         ("state", "@"),
         ("RMSE, end", "."),
@@ -179,7 +167,7 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
         let table = Table::of(answer, &format!("/outages/{k}/rmse_end/*"), &columns);
         page.folded(
             &format!("States, {}", window(outage.start_s, outage.end_s)),
-            |page| page.table(&table),
+            |page| page.table(table),
         );
     }
 }
@@ -203,22 +191,6 @@ fn consistency(answer: &RunAnswer) -> Table {
     Table::of_keys(answer, &head, &rows).without_unknown()
 }
 
-fn provenance(answer: &RunAnswer, page: &mut Document) {
-    page.section("Provenance");
-    // the command, the threads and the time taken are in manifest.json: this page is the same for the same seed
-    page.text(&format!(
-        "nav-sim {}; the command is in manifest.json.",
-        env!("CARGO_PKG_VERSION")
-    ));
-    page.table(&Table::of(
-        &answer.inputs,
-        "/*",
-        &[("input", "role"), ("file", "path"), ("BLAKE3", "blake3")],
-    ));
-    let configuration = toml::to_string_pretty(&answer.origin.configuration).unwrap_or_default();
-    page.folded("Configuration", |page| page.code(&configuration));
-}
-
 /// The sources of the errors at the ends of the outages that are shown.
 fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
     let outages = &answer.navigation.summary.outages;
@@ -237,7 +209,7 @@ fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
     for k in shown {
         let table = Table::of(answer, &format!("/outages/{k}/budget/*"), &columns);
         let title = window(outages[*k].start_s, outages[*k].end_s);
-        page.folded(&title, |page| page.table(&table));
+        page.folded(&title, |page| page.table(table));
     }
 }
 
@@ -247,7 +219,7 @@ fn over_time(epochs: &[EpochMetrics], value: impl Fn(&EpochMetrics) -> f64) -> V
     epochs.iter().map(|e| (e.t_s, value(e))).collect()
 }
 
-pub(super) fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
+fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
     let rmse = over_time(epochs, |e| e.rmse.0[0].value.hypot(e.rmse.0[1].value));
     let believed = over_time(epochs, |e| e.asee.0[0].value.hypot(e.asee.0[1].value));
     let three = believed
@@ -303,7 +275,7 @@ fn states(epochs: &[EpochMetrics], outages: &[(f64, f64)]) -> Vec<Chart> {
     REPORTED_NAMES.iter().enumerate().map(chart).collect()
 }
 
-pub(super) fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
+fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
     let panel = |axis: Axis, band: [f64; 2], value: fn(&EpochMetrics) -> f64| {
         let mut series = vec![Series::line("", Colour::Ink, over_time(epochs, value))];
         // of expected values there is no scatter, and no band for it
@@ -343,7 +315,8 @@ pub(super) fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
 /// consequence.
 fn remedy(summary: &Summary, unexpected: &[String], answer: &RunAnswer) -> String {
     let verdict = &summary.verdict;
-    let [is_recorded, is_modelled] = ["static", "truth"].map(|role| answer.has_input(role));
+    let has_input = |role| answer.inputs.iter().any(|input| input.role == role);
+    let [is_recorded, is_modelled] = ["static", "truth"].map(has_input);
     let ratios = summary.reduction.iter().flat_map(|quality| {
         quality
             .outage_end

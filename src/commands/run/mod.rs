@@ -1,8 +1,8 @@
 //! `nav-sim run`: the main job.
 
-use crate::app::inputs::{self, FilterArgs, SettingsArgs, files};
+use crate::app::inputs::{self, FilterArgs, SettingsArgs};
 use crate::app::{
-    Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Refuse, Result, refused,
+    Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result, refused,
 };
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::ModelFile;
@@ -12,7 +12,7 @@ use crate::report::tables::{epochs_csv, runs_csv};
 use crate::report::verdict::requirement_line;
 use crate::report::{integration_line, json, reduction_doubt, reduction_line, trajectory};
 use nav_sim_calibration::derived_interval;
-use nav_sim_document::{Document, svg};
+use nav_sim_document::Document;
 use nav_sim_navigation::ekf::{Belief, FilterStates};
 use nav_sim_navigation::metrics::{
     Budget, EpochMetrics, Expected, OutageSummary, PerState, ReductionQuality, Requirement,
@@ -94,8 +94,10 @@ pub struct RunAnswer {
     /// Runs, statistics and summary.
     #[serde(flatten)]
     pub navigation: Navigation,
-    /// Settings and sources, for the manifest; of them the speed, the only number that the seed does not determine.
-    #[serde(flatten, serialize_with = "throughput")]
+    /// IMU epochs a second, all runs together: the only number that the seed does not determine.
+    pub throughput_epochs_per_s: f64,
+    /// Settings and sources, for the manifest.
+    #[serde(skip)]
     pub origin: RunOrigin,
     /// The files that were read.
     #[serde(skip)]
@@ -103,13 +105,6 @@ pub struct RunAnswer {
     /// The reference trajectory, drawn.
     #[serde(skip)]
     pub track: Vec<(f64, [f64; 2])>,
-}
-
-fn throughput<S: serde::Serializer>(
-    origin: &RunOrigin,
-    to: S,
-) -> std::result::Result<S::Ok, S::Error> {
-    to.collect_map([("throughput_epochs_per_s", origin.throughput_epochs_per_s)])
 }
 
 /// The record of a run in its manifest.
@@ -120,21 +115,12 @@ pub struct RunOrigin {
     /// Whether the truth of each run was drawn from the spread of its model.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub spread: bool,
-    /// The model in the filter.
-    pub model: ModelNote,
+    /// Estimator of the model in the filter, if it was calibrated ("awv", "sr-awv", "dr-awv", …).
+    #[serde(default)]
+    pub estimator: Option<String>,
     /// Independent windows that the static recordings hold, where they made the errors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub independent_windows: Option<f64>,
-    /// IMU epochs a second, all runs together.
-    pub throughput_epochs_per_s: f64,
-}
-
-/// What the model file says about its making.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ModelNote {
-    /// Estimator, if calibrated ("awv", "sr-awv", "dr-awv", …).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub estimator: Option<String>,
 }
 
 /// Names of the tables and the summary of a run directory.
@@ -149,16 +135,6 @@ impl Command for Run {
     };
     const JUDGES: &'static [&'static str] = &["require"];
 
-    fn inputs(&self) -> Result<Inputs> {
-        Ok(files("trajectory", [&self.trajectory])
-            .chain(files("model", [&self.model]))
-            .chain(files("truth", &self.truth))
-            .chain(inputs::listed("static", &self.recordings)?)
-            .chain(files("scenario", &self.settings.file.scenario))
-            .chain(files("gnss", &self.gnss))
-            .collect())
-    }
-
     fn run(&self, context: &Context<'_>) -> Result<RunAnswer> {
         self.prepare(context)?.navigate(None, context)
     }
@@ -168,7 +144,6 @@ impl Command for Run {
 pub(crate) struct PreparedRun<'a> {
     request: &'a Run,
     inputs: NavigateInputs,
-    scenario: Scenario,
     origin: RunOrigin,
     seed: u64,
 }
@@ -179,18 +154,13 @@ impl Run {
         let mut scenario = self.scenario()?;
         let (mut inputs, file, made_by) = self.read(&mut scenario, context)?;
         let is_drawn = scenario.run.method != Method::Lincov || scenario.outage_random.is_some();
-        let seed = if is_drawn {
-            context.seed_or(scenario.run.seed)
+        let given = context.given_seed().or(scenario.run.seed);
+        scenario.run.seed = if is_drawn {
+            Some(context.seed_or(given))
         } else {
-            context
-                .given_seed()
-                .or(scenario.run.seed)
-                .unwrap_or_default()
+            given
         };
-        scenario.run.seed = is_drawn
-            .then_some(seed)
-            .or(context.given_seed())
-            .or(scenario.run.seed);
+        let seed = scenario.run.seed.unwrap_or_default();
         if self.spread {
             inputs.truth = TrueImu::Drawn(self.drawn(&made_by, &scenario, seed)?);
         }
@@ -213,27 +183,17 @@ impl Run {
                 "give an outage with --outage START:END",
             );
         }
-        if scenario.run.method == Method::Lincov && self.runs.is_some() {
-            context.warn(
-                "--runs is ignored with --method lincov; --method both adds Monte-Carlo runs",
-            );
-        }
-        let mut configuration = scenario.clone();
-        configuration.outage = Some(outages);
-        (configuration.outage_periodic, configuration.outage_random) = (None, None);
+        scenario.outage = Some(outages);
+        (scenario.outage_periodic, scenario.outage_random) = (None, None);
         let origin = RunOrigin {
-            configuration,
+            configuration: scenario,
             spread: self.spread,
-            model: ModelNote {
-                estimator: file.estimator(),
-            },
+            estimator: file.estimator(),
             independent_windows: None,
-            throughput_epochs_per_s: 0.0,
         };
         Ok(PreparedRun {
             request: self,
             inputs,
-            scenario,
             origin,
             seed,
         })
@@ -283,13 +243,13 @@ impl Run {
         };
         let trajectory = inputs::trajectory(&self.trajectory, context)?;
         let (model, file) = read_model(&self.model)?;
-        inputs::expect_turn_on(&mut scenario.initial, &file, &self.model, context);
+        inputs::expect_turn_on(&mut scenario.initial, file.turn_on, &self.model, context);
         let truth = self.truth.as_deref().map(read_model).transpose()?;
         // recordings are their own truth: what they had of a constant bias is taken from them
         if self.recordings.is_empty() {
             inputs::make_turn_on(
                 &mut scenario.imu,
-                truth.as_ref().map_or(&file, |(_, file)| file),
+                truth.as_ref().map_or(&file, |(_, file)| file).turn_on,
                 self.truth.as_ref().unwrap_or(&self.model),
                 context,
             );
@@ -348,7 +308,7 @@ pub(crate) fn columns(
 ) -> Result<Option<Vec<Option<RunResult>>>> {
     let Some(one) = runs
         .first()
-        .filter(|run| run.scenario.run.method != Method::Lincov)
+        .filter(|run| run.origin.configuration.run.method != Method::Lincov)
     else {
         context.advance(count * runs.len() as u64);
         return Ok(Some(runs.iter().map(|_| None).collect()));
@@ -356,7 +316,7 @@ pub(crate) fn columns(
     let beliefs = runs.iter().map(|run| Ok(run.filter()?.1));
     let (beliefs, outages) = (beliefs.collect::<Result<Vec<_>>>()?, one.outages());
     let inputs = &one.inputs;
-    let experiment = one.scenario.experiment(
+    let experiment = one.origin.configuration.experiment(
         &inputs.trajectory,
         inputs.truth(),
         &beliefs,
@@ -386,7 +346,7 @@ impl PreparedRun<'_> {
 
     /// The track and the filter.
     fn filter(&self) -> Result<(Track, Belief)> {
-        let (scenario, outages) = (&self.scenario, self.outages());
+        let (scenario, outages) = (&self.origin.configuration, self.outages());
         let (model, request) = (&self.inputs.model, self.request);
         let track = scenario.track(&self.inputs.trajectory, model, &outages)?;
         let belief = scenario.belief(model, &outages, &track).map_err(|e| {
@@ -413,13 +373,12 @@ impl PreparedRun<'_> {
         let Self {
             request,
             inputs,
-            scenario,
             mut origin,
             seed,
         } = self;
         let mut navigation = with_runs(
             &inputs,
-            &scenario,
+            &origin.configuration,
             &outages,
             (&track, &belief),
             seed,
@@ -428,14 +387,11 @@ impl PreparedRun<'_> {
         )?;
         let summary = &mut navigation.summary;
         summary.require = request.require.iter().map(|r| r.check(summary)).collect();
-        if let Some(runs) = &navigation.runs {
-            origin.independent_windows = runs.independent_windows;
-            let runs_s = context.runs_s();
-            if runs_s > 0.0 {
-                origin.throughput_epochs_per_s = runs.run_epochs as f64 / runs_s;
-            }
-        }
+        let (runs, runs_s) = (navigation.runs.as_ref(), context.runs_s());
+        origin.independent_windows = runs.and_then(|runs| runs.independent_windows);
+        let epochs = runs.map_or(0.0, |runs| runs.run_epochs as f64);
         Ok(RunAnswer {
+            throughput_epochs_per_s: if runs_s > 0.0 { epochs / runs_s } else { 0.0 },
             track: trajectory::track(&inputs.trajectory),
             inputs: context.inputs().to_vec(),
             navigation,
@@ -444,27 +400,9 @@ impl PreparedRun<'_> {
     }
 }
 
-impl RunAnswer {
-    /// The hashes of the inputs of a role.
-    fn has_input(&self, role: &str) -> bool {
-        self.inputs.iter().any(|input| input.role == role)
-    }
-}
-
 impl Answer for RunAnswer {
     fn document(&self) -> Document {
         document::document(self)
-    }
-
-    fn svg(&self, _: &Document) -> String {
-        let Navigation {
-            epochs, summary, ..
-        } = &self.navigation;
-        let shown = [
-            document::horizontal(epochs, summary),
-            document::nees(epochs, summary),
-        ];
-        svg("Navigation errors", &shown)
     }
 
     /// Without runs (covariance analysis) there is no table of them.
@@ -660,7 +598,7 @@ fn with_runs(
             epochs,
             // Nothing is drawn but outages; a seed that is given stays on record.
             summary: Summary {
-                seed: scenario.outage_random.map(|_| seed).or(scenario.run.seed),
+                seed: scenario.run.seed,
                 ..summary
             },
         },

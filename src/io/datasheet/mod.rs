@@ -75,19 +75,9 @@ impl Datasheet {
     /// A figure in SI (ppm for scale factors).
     #[must_use]
     pub fn value(&self, sensor: Sensor, figure: Figure) -> Option<f64> {
-        Some(self.quantity(sensor, figure)?.value)
-    }
-
-    /// The same as it is given.
-    pub(crate) fn given(&self, sensor: Sensor, figure: Figure) -> Option<&str> {
-        Some(self.quantity(sensor, figure)?.given.as_str())
-    }
-
-    fn quantity(&self, sensor: Sensor, figure: Figure) -> Option<&Quantity> {
-        self.entries
-            .iter()
-            .find(|e| e.sensor == sensor && e.figure == figure)
-            .map(|e| &e.quantity)
+        let mut entries = self.entries.iter();
+        let entry = entries.find(|e| e.sensor == sensor && e.figure == figure)?;
+        Some(entry.quantity.value)
     }
 
     /// The figures that decide an outage and the datasheet does not state: the model has no such error.

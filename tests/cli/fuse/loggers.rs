@@ -134,7 +134,7 @@ fn a_window_before_the_start_is_no_outage() {
     fs::write(&path, later(&fs::read_to_string(&path).unwrap())).unwrap();
     let ran = done(
         place.path(),
-        "fuse rec/imu.csv rec/gnss.csv imu.toml --outage 1:3 --outage 60:75 -o out",
+        "fuse rec/imu.csv rec/gnss.csv imu.toml --outage 1:3 --outage 60:75 -o out -v",
     );
     assert!(
         ran.stderr

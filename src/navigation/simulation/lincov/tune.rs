@@ -48,8 +48,6 @@ pub struct Task<'a> {
     pub filter: &'a Filter<'a>,
     /// Condition under which it is consistent.
     pub aim: Aim,
-    /// Whether a factor may be below 1.
-    pub allow_smaller: bool,
 }
 
 const ITERATIONS: usize = 60;
@@ -124,10 +122,9 @@ impl Task<'_> {
             let value = self.value(&set(factors, ln), &track, draw_factors);
             value.with_ridge(RIDGE, ln)
         };
-        let low = if self.allow_smaller { -MAX_LN } else { 0.0 };
         let descent = Damped {
             value: &value,
-            bounds: (low, MAX_LN),
+            bounds: (0.0, MAX_LN),
             iterations: ITERATIONS,
             enough: ENOUGH,
         };
@@ -135,7 +132,7 @@ impl Task<'_> {
         // the two the valley may be flat. The second counts where it is better by what can be seen.
         let unchanged = vec![0.0; factors.len()];
         let at = |ln: &[f64]| self.consistency_with(&set(factors, ln), draw_factors);
-        let exact = |ln: &[f64]| self.exact(ln, low, &at);
+        let exact = |ln: &[f64]| self.exact(ln, &at);
         let alike = exact(&unchanged)?;
         let near = descent.minimum(unchanged.clone()).unwrap_or(unchanged);
         let best = match descent.minimum(alike) {
@@ -144,13 +141,13 @@ impl Task<'_> {
         };
         let mut best = exact(&best)?;
         if self.aim == Aim::Worst {
-            self.lower_alone(&mut best, low, &at)?;
+            self.lower_alone(&mut best, &at)?;
         }
         Ok(set(factors, &best))
     }
 
     /// Lowers each factor whose noise binds no error, until it does.
-    fn lower_alone(&self, ln: &mut [f64], low: f64, at: &At<'_>) -> Result<(), BeliefError> {
+    fn lower_alone(&self, ln: &mut [f64], at: &At<'_>) -> Result<(), BeliefError> {
         for i in 0..ln.len() {
             let moved = |by: f64| {
                 let mut moved = ln.to_vec();
@@ -158,7 +155,7 @@ impl Task<'_> {
                 moved
             };
             let covers = |by: f64| Ok(self.excess(&at(&moved(by))?) <= EXACT);
-            let bounds = (low - ln[i], 0.0);
+            let bounds = (-ln[i], 0.0);
             if bounds.0 < -RESOLUTION && covers(0.0)? {
                 ln[i] += smallest(bounds, covers)?;
             }
@@ -309,12 +306,12 @@ impl Task<'_> {
 
     /// The logarithms with one number added to all, none below the lowest: the filter is consistent in the mean, or the least
     /// cautious that covers the worst.
-    fn exact(&self, ln: &[f64], low: f64, at: &At<'_>) -> Result<Vec<f64>, BeliefError> {
+    fn exact(&self, ln: &[f64], at: &At<'_>) -> Result<Vec<f64>, BeliefError> {
         let moved =
-            |by: f64| -> Vec<f64> { ln.iter().map(|x| (x + by).clamp(low, MAX_LN)).collect() };
+            |by: f64| -> Vec<f64> { ln.iter().map(|x| (x + by).clamp(0.0, MAX_LN)).collect() };
         // Down to where the largest factor meets the lowest bound: below that nothing changes any more.
-        let highest = ln.iter().copied().fold(low, f64::max);
-        let bounds = (low - highest, MAX_LN);
+        let highest = ln.iter().copied().fold(0.0, f64::max);
+        let bounds = (-highest, MAX_LN);
         if self.aim == Aim::Mean {
             let crossing = Crossing {
                 bounds,
