@@ -109,7 +109,6 @@ impl Setting {
             update: self.update,
             outages: &self.outages,
             seed: self.seed,
-            scenario: "",
             coverage_level: 0.95,
         }
     }
