@@ -145,7 +145,6 @@ impl Scenario {
             update: self.filter.update,
             outages,
             seed,
-            scenario: "",
             coverage_level: self.run.coverage_level,
         }
     }

@@ -106,7 +106,6 @@ impl Setting {
             update: self.update,
             outages: &self.outages,
             seed: self.seed,
-            scenario: "",
             coverage_level: 0.95,
         }
     }

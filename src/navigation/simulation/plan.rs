@@ -46,8 +46,6 @@ pub struct Experiment<'a> {
     pub outages: &'a [Outage],
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Name of the truth scenario, part of the key of every stream.
-    pub scenario: &'a str,
     /// Level of the coverage statistic, between 0 and 1.
     pub coverage_level: f64,
 }

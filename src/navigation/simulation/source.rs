@@ -46,7 +46,7 @@ impl<'a> Source<'a> {
         let experiment = plan.experiment;
         let key = |run| StreamKey {
             seed: experiment.seed,
-            scenario: experiment.scenario,
+            scenario: "",
             run,
             source: "",
             process: "",

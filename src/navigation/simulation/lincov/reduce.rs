@@ -351,7 +351,6 @@ pub fn drive(
         update: FixUpdate::default(),
         outages: &outages,
         seed: 0,
-        scenario: "",
         coverage_level: 0.95,
     };
     Track::of_noise_at(model.rate_hz, &experiment).ok()
