@@ -802,10 +802,6 @@ mod tests {
             document.verdict[1].contains("is underconfident: errors 0.756 to"),
             "{document:?}"
         );
-        assert!(
-            document.notes()[0].text.contains("--for mean"),
-            "{document:?}"
-        );
         tuned.factors[0].on_variance = 1.0;
         (tuned.before, tuned.after) = (consistency(1.0, 9.0), consistency(1.0, 9.0));
         assert_eq!(tuned.document().tone, Tone::Good);

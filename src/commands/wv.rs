@@ -330,7 +330,7 @@ mod tests {
         assert_eq!(rows.len(), 3);
         assert_eq!(
             rows[0][2..7],
-            ["0.01 s", "0.08 s", "0.64 s", "5.12 s", "41.0 s"]
+            ["0.01 s", "0.08 s", "0.64 s", "5.12 s", "41 s"]
         );
         assert_eq!(rows[2][1..3], ["gyro.z (rad/s)", "1.00e1"]);
         assert_eq!(rows[2][6..9], ["1.56e-1", "1.10e-1 at 81.9 s", "0.90"]);

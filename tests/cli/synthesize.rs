@@ -228,7 +228,7 @@ fn mistakes_are_refused_and_leave_nothing() {
     );
     refused(
         &["model.toml", "--duration", "0.01"],
-        "a recording needs at least 2 samples; these are 1",
+        "a recording has 2 to 1e9 samples; these are 1",
         "",
     );
     refused(&["model.toml", "--samples", "1"], "--samples='1'", "");

@@ -45,6 +45,16 @@ impl Calibration {
             (interval, "ci95|not determined"),
             ("averages of", "averages"),
         ];
+        if self.outcomes.len() > 2 {
+            let columns = [
+                ("fit", "name"),
+                ("N", "figures/N/value"),
+                ("95 %", "figures/N/ci95"),
+                ("B", "figures/B/value"),
+                ("K", "figures/K/value"),
+            ];
+            document.table(Table::of(json, "/fits/*", &columns));
+        }
         document.table(Table::of(json, "/fits/*/figures/*", &columns));
         for (importance, note) in self.notes() {
             document.note(importance, note);

@@ -177,7 +177,7 @@ mod candidate_tests {
     fn names_tell_candidates_apart() {
         let mut names: Vec<String> = Candidate::usual().iter().map(ToString::to_string).collect();
         assert_eq!(
-            (names[0].as_str(), names[8].as_str()),
+            (names[0].as_str(), names[7].as_str()),
             ("awv N2, 15", "avlr WN+RW, 15")
         );
         let count = names.len();

@@ -38,7 +38,7 @@ fn covariance_analysis_is_a_method_of_run() {
         .split("<body>")
         .nth(1)
         .unwrap()
-        .split("<script>")
+        .split("Configuration")
         .next()
         .unwrap();
     for words in [
