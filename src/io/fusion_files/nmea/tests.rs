@@ -23,19 +23,14 @@ fn fixes(
     text: &str,
     unsaid: Option<&FixSigma>,
     imu_s: Option<(f64, f64)>,
-) -> Result<(Vec<(u64, GnssFix)>, Vec<Note>), Error> {
+) -> Result<(Vec<GnssFix>, Vec<Note>), Error> {
     let (stated, remarks) = super::fixes(path, text, unsaid, imu_s)?;
-    let fix = |stated| crate::io::fusion_files::fix(path, stated, unsaid).map(|fix| (0, fix));
+    let fix = |stated| crate::io::fusion_files::fix(path, stated, unsaid);
     Ok((stated.iter().map(fix).collect::<Result<_, _>>()?, remarks))
 }
 
 fn read(text: &str) -> Vec<GnssFix> {
-    fixes("a.nmea", text, Some(&SIGMA), None)
-        .unwrap()
-        .0
-        .into_iter()
-        .map(|(_, fix)| fix)
-        .collect()
+    fixes("a.nmea", text, Some(&SIGMA), None).unwrap().0
 }
 
 /// The fixes of a log, and what is said of it.
@@ -45,10 +40,7 @@ fn said(text: &str, imu_s: Option<(f64, f64)>) -> (Vec<GnssFix>, Vec<String>) {
         Importance::Warning => format!("doubt: {}", note.text),
         _ => format!("note: {}", note.text),
     };
-    (
-        all.into_iter().map(|(_, fix)| fix).collect(),
-        remarks.into_iter().map(words).collect(),
-    )
+    (all, remarks.into_iter().map(words).collect())
 }
 
 /// A second of a receiver that knows date, position and its deviations.
