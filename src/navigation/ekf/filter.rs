@@ -490,12 +490,13 @@ impl Ekf {
     pub(crate) fn bias_sigma(&self, sensor: Sensor) -> Vec3 {
         let one = Vec3::splat(DVec3::ONE);
         let groups = self.bias_blocks(sensor).map(|g| (BIAS + g, one));
-        let terms: Vec<Term> = groups.chain(self.drift_term(sensor)).collect();
+        let terms = groups.chain(self.drift_term(sensor));
         let variance = |axis: usize| {
             // Var(Σ c_a x_a) with all covariances: after some fixes the groups of an axis are strongly
             // anti-correlated (the sum is observed, not its parts), and a sum of variances would be too large
             // many times over.
-            let pairs = terms.iter().flat_map(|a| terms.iter().map(move |b| (a, b)));
+            let of_term = |a: Term| terms.clone().map(move |b| (a, b));
+            let pairs = terms.clone().flat_map(of_term);
             pairs.fold(Lanes::ZERO, |sum, ((a, of_a), (b, of_b))| {
                 sum + self.p.get::<Lanes>(3 * a + axis, 3 * b + axis) * of_a[axis] * of_b[axis]
             })
