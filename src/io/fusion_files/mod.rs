@@ -303,6 +303,9 @@ pub(crate) fn read_gnss(
     };
     let fixes = stated.iter().map(|stated| fix(&shown, stated, unsaid));
     let fixes: Vec<GnssFix> = fixes.collect::<Result<_, _>>()?;
+    if fixes.is_empty() {
+        return Err(Error::contents(shown, Place::Within, "no fixes in it"));
+    }
     if stated
         .iter()
         .any(|(.., [_, sigma, ..])| sigma.is_none_or(|sigma| !sigma.is_finite()))
@@ -314,7 +317,7 @@ pub(crate) fn read_gnss(
     remarks.extend(doubt_degrees(fixes.iter().map(|fix| [fix.lat, fix.lon])).map(doubt));
     let times = fixes.iter().map(|fix| fix.t_s);
     increasing(&shown, |k| stated[k].0, times)?;
-    for (pair, (line, ..)) in fixes.windows(2).zip(&stated[1..]) {
+    for (pair, (line, ..)) in fixes.windows(2).zip(stated.iter().skip(1)) {
         let place = |f: &GnssFix| (f.t_s, geodetic_to_ecef(f.lat, f.lon, f.h));
         check_jump(&shown, *line, place(&pair[0]), place(&pair[1]))?;
     }
@@ -579,6 +582,17 @@ mod rtklib_tests {
             assert_eq!(t_s, [86_401.25]);
             assert_eq!(said, "an RTKLIB solution, in seconds of GPS week 2147");
         }
+    }
+
+    #[test]
+    fn a_solution_without_rows_has_no_fixes() {
+        let file = tempfile::NamedTempFile::with_suffix(".pos").unwrap();
+        std::fs::write(file.path(), HEAD).unwrap();
+        let refusal = read_gnss(file.path(), None, None, None).unwrap_err();
+        assert!(
+            refusal.to_string().ends_with(": no fixes in it"),
+            "{refusal}"
+        );
     }
 
     /// An IMU in Unix time, 18 leap seconds behind since 2017, or in GPS time has the fixes on its clock. 86401.25 s of

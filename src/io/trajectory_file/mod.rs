@@ -197,7 +197,7 @@ impl Rows {
         self.check_heights()?;
         self.check_steps()?;
         let place = |s: &TrajectorySample| (s.t_s, geodetic_to_ecef(s.lat, s.lon, s.h));
-        for (pair, line) in self.samples.windows(2).zip(&self.lines[1..]) {
+        for (pair, line) in self.samples.windows(2).zip(self.lines.iter().skip(1)) {
             check_jump(&self.path, *line, place(&pair[0]), place(&pair[1]))?;
         }
         let trajectory = self.stretch(0..self.samples.len())?;
