@@ -511,7 +511,7 @@ fn read_text(
     if !table.columns.is_empty() {
         head.rows(&mut table, reader, dictionary)?;
     }
-    table.comments = head.comments;
+    table.comments.splice(..0, head.comments);
     Ok(table)
 }
 
@@ -639,7 +639,6 @@ impl Head {
         let mut rows = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
-            .comment(Some(b'#'))
             .delimiter(self.delimiter)
             .buffer_capacity(BUFFER)
             .from_reader(rows);
@@ -651,6 +650,14 @@ impl Head {
         while rows.read_byte_record(&mut record).map_err(cannot)? {
             let line = self.before + line_of(&record, rows.position().line());
             let found = record.len();
+            let first = record.get(0).unwrap_or_default().trim_ascii_start();
+            if first.starts_with(b"#") || first.starts_with(b"%") {
+                let cells: Vec<&[u8]> = record.iter().collect();
+                let text = String::from_utf8_lossy(&cells.join(&self.delimiter)).into_owned();
+                let inside = text.trim_start_matches(['#', '%', ' ']);
+                table.comments.push(inside.to_owned());
+                continue;
+            }
             if row == 0 && !has_units && found == expected && is_words(&record) {
                 has_units = true;
                 let text = format!("line {line} has words and no numbers: passed over");
