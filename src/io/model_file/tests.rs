@@ -227,7 +227,7 @@ fn wrong_keys_are_refused_with_what_was_meant() {
     );
     assert_eq!(
         refusal("[accel]\nprocesses = []\n"),
-        "m.toml, line 1: \"rate_hz\" is missing | add the key \"rate_hz\""
+        "m.toml, line 1: \"rate_hz\" is missing | add rate_hz = 100.0, the sample rate (Hz)"
     );
     assert_eq!(
         refusal("rate_hz = 1\n"),

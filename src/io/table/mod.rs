@@ -717,7 +717,8 @@ fn no_header(path: &str, line: u64, text: &str, dictionary: &Dictionary<'_>) -> 
 /// The rate in a comment such as `Update Rate: 100.0Hz`.
 fn rate_in(comment: &str) -> Option<f64> {
     let lower = comment.to_lowercase();
-    let after = lower.split_once("update rate")?.1;
+    let words = ["update rate", "sample rate", "sampling rate", "output rate"];
+    let after = words.iter().find_map(|w| lower.split_once(w))?.1;
     let value = after.trim_start_matches(|c: char| !c.is_ascii_digit());
     let digits = value
         .split(|c: char| !c.is_ascii_digit() && c != '.')

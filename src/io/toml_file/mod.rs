@@ -192,8 +192,12 @@ impl Source {
             .map(|key| format!("\"{}\"", dotted(table, key)))
             .collect();
         let keys = keys.join(" or ");
+        let advice = match keys.as_str() {
+            "\"rate_hz\"" => "add rate_hz = 100.0, the sample rate (Hz)".to_owned(),
+            _ => format!("add the key {keys}"),
+        };
         self.error(table, format!("{keys} is missing"))
-            .or_hint(format!("add the key {keys}"))
+            .or_hint(advice)
     }
 
     /// The refusal of a value or key by its type.
