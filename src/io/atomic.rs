@@ -149,8 +149,8 @@ fn parent_of(path: &Path) -> &Path {
     }
 }
 
-/// Removes what killed writers of an output left under temporary names: for the holder of its marker.
-fn remove_abandoned(path: &Path) {
+/// Removes what killed writers of an output left under temporary names: for the holder of its marker, or where the output is there.
+pub(crate) fn remove_abandoned(path: &Path) {
     let start = format!(".{}.", name_of(path));
     let is_left = |name: &str| {
         let rest = name.strip_prefix(&start);

@@ -84,7 +84,8 @@ fn cells_are_known_by_what_they_hold() {
     );
 }
 
-/// A cell that another worker is writing is whole before it has its name: nobody else gives it one.
+/// A cell that another worker is writing is whole before it has its name: nobody else gives it one, and what killed workers
+/// left goes when all cells are there.
 #[test]
 fn cells_in_work_are_left_to_their_workers() {
     let place = place();
@@ -92,9 +93,12 @@ fn cells_in_work_are_left_to_their_workers() {
     ended(dir, "batch study.toml -o out", 0);
     let all = dir.join("out/cells");
     let in_work = all.join(".length_s=4_imu.1-0.partial");
-    fs::rename(all.join("length_s=4_imu"), &in_work).unwrap();
+    let own = all.join("length_s=4_imu");
+    fs::rename(&own, &in_work).unwrap();
+    fs::write(in_work.join("of_another"), "").unwrap();
     ended(dir, "batch study.toml -o out", 0);
-    assert!(in_work.join("manifest.json").exists() && all.join("length_s=4_imu").exists());
+    assert!(own.join("manifest.json").exists() && !own.join("of_another").exists());
+    assert!(!in_work.exists());
 }
 
 #[test]

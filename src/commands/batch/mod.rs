@@ -131,6 +131,9 @@ impl BatchRequest {
         let merged = || {
             let answer = results::merge(study, &cells, &place, context)?;
             answer.write(&place)?;
+            // a worker that was killed where another had just written the same cell
+            let done = cells.iter().filter(|cell| place.is_done(cell));
+            done.for_each(|cell| atomic::remove_abandoned(&place.cell(&cell.name)));
             Ok(Outcome::Merged(Box::new(answer)))
         };
         guard(&place)?;
