@@ -656,7 +656,7 @@ fn packed(path: &Path, text: String) -> std::io::Result<Vec<u8>> {
     packed.finish()
 }
 
-/// What the name of a page ends in.
+/// Endings of the names of pages and pictures.
 const PAGE_ENDING: &str = "html";
 
 /// The ending of a file's name.

@@ -18,31 +18,6 @@ fn white_noise_by_hand() {
     assert_relative_eq!(law.edof(1000)[1], 997.0 * 4.0 / 7.0, max_relative = 1e-12);
 }
 
-/// The spectrum and the filters agree with the closed forms: ∫ |H_j|² S df = nu_j.
-#[test]
-fn spectra_integrate_to_the_wavelet_variance() {
-    let processes = [
-        Process::white(2.0).unwrap(),
-        Process::quantization(3.0).unwrap(),
-        Process::ar1(0.9, 0.5).unwrap(),
-        Process::random_walk(0.1).unwrap(),
-        Process::ma1(0.5, 1.0).unwrap(),
-        Process::gauss_markov(10.0, 0.3, 100.0).unwrap(),
-    ];
-    let half = 1 << 14;
-    for process in &processes {
-        for level in 1..=6 {
-            let m = f64::from(level - 1).exp2();
-            let term = |k: usize| {
-                let x = 0.5 * PI * (k as f64 + 0.5) / half as f64;
-                process.spectrum(x.sin().powi(2)) * (m * x).sin().powi(4) / (m * x.sin()).powi(2)
-            };
-            let integral = (0..half).map(term).sum::<f64>() / half as f64;
-            assert_relative_eq!(integral, process.haar_wv(level), max_relative = 1e-9);
-        }
-    }
-}
-
 /// 2000 records of twice the scale, and of four times: 2/var of nu/mean(nu), known to √(2·(2 + 12/eta)/2000)·… or so: a
 /// variance of chi-squares of eta degrees, from n, is known to √((2 + 12/eta)/n) relative, 6.4 % at eta = 2; four of
 /// which are allowed, and 5 % for the lags. That of ln nu, whose tails are lighter, is known to √((2 + 1)/n) = 3.9 %, of which

@@ -961,7 +961,7 @@ pub(crate) struct CalibrationNote {
 }
 
 impl Calibration {
-    /// What the command prints as JSON.
+    /// The answer as JSON.
     pub(super) fn json(&self) -> Value {
         let fit = |o| fit_json(o, &self.outcomes, &self.settings);
         json!({

@@ -217,7 +217,7 @@ pub struct Unit {
 pub struct Laboratory {
     /// The recordings.
     pub units: Vec<Unit>,
-    /// How models are fitted.
+    /// Settings of the fits.
     pub settings: Settings,
 }
 

@@ -341,7 +341,7 @@ mod tests {
         );
         assert_eq!(
             step("at_s = 1"),
-            "c.toml, line 1: \"accel[1].amplitude\" is missing | add the key \"accel[1].amplitude\""
+            "c.toml, line 1: \"accel[1].amplitude\" is missing | add amplitude to accel[1]"
         );
         assert_eq!(
             step("at_s = -1\namplitude = 1"),
@@ -365,7 +365,7 @@ mod tests {
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"replace\"\nsigma = 1\n"),
-            "c.toml, line 1: \"gyro[1].share\" is missing | add the key \"gyro[1].share\""
+            "c.toml, line 1: \"gyro[1].share\" is missing | add share to gyro[1]"
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"ar1\"\nphi = 1\nsigma2 = 1\n"),

@@ -933,7 +933,7 @@ mod initial_tests {
             (
                 "h_m = 400\n",
                 "",
-                "i.toml, line 1: \"h_m\" is missing | add the key \"h_m\"",
+                "i.toml, line 1: \"h_m\" is missing | add h_m",
             ),
             (
                 "yaw_deg",
@@ -943,7 +943,7 @@ mod initial_tests {
             (
                 "t_s = 0",
                 "pos_sigma_m = [1, 1, -1]",
-                "i.toml, line 1: \"t_s\" is missing | add the key \"t_s\"",
+                "i.toml, line 1: \"t_s\" is missing | add t_s",
             ),
             (
                 "t_s = 0",

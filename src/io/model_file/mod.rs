@@ -381,7 +381,7 @@ impl ModelFile {
         misfits.max_by(|a, b| size(a).total_cmp(&size(b)))
     }
 
-    /// What the provenance has of each fit.
+    /// Entries of the provenance for each fit.
     fn fits(&self) -> impl Iterator<Item = &Value> {
         let fits = self.provenance.as_ref().and_then(|all| all.get("fits"));
         fits.and_then(Value::as_array).into_iter().flatten()

@@ -215,11 +215,11 @@ fn wrong_keys_are_refused_with_what_was_meant() {
     );
     assert_eq!(
         process_refusal("sigma2 = 1"),
-        "m.toml, line 4: \"accel.processes[1].type\" is missing | add the key \"accel.processes[1].type\""
+        "m.toml, line 4: \"accel.processes[1].type\" is missing | add type to accel.processes[1]"
     );
     assert_eq!(
         process_refusal("type = \"AR1\", phi = 0.5"),
-        "m.toml, line 4: \"accel.processes[1].sigma2\" is missing | add the key \"accel.processes[1].sigma2\""
+        "m.toml, line 4: \"accel.processes[1].sigma2\" is missing | add sigma2 to accel.processes[1]"
     );
     assert_eq!(
         refusal("rate = 100\n"),
@@ -231,11 +231,11 @@ fn wrong_keys_are_refused_with_what_was_meant() {
     );
     assert_eq!(
         refusal("rate_hz = 1\n"),
-        "m.toml, line 1: \"accel\" or \"gyro\" is missing | add the key \"accel\" or \"gyro\""
+        "m.toml, line 1: \"accel\" or \"gyro\" is missing | add accel or gyro"
     );
     assert_eq!(
         refusal("rate_hz = 1\n[accel]\n"),
-        "m.toml, line 2: \"accel.processes\" is missing | add the key \"accel.processes\""
+        "m.toml, line 2: \"accel.processes\" is missing | add processes to accel"
     );
     assert_eq!(
         refusal("rate_hz = 1\n[accel]\nprocesses = []\n[accel.x]\nprocesses = []\n"),

@@ -670,6 +670,11 @@ impl Head {
                 if record.iter().all(is_empty) {
                     continue;
                 }
+                // more than one line in a row
+                if record.as_slice().contains(&b'\n') {
+                    return Err(Failure::contents(&path, line, "a quote is not closed")
+                        .or_hint("close it, or remove it"));
+                }
                 // a logger that lost its power within a row
                 let is_cut = found < expected && row > 0;
                 if is_cut && !rows.read_byte_record(&mut record).map_err(cannot)? {
@@ -805,7 +810,8 @@ fn line_of(record: &csv::ByteRecord, next: u64) -> u64 {
         return start;
     }
     let inside = record.as_slice().iter().filter(|b| **b == b'\n').count() as u64;
-    next.saturating_sub(1 + inside)
+    // an open quote has the end of the last line in it
+    next.saturating_sub(1 + inside).max(start)
 }
 
 /// A number; with a decimal comma where semicolons separate.

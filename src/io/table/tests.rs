@@ -130,6 +130,21 @@ fn lines_before_the_header_and_decimal_commas_are_read() {
     assert_eq!(table.comments, ["made by hand", "a gap"]);
 }
 
+/// A quote that is not closed takes all lines behind it, which is no last line that was cut off.
+#[test]
+fn an_open_quote_is_refused_where_it_stands() {
+    let refusal = |row: &str| {
+        let text = format!("t_s,gyro_x_rad_s\n0,1\n1,2\n{row}\n3,4\n4,5\n");
+        parse("a.csv", &text, &DICTIONARY).unwrap_err().to_string()
+    };
+    assert_eq!(refusal("\"2,3"), "a.csv, line 4: a quote is not closed");
+    let number = refusal("2,\"3");
+    assert!(
+        number.starts_with("a.csv, line 4: column \"gyro_x_rad_s\": \"3"),
+        "{number}"
+    );
+}
+
 #[test]
 fn columns_beyond_the_memory_are_refused_with_both_figures() {
     let table = with_header(&["t_s"], &[]).unwrap();

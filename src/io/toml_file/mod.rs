@@ -187,16 +187,14 @@ impl Source {
 
     /// A table that lacks a key, one of several that would do.
     pub(crate) fn missing(&self, table: &str, keys: &[&str]) -> Failure {
-        let keys: Vec<String> = keys
-            .iter()
-            .map(|key| format!("\"{}\"", dotted(table, key)))
-            .collect();
-        let keys = keys.join(" or ");
-        let advice = match keys.as_str() {
-            "\"rate_hz\"" => "add rate_hz = 100.0, the sample rate (Hz)".to_owned(),
-            _ => format!("add the key {keys}"),
+        let advice = match (table, keys) {
+            ("", ["rate_hz"]) => "add rate_hz = 100.0, the sample rate (Hz)".to_owned(),
+            ("", _) => format!("add {}", keys.join(" or ")),
+            _ => format!("add {} to {table}", keys.join(" or ")),
         };
-        self.error(table, format!("{keys} is missing"))
+        let paths = keys.iter().map(|key| format!("\"{}\"", dotted(table, key)));
+        let paths: Vec<String> = paths.collect();
+        self.error(table, format!("{} is missing", paths.join(" or ")))
             .or_hint(advice)
     }
 
@@ -349,7 +347,7 @@ impl<'a> Node<'a> {
         })
     }
 
-    /// What is wrong with it, unless it is with a part of it.
+    /// Reads it; a refusal that has no path yet gets this one.
     fn blamed<T>(self, read: impl FnOnce(Self) -> Result<T, Refusal>) -> Result<T, Refusal> {
         let (path, passed) = (self.path.clone(), self.passed);
         read(self).map_err(|mut e| {

@@ -43,15 +43,15 @@ fn refusals_name_file_line_key_and_value() {
         ),
         (
             "\n[part]\nx = 1\n",
-            "line 1: \"count\" is missing | add the key \"count\"",
+            "line 1: \"count\" is missing | add count",
         ),
         (
             "count = 1\n[part]\n",
-            "line 2: \"part.x\" is missing | add the key \"part.x\"",
+            "line 2: \"part.x\" is missing | add x to part",
         ),
         (
             "count = 1\npart = {}\n",
-            "line 2: \"part.x\" is missing | add the key \"part.x\"",
+            "line 2: \"part.x\" is missing | add x to part",
         ),
         (
             "count = 1\n[part]\nx = \"a\"\n",
@@ -99,7 +99,7 @@ fn refusals_name_file_line_key_and_value() {
         ),
         (
             "count = 1\n[[parts]]\n",
-            "line 2: \"parts[1].x\" is missing | add the key \"parts[1].x\"",
+            "line 2: \"parts[1].x\" is missing | add x to parts[1]",
         ),
         (
             "count = 1\nconut = 1",
@@ -207,7 +207,7 @@ fn keys_of_tagged_tables_are_found() {
         ),
         (
             two("operation = \"step\"\nat = 1"),
-            "line 4: \"rule[2].height\" is missing | add the key \"rule[2].height\"",
+            "line 4: \"rule[2].height\" is missing | add height to rule[2]",
         ),
         (
             two("operation = \"step\"\nheight = 1\nhieght = 1"),
@@ -217,7 +217,7 @@ fn keys_of_tagged_tables_are_found() {
             two("operation = \"stpe\""),
             "line 5: \"rule[2].operation\" = \"stpe\" is not one of \"step\", \"drift\" | did you mean \"step\"?",
         ),
-        (two("height = 1"), "line 4: \"rule[2].operation\" is missing | add the key \"rule[2].operation\""),
+        (two("height = 1"), "line 4: \"rule[2].operation\" is missing | add operation to rule[2]"),
         (
             two("operation = \"drift\"\nx = 1\nreplicates = [1, -2]"),
             "line 7: \"rule[2].replicates\" = -2 is not a whole number ≥ 0 | ",

@@ -117,9 +117,9 @@ pub fn towards(
 /// A start that was tried on the fixes after it.
 struct Candidate {
     start: Start,
-    /// Whether the opposite one is refuted.
+    /// True if the opposite heading is refuted.
     decided: bool,
-    /// How well it agrees with the first minute, and with all that was tried.
+    /// Agreement over the first minute, and over all fixes tried.
     agreements: [Agreement; 2],
 }
 

@@ -157,7 +157,7 @@ fn nis(innovations: &[Option<FixRecord>]) -> f64 {
     nis / components.max(1) as f64
 }
 
-/// How many times a gain of independent innovations of NIS 1: errors that are larger, and errors that last, make any
+/// Gain in units of that of independent innovations of NIS 1: errors that are larger, and errors that last, make any
 /// gain as much larger (the sum of the autocorrelations of ρᵏ is (1 + ρ)/(1 − ρ)).
 fn scale(innovations: &[Option<FixRecord>]) -> f64 {
     let lag_1 = Whiteness::of(innovations.iter().flatten()).map_or(0.0, |w| w.lag_1);

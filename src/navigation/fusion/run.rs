@@ -502,7 +502,7 @@ pub fn bridged(samples: &[ImuIncrement], step_s: f64) -> Vec<ImuIncrement> {
     filled
 }
 
-/// How long samples last (s), their mean specific force (m/s²) and angular rate (rad/s).
+/// Duration of samples (s), their mean specific force (m/s²) and angular rate (rad/s).
 pub(super) fn rates(samples: &[ImuIncrement]) -> (f64, [DVec3; 2]) {
     let seconds: f64 = samples.iter().map(|s| s.dt_s).sum();
     let mean = |of: fn(&ImuIncrement) -> DVec3| samples.iter().map(of).sum::<DVec3>() / seconds;

@@ -40,7 +40,7 @@ impl AidingSettings {
         Aid::ALL.into_iter().filter_map(rate)
     }
 
-    /// Of an aid that is there: rate (Hz), white noise of a measurement as the filter believes and in truth (m/s or rad), and
+    /// Rate (Hz) of an aid that is set, white noise of a measurement as the filter believes and in truth (m/s or rad), and
     /// the point whose velocity it measures, from the IMU, in b (m).
     fn common(&self, aid: Aid) -> Option<(f64, f64, Option<f64>, [f64; 3])> {
         Some(match aid {

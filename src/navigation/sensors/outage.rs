@@ -43,7 +43,7 @@ impl Outage {
         self.start_s <= t_s + SLACK_S && !self.is_over(t_s)
     }
 
-    /// Whether a fix at `t_s` is missing by any of some outages.
+    /// True if any of the outages withholds a fix at `t_s`.
     pub fn any_withholds(outages: &[Self], t_s: f64) -> bool {
         outages.iter().any(|outage| outage.withholds(t_s))
     }

@@ -33,7 +33,7 @@ pub(super) struct Source<'a> {
     rate_hz: f64,
     imu: LaneErrors<'a>,
     gnss: Vec<GnssNoise>,
-    /// Those of the heights; empty without a barometer.
+    /// Streams of the heights; empty without a barometer.
     baro: Vec<Generator>,
     aiding: Vec<AidNoise>,
     /// Empty for an IMU without defects.

@@ -486,7 +486,7 @@ impl Damped<'_> {
         Some(x.as_slice().to_vec())
     }
 
-    /// What the cost is near a point: its gradient and Gauss and Newton's Hessian Σ c ∂f ∂fᵀ of its parts f.
+    /// Quadratic model of the cost near a point: its gradient and Gauss and Newton's Hessian Σ c ∂f ∂fᵀ of its parts f.
     fn quadratic(&self, x: &DVector<f64>, here: &Value) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let beside = |i: usize| {
             let mut beside = x.clone();

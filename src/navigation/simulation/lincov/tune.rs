@@ -670,23 +670,12 @@ pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
         };
         for process in &mut scaled.axes[channel.index()].processes {
             if is_felt(process) {
-                *process = times(process, factor.on_variance);
+                // beyond the largest number nothing is left to enlarge
+                *process = process.times(factor.on_variance).unwrap_or(*process);
             }
         }
     }
     scaled
-}
-
-/// A process whose variance is multiplied.
-fn times(process: &Process, on_variance: f64) -> Process {
-    // a drift has an amplitude, the others a variance
-    let factor = if process.kind() == Kind::Drift {
-        on_variance.sqrt()
-    } else {
-        on_variance
-    };
-    // beyond the largest number nothing is left to enlarge
-    process.times(factor).unwrap_or(*process)
 }
 
 // Where a function that falls crosses zero.
