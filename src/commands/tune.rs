@@ -4,11 +4,9 @@ use crate::app::inputs::{self, SettingsArgs};
 use crate::app::{
     Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Result, refused,
 };
-use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::{self, ModelFile, PROGRAM, known};
 use crate::parse;
 use crate::report::in_order;
-use nav_sim_calibration::derived_interval;
 use nav_sim_document::{Document, Table, Tone, readable, seconds, short_names};
 use nav_sim_navigation::ekf::{BeliefError, FilterStates};
 use nav_sim_navigation::metrics::{PerState, VerdictKind};
@@ -16,14 +14,14 @@ use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
-    Aim, Factor, FilterConsistency, Task, Track, TrueErrors, UpperEnd, aiding_factor, drive, scaled,
+    Aim, Factor, FilterConsistency, Task, Track, TrueErrors, aiding_factor, drive, scaled,
 };
 use nav_sim_navigation::simulation::{NEES_DOF, REPORTED_NAMES, TOLERANCE};
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Model;
 use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Find the smallest factors on MODEL that make its filter consistent for another truth
 ///
@@ -45,10 +43,6 @@ pub struct Tune {
     /// Noise models that may make the errors, such as those of single recordings [default: MODEL, with the errors in SCENARIO]
     #[arg(id = "truth", long = "truth", value_name = "MODEL2", num_args = 1..)]
     truths: Vec<PathBuf>,
-    /// Truths are MODEL itself and the draws of its calibration (MODEL.draws.json, which `calibrate` writes), each with the
-    /// parameters of a recording of its own where MODEL states a spread: errors count up to the upper end of their 95 % interval
-    #[arg(long, conflicts_with = "truth")]
-    intervals: bool,
     /// Trajectory: motion profile (.toml) or table (.csv) [default: a built-in drive with outages of that length]
     #[arg(long, value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
@@ -79,38 +73,29 @@ impl Command for Tune {
         help: "Model file to write",
     };
 
-    fn inputs(&self, mut given: Inputs) -> Result<Inputs> {
-        self.refuse_recordings()?;
-        let draws = draws_file::beside(&self.model);
-        let is_read = self.intervals && draws.exists();
-        given.extend(is_read.then(|| ("draws".to_owned(), draws)));
-        Ok(given)
+    fn inputs(&self, given: Inputs) -> Result<Inputs> {
+        self.refuse_recordings().map(|()| given)
     }
 
     fn run(&self, context: &Context<'_>) -> Result<TuneAnswer> {
         let mut scenario = self.settings.checked()?;
-        if self.truths.is_empty() && !self.intervals && scenario.has_no_errors() {
+        if self.truths.is_empty() && scenario.has_no_errors() {
             return refused(
-                "no truth to be consistent with: neither --truth nor --intervals is given",
-                "give models (--truth OTHER.toml, one a recording), --intervals for a MODEL of `nav-sim calibrate`, or a scenario with errors",
+                "no truth to be consistent with: --truth is not given, and the scenario has no errors",
+                "give models (--truth OTHER.toml, one a recording), or a scenario with errors",
             );
         }
         let file = inputs::model(&self.model, context)?;
         let model = inputs::at_rate(&self.model, &file.model, scenario.imu.rate_hz, context)?;
         inputs::expect_turn_on(&mut scenario.initial, file.turn_on, &self.model, context);
-        let truths = self.truths((&file, &model), &scenario, context)?;
+        let truths = self.true_errors(&scenario, context)?;
         let (track, outages) = self.track(&scenario, &model, context)?;
-        let found = self.tune(&scenario, &model, truths, &track, &outages);
+        let found = self.tune(&scenario, &model, &truths, &track, &outages);
         let settings = self.settings.file.scenario.as_deref();
         let mut answer =
             found.map_err(|e| inputs::no_filter(&e, &self.model, settings, RARE_FIXES))?;
         answer.model = self.model.display().to_string();
-        let of = if self.intervals {
-            "intervals"
-        } else {
-            "truths"
-        };
-        let goal = format!("{} of {of}", self.aim);
+        let goal = format!("{} of truths", self.aim);
         let is_met = answer.fault().is_none();
         answer.tuned = is_met.then(|| tuned(&file, &answer.factors, &goal, context.inputs()));
         Ok(answer)
@@ -136,66 +121,21 @@ impl Tune {
 
     /// What may be true, at the rate of the IMU: noise, turn-on bias, and what the scenario states of the true IMU and
     /// receiver.
-    fn truths(
-        &self,
-        (file, model): (&ModelFile, &Model),
-        scenario: &Scenario,
-        context: &Context<'_>,
-    ) -> Result<Truths> {
-        let true_errors = |path: &Path, model: Model, turned_on: &ModelFile| {
+    fn true_errors(&self, scenario: &Scenario, context: &Context<'_>) -> Result<Vec<TrueErrors>> {
+        let truth = |path: &PathBuf| {
+            let file = inputs::model(path, context)?;
+            let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
             let (mut imu, gnss) = (scenario.imu.clone(), scenario.gnss.clone());
-            inputs::make_turn_on(&mut imu, turned_on.turn_on, path, context);
-            TrueErrors {
+            inputs::make_turn_on(&mut imu, file.turn_on, path, context);
+            let aiding = scenario.aiding.clone();
+            Ok::<_, Failure>(TrueErrors {
                 model,
                 imu,
                 gnss,
-                aiding: scenario.aiding.clone(),
-            }
+                aiding,
+            })
         };
-        let truths = if self.intervals {
-            let draws = draws(
-                &self.model,
-                file,
-                scenario.imu.rate_hz,
-                context.seed_or(None),
-            )?;
-            let estimate = true_errors(&self.model, model.clone(), file);
-            let names = vec![format!(
-                "{} and the {} draws beside it",
-                self.model.display(),
-                draws.models.len()
-            )];
-            let drawn = draws.models.into_iter().map(|model| TrueErrors {
-                model,
-                ..estimate.clone()
-            });
-            let errors = std::iter::once(estimate.clone()).chain(drawn).collect();
-            Truths {
-                names,
-                errors,
-                stretch: Some(draws.stretch),
-            }
-        } else {
-            let truth = |path: &PathBuf| {
-                let file = inputs::model(path, context)?;
-                let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
-                Ok::<_, Failure>((path.display().to_string(), true_errors(path, model, &file)))
-            };
-            // Without another, MODEL with what the scenario says is wrong beside it.
-            let own = std::slice::from_ref(&self.model);
-            let paths = if self.truths.is_empty() {
-                own
-            } else {
-                &self.truths
-            };
-            let named = paths.iter().map(truth).collect::<Result<Vec<_>>>()?;
-            let (names, errors) = named.into_iter().unzip();
-            Truths {
-                names,
-                errors,
-                stretch: None,
-            }
-        };
+        let truths = self.paths().iter().map(truth).collect::<Result<Vec<_>>>()?;
         let unexpected = |truth: &TrueErrors| {
             let imu = truth.imu.clone();
             let scenario = Scenario {
@@ -204,9 +144,18 @@ impl Tune {
             };
             scenario.unexpected()
         };
-        let doubts: Vec<String> = truths.errors.iter().flat_map(unexpected).collect();
+        let doubts: Vec<String> = truths.iter().flat_map(unexpected).collect();
         context.warn_each(in_order(doubts.iter().map(String::as_str)));
         Ok(truths)
+    }
+
+    /// The models that may be true; without --truth MODEL itself, beside what the scenario says is wrong.
+    fn paths(&self) -> &[PathBuf] {
+        if self.truths.is_empty() {
+            std::slice::from_ref(&self.model)
+        } else {
+            &self.truths
+        }
     }
 
     /// The way of the analysis with its outages.
@@ -244,50 +193,16 @@ impl Tune {
     }
 }
 
-/// The draws beside a model file; what the intervals in the file itself leave out is how its parameters hang together.
-fn draws(path: &Path, file: &ModelFile, rate_hz: f64, seed: u64) -> Result<Draws> {
-    let missing = || {
-        format!(
-            "{}: the draws of its calibration are missing",
-            draws_file::beside(path).display()
-        )
-    };
-    let found = draws_file::usable(path, file, rate_hz, Some(seed))
-        .and_then(|draws| draws.ok_or_else(missing));
-    found.map_err(|doubt| {
-        Failure::input(doubt)
-            .hint("calibrate again: the draws are written beside MODEL, unless with --bootstrap 0")
-    })
-}
-
-/// What may be true of an IMU: some models, or one and the draws of its calibration.
-struct Truths {
-    /// The names of the models; of draws one for all.
-    pub names: Vec<String>,
-    /// What they are; the model first, where the others are its draws.
-    pub errors: Vec<TrueErrors>,
-    /// Of draws, what distances from their median are multiplied by.
-    pub stretch: Option<f64>,
-}
-
 impl Tune {
     /// The factors, and the filter before and after them. `given` has the filter that `run` would have.
     fn tune(
         &self,
         given: &Scenario,
         model: &Model,
-        truths: Truths,
+        truths: &[TrueErrors],
         track: &Track,
         outages: &[Outage],
     ) -> std::result::Result<TuneAnswer, BeliefError> {
-        // Draws are many: within 1.2e-3 the analysis is the same with one step from fix to fix, which `run` takes for them too.
-        let merged = truths.stretch.map(|_| track.merged());
-        let analysed = merged.as_ref().unwrap_or(track);
-        // The interval that `run` states for an error: the filter and its standard deviation are the same in all draws.
-        let upper_end = |stretch| {
-            move |estimate: f64, draws: Vec<f64>| derived_interval(estimate, draws, stretch)[1]
-        };
-        let upper_end = truths.stretch.map(upper_end);
         let mut scenario = given.clone();
         match self.filter {
             // what goes with the filter of 21 states beside the model stays
@@ -297,28 +212,24 @@ impl Tune {
         let filter_of_run = given.filter.states;
         // What is wrong with the vehicle's own measurements no noise of the IMU stands for: their sigmas come first.
         let aiding = &given.aiding;
-        let belief = scenario
-            .with_full_noise()
-            .belief(model, outages, analysed)?;
+        let belief = scenario.with_full_noise().belief(model, outages, track)?;
         let known = TrueErrors {
             aiding: aiding.clone(),
             ..TrueErrors::from(model.clone())
         };
-        let aiding_sigmas = (!aiding.is_none())
-            .then(|| aiding_factor(analysed, &belief, &known).unwrap_or(f64::NAN));
+        let aiding_sigmas =
+            (!aiding.is_none()).then(|| aiding_factor(track, &belief, &known).unwrap_or(f64::NAN));
         let widened = aiding_sigmas
             .filter(|factor| *factor > 1.0)
-            .map(|factor| analysed.with_aiding_sigmas(factor));
-        let believed = analysed;
-        let analysed = widened.as_ref().unwrap_or(analysed);
+            .map(|factor| track.with_aiding_sigmas(factor));
+        let analysed = widened.as_ref().unwrap_or(track);
         let full = scenario.with_full_noise();
         let full = |model: &Model| full.belief(model, outages, analysed);
         let tuned = |model: &Model| scenario.belief(model, outages, analysed);
         let of_run = |model: &Model| given.belief(model, outages, analysed);
         let task = Task {
             model,
-            truths: &truths.errors,
-            drawn: upper_end.as_ref().map(|end| end as &UpperEnd<'_>),
+            truths,
             track: analysed,
             full: &full,
             filter: &tuned,
@@ -338,18 +249,13 @@ impl Tune {
             tuned: None,
             filter: self.filter,
             filter_of_run,
-            before: Task {
-                track: believed,
-                ..task
-            }
-            .consistency(task.filter, &ones)?,
+            before: Task { track, ..task }.consistency(task.filter, &ones)?,
             aiding_sigmas,
             after,
             of_run: (self.filter != filter_of_run)
                 .then(|| task.consistency(&of_run, &factors))
                 .transpose()?,
             informed: truths
-                .errors
                 .iter()
                 .all(|truth| truth.imu.without_states().next().is_none())
                 .then(|| {
@@ -359,8 +265,11 @@ impl Tune {
                 })
                 .transpose()?,
             factors,
-            is_drawn: truths.stretch.is_some(),
-            truths: truths.names,
+            truths: self
+                .paths()
+                .iter()
+                .map(|path| path.display().to_string())
+                .collect(),
             aim: self.aim,
             without_factor: task.without_factor(),
         })
@@ -435,14 +344,12 @@ pub struct TuneAnswer {
     of_run: Option<FilterConsistency>,
     /// A filter that knows the truth, each truth its own; none where there are errors of which no filter has states.
     informed: Option<FilterConsistency>,
-    /// Names of the truths; of draws one for all.
+    /// Names of the truths.
     truths: Vec<String>,
     /// Condition under which the filter counts as consistent.
     aim: Aim,
     /// Sensors without noise that a factor could multiply, where a truth has some.
     without_factor: Vec<Sensor>,
-    /// Whether the truths are the draws of a calibration, and what counts is the upper end of an interval.
-    is_drawn: bool,
 }
 
 /// Verdict of `run` on a filter, by its covariance analysis.
@@ -509,8 +416,6 @@ impl TuneAnswer {
     /// Why the factors are of no use, if they are not.
     fn fault(&self) -> Option<String> {
         let is_overconfident = match self.aim {
-            // of draws the first counts: what `run` judges
-            Aim::Worst if self.is_drawn => kind(&self.after) == VerdictKind::Overconfident,
             Aim::Worst => self.after.largest.ratio > 1.0 + TOLERANCE,
             Aim::Mean => self.after.nees / NEES_DOF as f64 > (1.0 + TOLERANCE).powi(2),
         };
@@ -567,11 +472,7 @@ impl TuneAnswer {
 
     /// The truth in which an error is largest.
     fn worst_truth(&self, found: &FilterConsistency) -> &str {
-        &self.truths[if self.is_drawn {
-            0
-        } else {
-            found.largest.truth
-        }]
+        &self.truths[found.largest.truth]
     }
 }
 
@@ -760,7 +661,6 @@ mod tests {
             of_run: (filter != FilterStates::Reduced15).then_some(of_run),
             informed: Some(consistency(1.0, 9.0)),
             truths: vec!["truth.toml".to_owned()],
-            is_drawn: false,
             aim: Aim::Worst,
             without_factor: Vec::new(),
         }

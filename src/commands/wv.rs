@@ -2,7 +2,7 @@
 
 use crate::app::reading::{RecordingRequest, VarianceRequest};
 use crate::app::{Answer, Command, Context, Out, OutputFile, Result};
-use crate::commands::calibrate::{visit, without_warm_up};
+use crate::commands::calibrate::visit;
 use crate::io::recordings::ReadOptions;
 use crate::parse;
 use crate::report::curves::{
@@ -49,18 +49,12 @@ impl Command for Wv {
 
     fn run(&self, context: &Context<'_>) -> Result<SignalsFile> {
         let (scales, tuning) = (self.tuning.levels(), self.tuning.tuning()?);
-        let skips_warm_up = self.recordings.reading.skips_warm_up();
         // Four samples have a scale.
         let reading = ReadOptions {
             min_samples: scales.map_or(4, |j| 1 << j),
             ..self.recordings.options()
         };
         let look = |recording: Recording| -> Result<Vec<SignalCurves>> {
-            let recording = if skips_warm_up {
-                without_warm_up(recording, true).0
-            } else {
-                recording
-            };
             let measured = replicates(&recording, scales, &tuning)?;
             let curves = |(channel, replicate): &(Channel, Replicate)| {
                 let edof = self.degrees_of_freedom(&recording, *channel, replicate)?;

@@ -203,15 +203,9 @@ fn three_recordings_tell_no_candidates_apart() {
 fn a_warm_up_that_is_left_out_counts_for_nothing() {
     const WARM_UP: usize = 1024;
     let directory = recordings("16384", "3");
-    let first = directory.path().join("r/replicate_1.csv");
-    let text = std::fs::read_to_string(&first).unwrap();
-    let (header, rows) = text.split_once('\n').unwrap();
-    let warm = |row: &str| {
-        let (rest, last) = row.rsplit_once(',').unwrap();
-        format!("{rest},{}\n", last.parse::<f64>().unwrap() + 0.1)
-    };
-    let ranking = |rows: String, out: &str, more: &[&str]| {
-        std::fs::write(&first, format!("{header}\n{rows}")).unwrap();
+    let path = |k: usize| directory.path().join(format!("r/replicate_{k}.csv"));
+    let texts = [1, 2, 3].map(|k| std::fs::read_to_string(path(k)).unwrap());
+    let ranking = |out: &str, more: &[&str]| {
         let arguments = ["--estimator", "awv", "--model", "WN+RW", "-o", out];
         choose(directory.path(), &[&arguments[..], more].concat()).success();
         let file =
@@ -220,20 +214,22 @@ fn a_warm_up_that_is_left_out_counts_for_nothing() {
             serde_json::from_str::<Value>(&file).unwrap()["candidates"][0]["folds"][0].clone();
         [&fold["rmse_m"], &fold["nees"], &fold["believed_m"]].map(|v| v.as_f64().unwrap())
     };
-    let lines: Vec<&str> = rows.lines().collect();
-    let never: String = lines[WARM_UP..]
-        .iter()
-        .map(|row| format!("{row}\n"))
-        .collect();
-    let begun: String = lines[..WARM_UP]
-        .iter()
-        .map(|row| warm(row))
-        .chain([never.clone()])
-        .collect();
-    let (left_out, never) = (
-        ranking(begun, "auto", &["--skip-s", "auto"]),
-        ranking(never, "never", &[]),
-    );
+    let warm = |(k, row): (usize, &str)| match (row.rsplit_once(','), k) {
+        (Some((rest, last)), 1..=WARM_UP) => {
+            format!("{rest},{}\n", last.parse::<f64>().unwrap() + 0.1)
+        }
+        _ => format!("{row}\n"),
+    };
+    let begun: String = texts[0].lines().enumerate().map(warm).collect();
+    std::fs::write(path(1), begun).unwrap();
+    let left_out = ranking("left_out", &["--skip-s", "10.24"]);
+    for (k, text) in (1..).zip(&texts) {
+        let rows = text.lines().enumerate();
+        let kept = rows.filter(|(k, _)| !(1..=WARM_UP).contains(k));
+        let never: String = kept.map(|(_, row)| format!("{row}\n")).collect();
+        std::fs::write(path(k), never).unwrap();
+    }
+    let never = ranking("never", &[]);
     // samples are kept from the first one of the file on: the same but for their rounding
     assert!(
         left_out

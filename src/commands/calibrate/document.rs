@@ -8,9 +8,9 @@ use crate::report::csv::merged;
 use crate::report::curves::{FittedCurve, band, curve, recording_names, sensor_name};
 use crate::report::in_order;
 use nav_sim_calibration::{
-    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Miss,
-    Outcome, ParameterInterval, ParameterSpread, Practical, Ranking, Settings, TURN_ON_LEVEL,
-    TurnOnFinding, TurnOnSpread, Undetermined, Verdict, WIDEST, duration, model_of, percent, tau_s,
+    Beginning, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Miss, Outcome,
+    ParameterInterval, ParameterSpread, Practical, Ranking, Settings, TURN_ON_LEVEL, TurnOnFinding,
+    TurnOnSpread, Undetermined, Verdict, WIDEST, duration, model_of, percent, tau_s,
 };
 use nav_sim_document::{
     Axis as ChartAxis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone,
@@ -167,8 +167,8 @@ impl Calibration {
             };
             note(importance, found.sensor.name(), turn_on_remark(found));
         }
-        if let Some((head, text)) = beginnings(&self.beginnings) {
-            note(Importance::Remark, head, text);
+        if let Some(text) = beginnings(&self.beginnings) {
+            note(Importance::Remark, "not stationary at the beginning", text);
         }
         for outcome in fits {
             let reasons = outcome.ranking.iter().flat_map(reasons);
@@ -418,27 +418,21 @@ fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> Option<Stri
     ))
 }
 
-/// Beginnings that are left out, or that change a wavelet variance notably, and what of them.
-fn beginnings(found: &Beginnings) -> Option<(&'static str, String)> {
+/// The recordings whose beginnings change a wavelet variance notably, and what to leave out.
+fn beginnings(found: &[Beginning]) -> Option<String> {
     const NOTABLE: f64 = 0.05;
     let matters = |b: &&Beginning| {
         let mut changes = b.signals.iter().map(|w| w.change);
-        found.left_out || changes.any(|c| c.is_none_or(|ratio| ratio.ln().abs() > NOTABLE))
+        changes.any(|c| c.is_none_or(|ratio| ratio.ln().abs() > NOTABLE))
     };
-    let told: Vec<&Beginning> = found.all.iter().filter(matters).collect();
+    let told: Vec<&Beginning> = found.iter().filter(matters).collect();
     let names = recording_names(told.iter().map(|b| b.recording.as_str()));
     let line = |(b, name): (&&Beginning, String)| match b.skip_s {
-        Some(s) if found.left_out => format!("{name} {s} s"),
         Some(s) => format!("{name} --skip-s {s}"),
         None => format!("{name} never settles"),
     };
     let lines: Vec<String> = told.iter().zip(names).map(line).collect();
-    let head = if found.left_out {
-        "left out at the beginning"
-    } else {
-        "not stationary at the beginning"
-    };
-    (!lines.is_empty()).then(|| (head, some(&lines)))
+    (!lines.is_empty()).then(|| some(&lines))
 }
 
 /// `accel.x`, with the estimator where there are several.

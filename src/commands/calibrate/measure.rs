@@ -7,8 +7,8 @@ use crate::io::recordings::{FileReport, ReadOptions, Report};
 use crate::io::{curve_file, input, recordings};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
-    self, Advance, Beginning, Beginnings, Bootstrap, CalibrationError, Diagnosis, Estimator, Group,
-    Outcome, Pool, Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve, grouped,
+    self, Advance, Beginning, Bootstrap, CalibrationError, Diagnosis, Estimator, Group, Outcome,
+    Pool, Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve, grouped,
     infer_telling, replicates, turn_on, warm_up,
 };
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
@@ -79,8 +79,6 @@ impl EstimatorChoice {
 pub struct CalibrationOptions {
     /// How recordings are read.
     pub reading: ReadOptions,
-    /// Whether the warm-up found in each recording is left out.
-    pub skip_warm_up: bool,
     /// Number of scales; `None`: of each recording one less than its length allows.
     pub scales: Option<u32>,
     /// Which estimators.
@@ -97,7 +95,6 @@ impl Default for CalibrationOptions {
     fn default() -> Self {
         Self {
             reading: ReadOptions::default(),
-            skip_warm_up: false,
             scales: None,
             estimators: EstimatorChoice::One(Estimator::default()),
             pool: None,
@@ -111,7 +108,7 @@ impl Default for CalibrationOptions {
 pub(crate) struct Measured {
     pub report: Report,
     pub replicates: Vec<(Channel, Replicate)>,
-    pub beginnings: Beginnings,
+    pub beginnings: Vec<Beginning>,
     pub settings: Settings,
 }
 
@@ -126,7 +123,7 @@ pub struct Calibration {
     /// How they were fitted.
     pub settings: Settings,
     /// The recordings that do not begin as they go on.
-    pub beginnings: Beginnings,
+    pub beginnings: Vec<Beginning>,
     /// Turn-on bias from the recordings' means, for each estimator and sensor.
     pub turn_on: Vec<TurnOnSpread>,
     /// Each recording against the others.
@@ -170,7 +167,6 @@ pub(crate) fn measure(
     context: &Context<'_>,
 ) -> Result<Measured, Failure> {
     let CalibrationOptions {
-        skip_warm_up,
         scales,
         estimators,
         pool,
@@ -183,14 +179,12 @@ pub(crate) fn measure(
         min_samples: needed,
         ..options.reading.clone()
     };
-    let look = |recording: Recording| {
-        MeasuredRecording::new(recording, *skip_warm_up, *scales, &settings.tuning)
-    };
+    let look = |recording: Recording| MeasuredRecording::new(recording, *scales, &settings.tuning);
     let (looks, report) = visit(paths, &reading, &look, context)?;
     let looks = looks.into_iter().collect::<Result<Vec<_>, _>>()?;
     distinct(&looks)?;
     let rate_hz = report.files[0].rate_hz;
-    let beginnings = beginnings(&looks, (reading.skip_s, *skip_warm_up), rate_hz);
+    let beginnings = beginnings(&looks, reading.skip_s, rate_hz);
     shortest(&report, *scales, context);
     let estimators = estimators.estimators(report.files.iter().map(|f| f.samples.len()).sum())?;
     let settings = Settings {
@@ -233,7 +227,7 @@ impl Calibration {
         Self {
             turn_on: settings.estimators.iter().flat_map(of_estimator).collect(),
             diagnoses: diagnose(&groups, &outcomes, &settings),
-            beginnings: Beginnings::default(),
+            beginnings: Vec::new(),
             note: CalibrationNote::default(),
             groups,
             outcomes,
@@ -291,7 +285,6 @@ struct MeasuredRecording {
 impl MeasuredRecording {
     fn new(
         recording: Recording,
-        skip_warm_up: bool,
         levels: Option<u32>,
         tuning: &Tuning,
     ) -> Result<Self, CalibrationError> {
@@ -300,13 +293,15 @@ impl MeasuredRecording {
             .par_iter()
             .map(|s| (s.channel, input::hash_of_samples(&s.samples)))
             .collect();
-        let (recording, warm_ups) = without_warm_up(recording, skip_warm_up);
-        let replicates = replicates(&recording, levels, tuning)?;
         Ok(Self {
-            recording: recording.name,
             signals,
-            warm_ups,
-            replicates,
+            warm_ups: recording
+                .signals
+                .par_iter()
+                .filter_map(|s| warm_up(&s.samples))
+                .collect(),
+            replicates: replicates(&recording, levels, tuning)?,
+            recording: recording.name,
         })
     }
 }
@@ -344,45 +339,20 @@ fn distinct(looks: &[MeasuredRecording]) -> Result<(), Failure> {
 }
 
 /// The recordings that do not begin as they go on after what was skipped.
-fn beginnings(
-    looks: &[MeasuredRecording],
-    (skipped_s, left_out): (f64, bool),
-    rate_hz: f64,
-) -> Beginnings {
+fn beginnings(looks: &[MeasuredRecording], skipped_s: f64, rate_hz: f64) -> Vec<Beginning> {
     let beginning = |look: &MeasuredRecording| Beginning {
         recording: look.recording.clone(),
         signals: look.warm_ups.clone(),
         skip_s: longest(&look.warm_ups).map(|n| (skipped_s + n as f64 / rate_hz).ceil()),
     };
     let found = looks.iter().filter(|look| !look.warm_ups.is_empty());
-    Beginnings {
-        all: found.map(beginning).collect(),
-        left_out,
-    }
+    found.map(beginning).collect()
 }
 
 /// Samples to leave out of a recording for all its signals; none where that does not help one of them.
 fn longest(signals: &[WarmUp]) -> Option<usize> {
     let helps = signals.iter().all(|w| w.change.is_some());
     signals.iter().map(|w| w.samples).max().filter(|_| helps)
-}
-
-/// How the signals of a recording begin; if it is to be left out, the recording without that.
-pub(crate) fn without_warm_up(
-    mut recording: Recording,
-    leave_out: bool,
-) -> (Recording, Vec<WarmUp>) {
-    let found: Vec<_> = recording
-        .signals
-        .par_iter()
-        .filter_map(|s| warm_up(&s.samples))
-        .collect();
-    if let Some(samples) = longest(&found).filter(|_| leave_out) {
-        for signal in &mut recording.signals {
-            signal.samples.drain(..samples);
-        }
-    }
-    (recording, found)
 }
 
 /// Remarks which recording is so much shorter than the others that it lacks scales, or costs all of them scales.

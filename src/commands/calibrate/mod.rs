@@ -26,7 +26,7 @@ mod measure;
 
 pub(crate) use document::CalibrationNote;
 pub use measure::{Calibration, CalibrationOptions, EstimatorChoice, calibrate};
-pub(crate) use measure::{Measured, measure, visit, without_warm_up};
+pub(crate) use measure::{Measured, measure, visit};
 
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
 use crate::app::{Answer, Command, Context, Out, OutputFile, Result, refused};
@@ -162,7 +162,6 @@ impl Command for Calibrate {
             None => {
                 let options = CalibrationOptions {
                     reading: self.recordings.options(),
-                    skip_warm_up: self.recordings.reading.skips_warm_up(),
                     scales: self.tuning.levels(),
                     estimators: self.estimator,
                     pool: self.pool,

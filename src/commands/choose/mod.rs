@@ -12,7 +12,7 @@ use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
 use crate::app::{Answer, Command, Context, Inputs, Out, OutputFile, Result, refused};
 use crate::commands::calibrate::{
     Calibration, CalibrationNote, CalibrationOptions, ESTIMATORS, EstimatorChoice, Measured,
-    measure, without_warm_up,
+    measure,
 };
 use crate::io::recordings::{self, FileReport, Gaps, ReadOptions};
 use crate::parse;
@@ -24,7 +24,6 @@ use nav_sim_document::{
 };
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_signal::imu::Recording;
 use nav_sim_signal::noise::Model;
 use ranking::{Mean, Placed, Ranking};
 use serde::Serialize;
@@ -168,7 +167,6 @@ impl Command for Choose {
         // the candidates have estimators and models of their own
         let options = CalibrationOptions {
             reading: self.recordings.options(self.gaps),
-            skip_warm_up: self.recordings.skips_warm_up(),
             settings: Settings {
                 trim: self.trim,
                 ..Settings::default()
@@ -214,11 +212,6 @@ impl Command for Choose {
         for k in &judges {
             let file = &files[*k];
             let (read, _) = recordings::read(std::slice::from_ref(&file.path), &reading)?;
-            // a warm-up that was left out of the curves is no stretch to navigate on either
-            let read: Vec<Recording> = read
-                .into_iter()
-                .map(|recording| without_warm_up(recording, options.skip_warm_up).0)
-                .collect();
             let advance = |n| context.advance(n);
             let (recording, windows) = (file.file.clone(), self.runs);
             let scores = drive
@@ -451,7 +444,9 @@ impl ChoiceMade {
         let is_common = 2 * ranking.undescribed.len() > folds.len();
         warn(&ranking.undescribed, &|names| {
             if is_common {
-                format!("no candidate describes {names}: a warm-up? try --skip-s auto")
+                format!(
+                    "no candidate describes {names}: a warm-up? nav-sim calibrate says what to --skip-s"
+                )
             } else {
                 format!("no candidate describes {names}: look at it with nav-sim calibrate")
             }

@@ -257,7 +257,7 @@ impl Run {
         let analysed = scenario.run.method == Method::Lincov;
         let draws = |path: &Path, file: &ModelFile| -> Option<Draws> {
             analysed
-                .then(|| draws_file::usable(path, file, imu_hz, None))?
+                .then(|| draws_file::usable(path, file, imu_hz))?
                 .unwrap_or_else(|doubt| {
                     context.warn(format!("{doubt}: no intervals from the calibration"));
                     None
