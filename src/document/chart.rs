@@ -1,23 +1,12 @@
 //! What a chart shows, before it is drawn.
 
-/// How an axis runs.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Scale {
-    /// Evenly.
-    Linear,
-    /// By powers of ten; what is not positive is not shown.
-    Log,
-    /// One place for each of these names: the k-th stands at k.
-    Names(Vec<String>),
-}
-
 /// An axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// Quantity and unit, such as `time (s)`.
     pub label: String,
-    /// How it runs.
-    pub scale: Scale,
+    /// Whether it runs by powers of ten; what is not positive is not shown then.
+    pub is_log: bool,
     /// What it shows at least.
     pub include: Option<(f64, f64)>,
 }
@@ -27,7 +16,7 @@ impl Axis {
     pub fn linear(label: &str) -> Self {
         Self {
             label: label.to_owned(),
-            scale: Scale::Linear,
+            is_log: false,
             include: None,
         }
     }
@@ -35,16 +24,8 @@ impl Axis {
     /// A logarithmic axis.
     pub fn log(label: &str) -> Self {
         Self {
-            scale: Scale::Log,
+            is_log: true,
             ..Self::linear(label)
-        }
-    }
-
-    /// An axis of names.
-    pub fn names(names: Vec<String>) -> Self {
-        Self {
-            scale: Scale::Names(names),
-            ..Self::linear("")
         }
     }
 

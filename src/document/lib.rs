@@ -28,7 +28,7 @@ mod table;
 // L5: documents
 mod document;
 
-pub use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Scale, Series, Size, Stroke};
+pub use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Series, Size, Stroke};
 pub use document::{Block, Document, Importance, NOTES, Note, Tone};
 pub use draw::{escape, turns};
 pub use number::{percent, readable, seconds, short_names, shortest, six_digits, window};

@@ -19,13 +19,11 @@ use crate::parse;
 use crate::report::{json, six_digits};
 use candidates::{Candidate, Drive, Fold, Inflation, Laboratory, Unit};
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, model_of};
-use nav_sim_document::{
-    Axis, Chart, Colour, Document, Importance, Panel, Series, Table, Tone, readable, window,
-};
+use nav_sim_document::{Document, Importance, Table, Tone, readable, window};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_signal::noise::Model;
-use ranking::{Mean, Placed, Ranking};
+use ranking::Ranking;
 use serde::Serialize;
 use serde_json::json;
 use std::path::PathBuf;
@@ -146,6 +144,7 @@ impl Command for Choose {
             "ranking.json",
         ],
     };
+    const PLOT: bool = false;
 
     fn inputs(&self, given: Inputs) -> Result<Inputs> {
         self.candidates().map(|_| given)
@@ -402,7 +401,6 @@ impl ChoiceMade {
             ("RMSE (m)", "rmse_m"),
         ];
         document.table(Table::of(&json, "/candidates/*", &columns));
-        document.chart(&self.chart(), CAPTION);
         let columns = [
             ("candidate", "candidate"),
             ("RMSE (m)", "rmse_m"),
@@ -425,71 +423,16 @@ impl ChoiceMade {
 
     /// Notes, the most important first.
     fn notes(&self, document: &mut Document) {
-        let (ranking, folds) = (&self.ranking, &self.ranking.candidates[0].folds);
         let mut warn = |names: &[String], text: &dyn Fn(String) -> String| {
             if !names.is_empty() {
                 document.note(Importance::Warning, text(names.join(", ")));
             }
         };
         warn(&self.abnormal, &|names| {
-            let verb = if self.abnormal.len() == 1 {
-                "is"
-            } else {
-                "are"
-            };
-            format!(
-                "{names} {verb} abnormal, and no judge of candidates: nav-sim calibrate says how"
-            )
+            format!("abnormal, and no judge of candidates (nav-sim calibrate says how): {names}")
         });
-        let is_common = 2 * ranking.undescribed.len() > folds.len();
-        warn(&ranking.undescribed, &|names| {
-            if is_common {
-                format!(
-                    "no candidate describes {names}: a warm-up? nav-sim calibrate says what to --skip-s"
-                )
-            } else {
-                format!("no candidate describes {names}: look at it with nav-sim calibrate")
-            }
+        warn(&self.ranking.undescribed, &|names| {
+            format!("no candidate describes {names}: a warm-up? look at it with nav-sim calibrate")
         });
-    }
-
-    /// Log scores against the best, a row a candidate.
-    fn chart(&self) -> Chart {
-        let placed = self.ranking.candidates.iter().rev().enumerate();
-        let (mut names, mut points, mut bars) = (Vec::new(), Vec::new(), Vec::new());
-        for (
-            row,
-            Placed {
-                candidate,
-                difference,
-                ..
-            },
-        ) in placed
-        {
-            let Mean {
-                value,
-                ci95: (low, high),
-            } = difference.log_score;
-            let height = row as f64;
-            names.push(candidate.clone());
-            points.push((value, height, f64::NAN));
-            bars.extend([(low, height), (high, height), (f64::NAN, f64::NAN)]);
-        }
-        let rows = names.len() as f64;
-        let series = vec![
-            Series::dashed("best", Colour::RIGHT, vec![(0.0, -0.5), (0.0, rows - 0.5)]),
-            Series::line("", Colour::BELIEVED, bars),
-            Series::points("", Colour::BELIEVED, points),
-        ];
-        Chart::new(
-            "Log score against the best",
-            Axis::linear("nats"),
-            vec![Panel {
-                height: 0.1 * (rows + 1.0),
-                ..Panel::new(Axis::names(names), series)
-            }],
-        )
     }
 }
-
-const CAPTION: &str = "Log score: the mean log density of the true errors under the filter's covariance, less that of the best. Bars: 95 % intervals over recordings.";
