@@ -128,6 +128,64 @@ pub trait Answer: Serialize {
     }
 }
 
+/// An answer whose JSON, document and files are made with it.
+#[derive(Debug, Serialize)]
+#[serde(transparent)]
+pub struct PlainAnswer {
+    json: Value,
+    #[serde(skip)]
+    document: Document,
+    #[serde(skip)]
+    files: Vec<(String, String)>,
+    #[serde(skip)]
+    unmet: Option<Failure>,
+}
+
+impl PlainAnswer {
+    pub(crate) fn new(json: Value, document: Document) -> Self {
+        Self {
+            json,
+            document,
+            files: Vec::new(),
+            unmet: None,
+        }
+    }
+
+    /// The same with files: names or endings, and texts.
+    pub(crate) fn with<N: Into<String>>(
+        self,
+        files: impl IntoIterator<Item = (N, String)>,
+    ) -> Self {
+        let files = files.into_iter().map(|(name, text)| (name.into(), text));
+        Self {
+            files: files.collect(),
+            ..self
+        }
+    }
+
+    /// The same with a bound that may not be met.
+    pub(crate) fn judged(self, unmet: Option<Failure>) -> Self {
+        Self { unmet, ..self }
+    }
+}
+
+impl Answer for PlainAnswer {
+    fn document(&self) -> Document {
+        self.document.clone()
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        let files = self.files.iter();
+        files
+            .map(|(name, text)| OutputFile::whole(name, text.clone()))
+            .collect()
+    }
+
+    fn unmet(&self) -> Option<Failure> {
+        self.unmet.clone()
+    }
+}
+
 /// A file to be written.
 pub struct OutputFile<'a> {
     /// Name in the directory, or ending.

@@ -1,9 +1,7 @@
 //! The IMU that a limit needs, what a given one makes of it, and a ranking of several.
 
 use crate::app::inputs::{self, ScenarioArgs};
-use crate::app::{
-    Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, refused,
-};
+use crate::app::{Command, Context, Failure, Inputs, Out, PlainAnswer, Refuse, Result, refused};
 use crate::io::datasheet::{self, CATALOGUE, Datasheet};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::input::listed;
@@ -95,23 +93,8 @@ impl FromStr for Ask {
     }
 }
 
-/// What a limit needs, or what one or several IMUs make of it.
-#[derive(Debug, Serialize)]
-#[serde(transparent)]
-pub struct RequireAnswer {
-    json: Value,
-    #[serde(skip)]
-    document: Document,
-    /// The IMU that is needed, where that is asked.
-    #[serde(skip)]
-    model: Option<ModelFile>,
-    /// The limits that are not kept.
-    #[serde(skip)]
-    unmet: Option<Failure>,
-}
-
 impl Command for Require {
-    type Answer = RequireAnswer;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "require";
     const OUT: Out = Out::File {
         name: "needed.toml",
@@ -149,7 +132,7 @@ impl Command for Require {
         Ok(given)
     }
 
-    fn run(&self, context: &Context<'_>) -> Result<RequireAnswer> {
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let asked = self.requirements(context)?;
         match (&self.model, &self.catalogue) {
             (Some(path), _) => asked.given(path, self.vehicle.is_some(), context),
@@ -165,21 +148,6 @@ impl Command for Require {
                 Failure::input(e).hint(hint)
             }),
         }
-    }
-}
-
-impl Answer for RequireAnswer {
-    fn document(&self) -> Document {
-        self.document.clone()
-    }
-
-    fn files(&self) -> Vec<OutputFile<'_>> {
-        let file = |file| OutputFile::whole("", model_file::to_toml(file));
-        self.model.iter().map(file).collect()
-    }
-
-    fn unmet(&self) -> Option<Failure> {
-        self.unmet.clone()
     }
 }
 
@@ -221,12 +189,7 @@ impl Require {
 
 impl Requirements {
     /// What a given IMU makes of the limits.
-    fn given(
-        &self,
-        path: &Path,
-        has_vehicle: bool,
-        context: &Context<'_>,
-    ) -> Result<RequireAnswer> {
+    fn given(&self, path: &Path, has_vehicle: bool, context: &Context<'_>) -> Result<PlainAnswer> {
         let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
         let file = inputs::model(path, context)?;
         let mut scenario = self.scenario.clone();
@@ -285,12 +248,7 @@ impl Requirements {
                 limit.quantity
             ))
         });
-        Ok(RequireAnswer {
-            json,
-            document,
-            model: None,
-            unmet,
-        })
+        Ok(PlainAnswer::new(json, document).judged(unmet))
     }
 
     fn verdict(&self, judgement: &Judgement, outages: &[Outage]) -> Vec<String> {
@@ -549,7 +507,7 @@ impl Requirements {
     ///
     /// # Errors
     /// When no IMU keeps the limits, or trajectory and rates do not fit together.
-    fn needed(&self) -> Result<RequireAnswer, RequireError> {
+    fn needed(&self) -> Result<PlainAnswer, RequireError> {
         let outages = self.outages();
         let course = self.course(&outages)?;
         let scenario = &self.with_stated_turn_on();
@@ -627,12 +585,7 @@ impl Requirements {
             ("others 10 × better", "others_10_times_better"),
         ];
         document.table(Table::of(&json, "/figures/*", &columns));
-        Ok(RequireAnswer {
-            json,
-            document,
-            model: Some(file),
-            unmet: None,
-        })
+        Ok(PlainAnswer::new(json, document).with([("", model_file::to_toml(&file))]))
     }
 
     /// The scenario with a filter that expects the turn-on biases that `[imu]` states, as it expects those of a model file.
@@ -753,7 +706,7 @@ impl Requirements {
     ///
     /// # Errors
     /// When a model has no filter, with its name, or the longest outage is asked for.
-    fn ranked(&self, units: &[CatalogueUnit]) -> Result<RequireAnswer> {
+    fn ranked(&self, units: &[CatalogueUnit]) -> Result<PlainAnswer> {
         let ranked = |unit: &CatalogueUnit| {
             let judged = self.judged(&unit.scenario, &unit.model);
             let mut judgement = judged.refuse_within(&unit.name)?;
@@ -828,12 +781,7 @@ impl Requirements {
         let columns = [("unit", "unit"), ("not stated", "missing")];
         document.table(Table::of(&json, "/units/*", &columns));
         document.text(RULE);
-        Ok(RequireAnswer {
-            json,
-            document,
-            model: None,
-            unmet,
-        })
+        Ok(PlainAnswer::new(json, document).judged(unmet))
     }
 
     /// The longest outage of which all places are within the limits, in whole seconds. The first place holds the longest.

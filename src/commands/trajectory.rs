@@ -1,6 +1,6 @@
 //! `nav-sim trajectory`: reference trajectories.
 
-use crate::app::{Answer, Asked, Command, Context, Failure, Out, OutputFile, Result, inputs};
+use crate::app::{Asked, Command, Context, Failure, Out, PlainAnswer, Result, inputs};
 use crate::io::scenario_file;
 use crate::io::trajectory_file::{self, Instants, Options, parse_origin};
 use crate::parse;
@@ -15,8 +15,7 @@ use nav_sim_navigation::simulation::{Plan, record};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::plausibility::{LIMITS, examine};
 use nav_sim_signal::noise::continuous;
-use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::PathBuf;
 
 /// Make, check and convert reference trajectories
@@ -88,27 +87,6 @@ impl Source {
     }
 }
 
-/// A trajectory as a table of nav-sim.
-#[derive(Debug, Serialize)]
-pub struct TrajectoryTable {
-    schema_version: u32,
-    start_s: f64,
-    end_s: f64,
-    rows: usize,
-    #[serde(skip)]
-    text: String,
-}
-
-impl Answer for TrajectoryTable {
-    fn document(&self) -> Document {
-        Document::new("Trajectory", Tone::Good, [format!("{} rows", self.rows)])
-    }
-
-    fn files(&self) -> Vec<OutputFile<'_>> {
-        vec![OutputFile::whole("", self.text.clone())]
-    }
-}
-
 /// Table of the rows of a trajectory, or of evenly spaced ones.
 #[derive(clap::Args, Debug)]
 pub struct Convert {
@@ -120,7 +98,7 @@ pub struct Convert {
 }
 
 impl Command for Convert {
-    type Answer = TrajectoryTable;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "trajectory convert";
     const OUT: Out = Out::File {
         name: "trajectory.csv",
@@ -129,16 +107,19 @@ impl Command for Convert {
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
 
-    fn run(&self, context: &Context<'_>) -> Result<TrajectoryTable> {
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let (trajectory, _) = self.source.read(context)?;
         let rows = self.rate_hz.map_or(Instants::Knots, Instants::Rate);
-        Ok(TrajectoryTable {
-            schema_version: 1,
-            start_s: trajectory.start_s(),
-            end_s: trajectory.end_s(),
-            rows: rows.times(&trajectory).len(),
-            text: trajectory_file::csv(&trajectory, rows),
-        })
+        let count = rows.times(&trajectory).len();
+        let json = json!({
+            "schema_version": 1,
+            "start_s": trajectory.start_s(),
+            "end_s": trajectory.end_s(),
+            "rows": count,
+        });
+        let document = Document::new("Trajectory", Tone::Good, [format!("{count} rows")]);
+        let text = trajectory_file::csv(&trajectory, rows);
+        Ok(PlainAnswer::new(json, document).with([("", text)]))
     }
 }
 
@@ -171,11 +152,11 @@ pub struct CheckTrajectory {
 const SAID: usize = 10;
 
 impl Command for CheckTrajectory {
-    type Answer = TrajectoryCheck;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "trajectory check";
     const PLOT: bool = false;
 
-    fn run(&self, context: &Context<'_>) -> Result<TrajectoryCheck> {
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let (trajectory, warnings) = self.source.read(context)?;
         let mut limits = LIMITS;
         limits[0] = self.limit_speed;
@@ -190,6 +171,9 @@ impl Command for CheckTrajectory {
         }
         let closure = Closure::new(&trajectory, self.rate_hz, GravityModel::default())
             .map_err(|e| Failure::input(format!("{name}: {e}")).hint("give another --rate-hz"))?;
+        let is_within = closure.within(&bounds);
+        let places = trajectory.knots().iter();
+        let places: Vec<_> = places.map(|t| trajectory.kinematics(*t).r_e).collect();
         let motion = |[speed_m_s, acceleration_m_s2, jerk_m_s3, rate_deg_s]: [f64; 4]| {
             json!({
                 "speed_m_s": speed_m_s,
@@ -198,45 +182,22 @@ impl Command for CheckTrajectory {
                 "rate_deg_s": rate_deg_s,
             })
         };
-        let places = trajectory.knots().iter();
-        let places: Vec<_> = places.map(|t| trajectory.kinematics(*t).r_e).collect();
-        Ok(TrajectoryCheck {
-            file: name,
-            start_s: trajectory.start_s(),
-            end_s: trajectory.end_s(),
-            points: places.len(),
-            path_m: places.windows(2).map(|w| w[0].distance(w[1])).sum(),
-            largest: motion(largest),
-            limits: motion(limits),
-            beyond_limits: beyond.iter().map(ToString::to_string).collect(),
-            warnings,
-            within_bounds: closure.within(&bounds),
-            closure,
-            bounds,
-        })
-    }
-}
-
-/// Results of the check.
-#[derive(Serialize)]
-pub struct TrajectoryCheck {
-    file: String,
-    start_s: f64,
-    end_s: f64,
-    points: usize,
-    /// Length of the path: chords between the points.
-    path_m: f64,
-    largest: Value,
-    limits: Value,
-    beyond_limits: Vec<String>,
-    warnings: Vec<String>,
-    closure: Closure,
-    within_bounds: bool,
-    bounds: Bounds,
-}
-
-impl Answer for TrajectoryCheck {
-    fn document(&self) -> Document {
+        let beyond: Vec<String> = beyond.iter().map(ToString::to_string).collect();
+        let json = json!({
+            "file": name,
+            "start_s": trajectory.start_s(),
+            "end_s": trajectory.end_s(),
+            "points": places.len(),
+            // chords between the points
+            "path_m": places.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>(),
+            "largest": motion(largest),
+            "limits": motion(limits),
+            "beyond_limits": beyond,
+            "warnings": warnings,
+            "closure": closure,
+            "within_bounds": is_within,
+            "bounds": bounds,
+        });
         let rows = [
             ("path (m)", "path_m -"),
             ("speed (m/s)", "largest/speed_m_s limits/speed_m_s"),
@@ -260,29 +221,22 @@ impl Answer for TrajectoryCheck {
             ("velocity (m/s)", "closure/velocity_m_s bounds/velocity_m_s"),
             ("attitude (rad)", "closure/attitude_rad bounds/attitude_rad"),
         ];
-        let c = &self.closure;
+        let (start_s, points) = (trajectory.start_s(), places.len());
         let text = format!(
-            "{}: {} s from {} s, {} points\nclosure at {} Hz over {} s: {}\n{}",
-            self.file,
-            self.end_s - self.start_s,
-            self.start_s,
-            self.points,
-            c.rate_hz,
-            c.duration_s,
-            if self.within_bounds {
+            "{name}: {} s from {start_s} s, {points} points\nclosure at {} Hz over {} s: {}\n{}",
+            trajectory.end_s() - start_s,
+            closure.rate_hz,
+            closure.duration_s,
+            if is_within {
                 "within bounds"
             } else {
                 "BEYOND A BOUND"
             },
-            Table::of_keys(self, &["", "largest", "limit"], &rows).columns(usize::MAX)
+            Table::of_keys(&json, &["", "largest", "limit"], &rows).columns(usize::MAX)
         );
-        Document::new("Trajectory", Tone::Good, [text])
-    }
-
-    fn unmet(&self) -> Option<Failure> {
         let (mut missed, mut hints) = (Vec::new(), Vec::new());
-        if !self.within_bounds {
-            let (c, b) = (&self.closure, &self.bounds);
+        if !is_within {
+            let (c, b) = (&closure, &bounds);
             missed.push(format!(
                 "closure at {} Hz is {:.3e} m, {:.3e} m/s, {:.3e} rad, beyond {:e} m, {:e} m/s or {:e} rad",
                 c.rate_hz,
@@ -295,17 +249,18 @@ impl Answer for TrajectoryCheck {
             ));
             hints.push("a higher --rate-hz closes better; rough motion may deserve a wider bound");
         }
-        let stretches = match self.beyond_limits.len() {
-            0 => None,
-            1 => Some("1 stretch".to_owned()),
-            n => Some(format!("{n} stretches")),
-        };
-        if let Some(stretches) = stretches {
+        if !beyond.is_empty() {
+            let stretches = match beyond.len() {
+                1 => "1 stretch".to_owned(),
+                n => format!("{n} stretches"),
+            };
             missed.push(format!("the motion is beyond a limit in {stretches}"));
             hints.push("a vehicle that does move so deserves a larger --limit-speed");
         }
-        let message = format!("{}: {}", self.file, missed.join("; "));
-        (!missed.is_empty()).then(|| Failure::bound(message).hint(hints.join("; ")))
+        let message = format!("{name}: {}", missed.join("; "));
+        let unmet = (!missed.is_empty()).then(|| Failure::bound(message).hint(hints.join("; ")));
+        let document = Document::new("Trajectory", Tone::Good, [text]);
+        Ok(PlainAnswer::new(json, document).judged(unmet))
     }
 }
 
@@ -332,19 +287,10 @@ pub struct Record {
     scenario: Option<PathBuf>,
 }
 
-/// Recorded drive: its files by name.
-#[derive(Debug, Serialize)]
-pub struct RecordedDrive {
-    schema_version: u32,
-    files: [&'static str; 4],
-    #[serde(skip)]
-    texts: [String; 4],
-}
-
 const RECORDED: [&str; 4] = ["imu.csv", "gnss.csv", "reference.csv", "initial.toml"];
 
 impl Command for Record {
-    type Answer = RecordedDrive;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "trajectory record";
     const OUT: Out = Out::Directory {
         path: "out/recording",
@@ -353,7 +299,7 @@ impl Command for Record {
     const PLOT: bool = false;
     const PAGE: bool = false;
 
-    fn run(&self, context: &Context<'_>) -> Result<RecordedDrive> {
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let mut scenario = self
             .scenario
             .as_deref()
@@ -375,29 +321,14 @@ impl Command for Record {
         let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &[], &[], seed);
         let plan = Plan::new(&experiment).map_err(Failure::input)?;
         let recording = record(&plan, 0);
-        Ok(RecordedDrive {
-            schema_version: 1,
-            files: RECORDED,
-            texts: [
-                imu_csv(&recording.imu),
-                gnss_csv(&recording.gnss),
-                trajectory_file::csv(&trajectory, Instants::Rate(10.0)),
-                initial_toml(trajectory.start_s(), &recording.start, &scenario.initial),
-            ],
-        })
-    }
-}
-
-impl Answer for RecordedDrive {
-    fn document(&self) -> Document {
-        Document::new("Recorded drive", Tone::Good, [self.files.join(", ")])
-    }
-
-    fn files(&self) -> Vec<OutputFile<'_>> {
-        self.files
-            .into_iter()
-            .zip(self.texts.clone())
-            .map(|(name, text)| OutputFile::whole(name, text))
-            .collect()
+        let texts = [
+            imu_csv(&recording.imu),
+            gnss_csv(&recording.gnss),
+            trajectory_file::csv(&trajectory, Instants::Rate(10.0)),
+            initial_toml(trajectory.start_s(), &recording.start, &scenario.initial),
+        ];
+        let json = json!({ "schema_version": 1, "files": RECORDED });
+        let document = Document::new("Recorded drive", Tone::Good, [RECORDED.join(", ")]);
+        Ok(PlainAnswer::new(json, document).with(RECORDED.into_iter().zip(texts)))
     }
 }

@@ -1,9 +1,7 @@
 //! `nav-sim tune`: the smallest factors on the variances of a noise model that make its filter consistent with other truths.
 
 use crate::app::inputs::{self, SettingsArgs};
-use crate::app::{
-    Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Result, refused,
-};
+use crate::app::{Command, Context, Failure, Input, Inputs, Out, PlainAnswer, Result, refused};
 use crate::io::model_file::{self, ModelFile, PROGRAM, known};
 use crate::parse;
 use crate::report::in_order;
@@ -19,7 +17,6 @@ use nav_sim_navigation::simulation::lincov::{
 use nav_sim_navigation::simulation::{NEES_DOF, REPORTED_NAMES, TOLERANCE};
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Model;
-use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -66,7 +63,7 @@ const RARE_FIXES: &str =
 const DAY_S: f64 = 86_400.0;
 
 impl Command for Tune {
-    type Answer = TuneAnswer;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "tune";
     const OUT: Out = Out::File {
         name: "tuned.toml",
@@ -77,7 +74,7 @@ impl Command for Tune {
         self.refuse_recordings().map(|()| given)
     }
 
-    fn run(&self, context: &Context<'_>) -> Result<TuneAnswer> {
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let mut scenario = self.settings.checked()?;
         if self.truths.is_empty() && scenario.has_no_errors() {
             return refused(
@@ -92,13 +89,21 @@ impl Command for Tune {
         let (track, outages) = self.track(&scenario, &model, context)?;
         let found = self.tune(&scenario, &model, &truths, &track, &outages);
         let settings = self.settings.file.scenario.as_deref();
-        let mut answer =
-            found.map_err(|e| inputs::no_filter(&e, &self.model, settings, RARE_FIXES))?;
-        answer.model = self.model.display().to_string();
+        let found = found.map_err(|e| inputs::no_filter(&e, &self.model, settings, RARE_FIXES))?;
         let goal = format!("{} of truths", self.aim);
-        let is_met = answer.fault().is_none();
-        answer.tuned = is_met.then(|| tuned(&file, &answer.factors, &goal, context.inputs()));
-        Ok(answer)
+        let fault = found.fault();
+        let tuned = fault.is_none().then(|| {
+            let tuned = tuned(&file, &found.factors, &goal, context.inputs());
+            ("", model_file::to_toml(&tuned))
+        });
+        let unmet = fault.map(|fault| {
+            let model = self.model.display();
+            let message = format!("{model}: {fault}; no tuned model is written");
+            Failure::bound(message).hint(found.remedy())
+        });
+        Ok(PlainAnswer::new(found.json(), found.document())
+            .with(tuned)
+            .judged(unmet))
     }
 }
 
@@ -202,7 +207,7 @@ impl Tune {
         truths: &[TrueErrors],
         track: &Track,
         outages: &[Outage],
-    ) -> std::result::Result<TuneAnswer, BeliefError> {
+    ) -> std::result::Result<Tuning, BeliefError> {
         let mut scenario = given.clone();
         match self.filter {
             // what goes with the filter of 21 states beside the model stays
@@ -244,9 +249,7 @@ impl Tune {
             })
             .collect();
         let after = task.consistency(task.filter, &factors)?;
-        Ok(TuneAnswer {
-            model: String::new(),
-            tuned: None,
+        Ok(Tuning {
             filter: self.filter,
             filter_of_run,
             before: Task { track, ..task }.consistency(task.filter, &ones)?,
@@ -325,9 +328,7 @@ const UNCHANGED: f64 = 0.01;
 
 /// Factors, and the filter before and after them.
 #[derive(Debug, Clone)]
-pub struct TuneAnswer {
-    model: String,
-    tuned: Option<ModelFile>,
+struct Tuning {
     /// The filter that was tuned.
     filter: FilterStates,
     /// The filter that `run` makes of the model unless told otherwise.
@@ -361,7 +362,7 @@ fn kind(found: &FilterConsistency) -> VerdictKind {
     }
 }
 
-impl TuneAnswer {
+impl Tuning {
     /// The factors and their cost, then the filters that they make.
     fn verdict(&self) -> Vec<String> {
         let name = filter_name(self.filter);
@@ -476,8 +477,8 @@ impl TuneAnswer {
     }
 }
 
-impl Serialize for TuneAnswer {
-    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+impl Tuning {
+    fn json(&self) -> Value {
         let end = |(after_s, rmse): (&f64, &[f64; REPORTED_NAMES.len()])| {
             json!({
                 "after_s": after_s,
@@ -508,7 +509,7 @@ impl Serialize for TuneAnswer {
         if let Some(factor) = self.aiding_sigmas {
             file["aiding_sigma_factor"] = json!(factor);
         }
-        file.serialize(serializer)
+        file
     }
 }
 
@@ -552,7 +553,7 @@ fn factors_in_words(changed: &[&Factor]) -> String {
     changed.iter().map(word).collect::<Vec<_>>().join(", ")
 }
 
-impl Answer for TuneAnswer {
+impl Tuning {
     fn document(&self) -> Document {
         let found = kind(&self.after);
         let tone = match self.fault() {
@@ -562,6 +563,7 @@ impl Answer for TuneAnswer {
             }
             None => Tone::Doubtful,
         };
+        let json = self.json();
         let mut document = Document::new("Factors on a noise model", tone, self.verdict());
         let truths: Vec<&str> = self.truths.iter().map(String::as_str).collect();
         document.text(&format!("truths: {}", short_names(&truths).join(", ")));
@@ -575,7 +577,7 @@ impl Answer for TuneAnswer {
             ("in", "place"),
             ("RMSE {after_s} s (m)", "outage_end/*/horizontal_rmse_m"),
         ];
-        document.table(Table::of(self, "/filters/*", &columns));
+        document.table(Table::of(&json, "/filters/*", &columns));
         document.text("RMSE/sigma: largest error over what the filter states. RMSE: horizontal, at the end of an outage.");
         document.section("Factors");
         let columns = [
@@ -583,29 +585,12 @@ impl Answer for TuneAnswer {
             ("factor on the variance", "on_variance"),
             ("on the standard deviation", "on_sigma"),
         ];
-        document.table(Table::of(self, "/factors/*", &columns));
+        document.table(Table::of(&json, "/factors/*", &columns));
         document
-    }
-
-    fn files(&self) -> Vec<OutputFile<'_>> {
-        let tuned = self.tuned.as_ref().map(model_file::to_toml);
-        tuned
-            .map(|text| OutputFile::whole("", text))
-            .into_iter()
-            .collect()
-    }
-
-    fn unmet(&self) -> Option<Failure> {
-        let message = format!(
-            "{}: {}; no tuned model is written",
-            self.model,
-            self.fault()?
-        );
-        Some(Failure::bound(message).hint(self.remedy()))
     }
 }
 
-impl TuneAnswer {
+impl Tuning {
     /// State, time and truth of the largest error.
     fn place(&self, found: &FilterConsistency) -> String {
         let mut place = REPORTED_NAMES[found.largest.state].to_owned();
@@ -645,10 +630,8 @@ mod tests {
         }
     }
 
-    fn result(filter: FilterStates, of_run: FilterConsistency) -> TuneAnswer {
-        TuneAnswer {
-            model: String::new(),
-            tuned: None,
+    fn result(filter: FilterStates, of_run: FilterConsistency) -> Tuning {
+        Tuning {
             aiding_sigmas: None,
             filter,
             filter_of_run: FilterStates::Reduced15,

@@ -197,7 +197,10 @@ impl Answer for Calibration {
             let stem = stem_of(*estimator, estimators);
             self.files_of(*estimator, (model_ending(&stem), stem), None)
         };
-        estimators.iter().flat_map(of_estimator).collect()
+        let files = estimators.iter().flat_map(of_estimator);
+        files
+            .map(|(name, text)| OutputFile::whole(name, text))
+            .collect()
     }
 }
 
@@ -302,7 +305,7 @@ impl Calibration {
         estimator: Estimator,
         (model_name, stem): (String, String),
         inflated: Option<(&Model, &str)>,
-    ) -> Vec<OutputFile<'static>> {
+    ) -> Vec<(String, String)> {
         let shown = self.of(estimator);
         let curves = report::json(&shown.curves());
         let mut model = shown.model_file(&input::hash_of(curves.as_bytes()));
@@ -318,14 +321,14 @@ impl Calibration {
             };
         }
         let page = shown.page();
-        let named = |ending: &str, text| OutputFile::whole(format!("{stem}{ending}"), text);
+        let named = |ending: &str, text| (format!("{stem}{ending}"), text);
         let draws = draws.map(|draws| {
             let text = serde_json::to_string(&draws).expect("plain structs are always JSON");
             named(".draws.json", text + "\n")
         });
         let others = [
             named(".wv.json", curves),
-            OutputFile::whole(model_name, crate::io::model_file::to_toml(&model)),
+            (model_name, crate::io::model_file::to_toml(&model)),
             named(".html", page.html()),
             named(".svg", page.svg()),
         ];

@@ -9,23 +9,21 @@
 
 use crate::app::inputs::{self, SettingsArgs};
 use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
-use crate::app::{Answer, Command, Context, Inputs, Out, OutputFile, Result, refused};
+use crate::app::{Command, Context, Inputs, Out, PlainAnswer, Result, refused};
 use crate::commands::calibrate::{
     Calibration, CalibrationNote, CalibrationOptions, ESTIMATORS, EstimatorChoice, Measured,
     measure,
 };
 use crate::io::recordings::{self, FileReport, Gaps, ReadOptions};
 use crate::parse;
-use crate::report::{json, six_digits};
+use crate::report::csv::merged;
+use crate::report::{self, six_digits};
 use candidates::{Candidate, Drive, Fold, Inflation, Laboratory, Unit};
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, model_of};
 use nav_sim_document::{Document, Importance, Table, Tone, readable, window};
 use nav_sim_navigation::ekf::FilterStates;
-use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_signal::noise::Model;
 use ranking::Ranking;
-use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 pub mod candidates;
@@ -89,49 +87,8 @@ pub struct Choose {
 /// The estimators that are one.
 const EACH: &[&str] = ESTIMATORS.split_at(6).0;
 
-/// The ranking (`ranking.json`), and the winner's calibration of all recordings.
-#[derive(Serialize)]
-pub struct ChoiceMade {
-    schema_version: u32,
-    verdict: Vec<String>,
-    trajectory: String,
-    outages: Vec<Outage>,
-    seed: u64,
-    #[serde(flatten)]
-    ranking: Ranking,
-    /// Recordings that are calibrated on but judge no candidate.
-    #[serde(skip)]
-    abnormal: Vec<String>,
-    #[serde(skip)]
-    calibration: Calibration,
-    #[serde(skip)]
-    estimator: Estimator,
-    /// The winner's model, if it is inflated, and how.
-    #[serde(skip)]
-    inflated: Option<(Model, Inflation)>,
-}
-
-impl Answer for ChoiceMade {
-    fn document(&self) -> Document {
-        self.ranked()
-    }
-
-    /// The winner's model with its curves and draws, and the ranking.
-    fn files(&self) -> Vec<OutputFile<'_>> {
-        let mut files = self.calibration.files_of(
-            self.estimator,
-            ("model.toml".to_owned(), "model".to_owned()),
-            self.inflated
-                .as_ref()
-                .map(|(model, how)| (model, how.name())),
-        );
-        files.push(OutputFile::whole("ranking.json", json(self)));
-        files
-    }
-}
-
 impl Command for Choose {
-    type Answer = ChoiceMade;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "choose";
     const OUT: Out = Out::Directory {
         path: "out/choice",
@@ -151,7 +108,7 @@ impl Command for Choose {
     }
 
     /// Files are read twice, so that no more than a few are in memory.
-    fn run(&self, context: &Context<'_>) -> Result<ChoiceMade> {
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let candidates = self.candidates()?;
         let scenario = self.settings.checked()?;
         let trajectory = inputs::trajectory(&self.trajectory, context)?;
@@ -248,18 +205,48 @@ impl Command for Choose {
             .iter()
             .enumerate()
             .filter(|(k, _)| !judges.contains(k));
-        Ok(ChoiceMade {
-            schema_version: 1,
-            verdict: ranking.verdict(),
-            trajectory: self.trajectory.display().to_string(),
-            outages,
-            seed,
-            ranking,
-            abnormal: others.map(|(_, file)| file.file.clone()).collect(),
-            calibration,
-            estimator: winner.estimator,
-            inflated: (winner.inflation != Inflation::None).then_some((model, winner.inflation)),
-        })
+        let abnormal: Vec<&str> = others.map(|(_, file)| file.file.as_str()).collect();
+        let verdict = ranking.verdict();
+        let trajectory = self.trajectory.display().to_string();
+        let json = merged([
+            json!({
+                "schema_version": 1,
+                "verdict": verdict,
+                "trajectory": trajectory,
+                "outages": outages,
+                "seed": seed,
+            }),
+            json!(ranking),
+        ]);
+        let tone = match ranking.tells {
+            true => Tone::Good,
+            false => Tone::Undecided,
+        };
+        let mut document = Document::new("Which noise model", tone, verdict);
+        let mut warn = |text, names: &[&str]| {
+            if !names.is_empty() {
+                document.note(Importance::Warning, format!("{text}: {}", names.join(", ")));
+            }
+        };
+        warn(
+            "abnormal, and no judge of candidates (nav-sim calibrate says how)",
+            &abnormal,
+        );
+        let undescribed: Vec<&str> = ranking.undescribed.iter().map(String::as_str).collect();
+        warn(
+            "described by no candidate (a warm-up? look at it with nav-sim calibrate)",
+            &undescribed,
+        );
+        let ends = outages.iter().map(|o| window(o.start_s, o.end_s));
+        let ends = ends.collect::<Vec<_>>().join(", ");
+        document.text(&format!("along {trajectory}, outages {ends}, seed {seed}"));
+        tables(&json, &mut document);
+        let how = winner.inflation.name();
+        let inflated = (winner.inflation != Inflation::None).then_some((&model, how));
+        let names = ("model.toml".to_owned(), "model".to_owned());
+        let mut files = calibration.files_of(winner.estimator, names, inflated);
+        files.push(("ranking.json".to_owned(), report::json(&json)));
+        Ok(PlainAnswer::new(json, document).with(files))
     }
 }
 
@@ -373,66 +360,33 @@ impl Ranking {
     }
 }
 
-impl ChoiceMade {
-    fn ranked(&self) -> Document {
-        let (ranking, json) = (&self.ranking, json!(self));
-        let tone = if ranking.tells {
-            Tone::Good
-        } else {
-            Tone::Undecided
-        };
-        let mut document = Document::new("Which noise model", tone, self.verdict.iter());
-        self.notes(&mut document);
-        let ends: Vec<String> = self
-            .outages
-            .iter()
-            .map(|o| window(o.start_s, o.end_s))
-            .collect();
-        let (trajectory, ends, seed) = (&self.trajectory, ends.join(", "), self.seed);
-        document.text(&format!("along {trajectory}, outages {ends}, seed {seed}"));
-        let columns = [
-            ("candidate", "candidate"),
-            ("", "place"),
-            ("log score (nats)", "log_score/value"),
-            ("to the best", "difference/log_score/value"),
-            ("95 %", "difference/log_score/ci95"),
-            ("NEES (9)", "nees/value"),
-            ("95 %", "nees/ci95"),
-            ("RMSE (m)", "rmse_m"),
-        ];
-        document.table(Table::of(&json, "/candidates/*", &columns));
-        let columns = [
-            ("candidate", "candidate"),
-            ("RMSE (m)", "rmse_m"),
-            ("believed (m)", "believed_m"),
-            ("coverage (0.95)", "coverage"),
-        ];
-        document.table(Table::of(&json, "/candidates/*", &columns));
-        let columns = [
-            ("recording left out", "recording"),
-            ("candidate", "../../candidate"),
-            ("windows", "windows"),
-            ("NEES (9)", "nees"),
-            ("log score (nats)", "log_score"),
-            ("RMSE (m)", "rmse_m"),
-        ];
-        let folds = Table::of(&json, "/candidates/*/folds/*", &columns);
-        document.folded("Recording by recording", |inside| inside.table(folds));
-        document
-    }
-
-    /// Notes, the most important first.
-    fn notes(&self, document: &mut Document) {
-        let mut warn = |names: &[String], text: &dyn Fn(String) -> String| {
-            if !names.is_empty() {
-                document.note(Importance::Warning, text(names.join(", ")));
-            }
-        };
-        warn(&self.abnormal, &|names| {
-            format!("abnormal, and no judge of candidates (nav-sim calibrate says how): {names}")
-        });
-        warn(&self.ranking.undescribed, &|names| {
-            format!("no candidate describes {names}: a warm-up? look at it with nav-sim calibrate")
-        });
-    }
+fn tables(json: &Value, document: &mut Document) {
+    let columns = [
+        ("candidate", "candidate"),
+        ("", "place"),
+        ("log score (nats)", "log_score/value"),
+        ("to the best", "difference/log_score/value"),
+        ("95 %", "difference/log_score/ci95"),
+        ("NEES (9)", "nees/value"),
+        ("95 %", "nees/ci95"),
+        ("RMSE (m)", "rmse_m"),
+    ];
+    document.table(Table::of(json, "/candidates/*", &columns));
+    let columns = [
+        ("candidate", "candidate"),
+        ("RMSE (m)", "rmse_m"),
+        ("believed (m)", "believed_m"),
+        ("coverage (0.95)", "coverage"),
+    ];
+    document.table(Table::of(json, "/candidates/*", &columns));
+    let columns = [
+        ("recording left out", "recording"),
+        ("candidate", "../../candidate"),
+        ("windows", "windows"),
+        ("NEES (9)", "nees"),
+        ("log score (nats)", "log_score"),
+        ("RMSE (m)", "rmse_m"),
+    ];
+    let folds = Table::of(json, "/candidates/*/folds/*", &columns);
+    document.folded("Recording by recording", |inside| inside.table(folds));
 }
