@@ -267,7 +267,7 @@ fn evidence(finding: &Finding) -> String {
 }
 
 /// Clocks that are not the same, and the option that makes them so.
-pub(super) fn apart(clocks: &ClocksApart) -> String {
+fn apart(clocks: &ClocksApart) -> String {
     let [now, then] = clocks.correlation;
     let delay = match clocks.sigma_s {
         Some(sigma_s) => format!("{:.3} (± {sigma_s:.3})", clocks.delay_s),

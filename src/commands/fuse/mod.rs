@@ -527,7 +527,7 @@ impl<'a> Drive<'a> {
         let mounting = match self.request.mounting {
             Some(MountingChoice::Auto) => Some(
                 mounting::find(&recorded, &settings, &belief)
-                    .map_err(|e| self.not_mounted(e, &recorded, &settings, &belief))?,
+                    .map_err(|e| Failure::input(e).hint(NOT_MOUNTED))?,
             ),
             _ => None,
         };
@@ -645,6 +645,9 @@ impl<'a> Drive<'a> {
     }
 }
 
+/// Help where the mounting is not found.
+const NOT_MOUNTED: &str = "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, velocities in the fixes and one clock (--gnss-delay)";
+
 impl Drive<'_> {
     /// Brings fixes to the clock of the IMU where the two have nothing in common and no delay is given; by how much (s).
     fn common_origin(&mut self) -> Result<Option<f64>> {
@@ -687,38 +690,6 @@ impl Drive<'_> {
             ),
             _ => Ok(()),
         }
-    }
-
-    /// Why the mounting is not found: the clocks, where they are apart.
-    fn not_mounted(
-        &self,
-        e: Refused,
-        recorded: &Recorded<'_>,
-        settings: &Settings,
-        belief: &Belief,
-    ) -> Failure {
-        let rest = |there: &Recorded<'_>| {
-            let found = mounting::find(there, settings, belief).ok()?;
-            let settings = Settings {
-                q_s_b: found.q_s_b,
-                mounting_sigma_b: found.sigma_b,
-                ..settings.clone()
-            };
-            displaced(
-                there,
-                belief,
-                &coarse(there, &settings, belief).ok()?.start,
-                &settings,
-            )?
-            .delay_s
-        };
-        let Some(mut clocks) = clocks_apart(recorded, rest) else {
-            return Failure::input(e).hint(
-                "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, and velocities in the fixes",
-            );
-        };
-        clocks.delay_s += self.request.gnss_delay_s;
-        Failure::input(e).hint(document::apart(&clocks))
     }
 }
 
