@@ -110,16 +110,11 @@ pub(crate) fn expect_turn_on(
     path: &Path,
     context: &Context<'_>,
 ) {
-    let (accel, gyro) = (
+    let settings = [
         &mut initial.accel_bias_sigma_m_s2,
         &mut initial.gyro_bias_sigma_rad_s,
-    );
-    set_turn_on(
-        [accel, gyro],
-        stated,
-        context,
-        &format!("{}: the filter expects", path.display()),
-    );
+    ];
+    set_turn_on(settings, stated, path, "the filter expects", context);
 }
 
 /// Gives the true IMU the turn-on bias that the model of its errors states, where settings are silent; a 0 is a setting.
@@ -129,30 +124,27 @@ pub(crate) fn make_turn_on(
     path: &Path,
     context: &Context<'_>,
 ) {
-    let (accel, gyro) = (
+    let settings = [
         &mut imu.turn_on_bias_accel_m_s2,
         &mut imu.turn_on_bias_gyro_rad_s,
-    );
-    set_turn_on(
-        [accel, gyro],
-        stated,
-        context,
-        &format!("{}: the true IMU has", path.display()),
-    );
+    ];
+    set_turn_on(settings, stated, path, "the true IMU has", context);
 }
 
 fn set_turn_on(
     settings: [&mut Option<f64>; 2],
     stated: Option<TurnOn>,
-    context: &Context<'_>,
+    path: &Path,
     who: &str,
+    context: &Context<'_>,
 ) {
     for (sensor, setting) in Sensor::ALL.into_iter().zip(settings) {
         if let (None, Some(sigma)) = (&setting, stated.unwrap_or_default().sigma(sensor)) {
             *setting = Some(sigma);
             let (sigma, unit) = (readable(sigma), sensor.unit());
             context.remark(format!(
-                "{who} a turn-on bias of {sigma} {unit} ({sensor}, standard deviation)"
+                "{}: {who} a turn-on bias of {sigma} {unit} ({sensor}, standard deviation)",
+                path.display()
             ));
         }
     }

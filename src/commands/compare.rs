@@ -426,10 +426,7 @@ impl Comparison {
             let series = std::iter::once(zero)
                 .chain(others.iter().enumerate().map(line))
                 .collect();
-            Panel {
-                height: 0.8,
-                ..Panel::new(axis, series)
-            }
+            Panel::new(axis, series).of_height(0.8)
         };
         Chart::over_time(
             &format!("ASEE against {}", self.name_of_reference()),

@@ -206,6 +206,11 @@ impl Panel {
             height: 1.0,
         }
     }
+
+    /// The same of another height, as a share of the usual one.
+    pub fn of_height(self, height: f64) -> Self {
+        Self { height, ..self }
+    }
 }
 
 /// How much room a chart takes.

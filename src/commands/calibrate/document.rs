@@ -278,10 +278,7 @@ fn chart(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_
     let deviation = ChartAxis::log(&format!("Allan deviation ({})", fitted.sensor.unit()));
     let ratio = ChartAxis::log("data / model").including(0.8, 1.25);
     let panels = [(1.4, deviation, upper), (0.5, ratio, lower)];
-    let panels = panels.map(|(height, axis, series)| Panel {
-        height,
-        ..Panel::new(axis, series)
-    });
+    let panels = panels.map(|(height, axis, series)| Panel::new(axis, series).of_height(height));
     let (group, estimator) = (group_name(fitted), fitted.estimator.to_uppercase());
     Chart::new(
         &format!("Allan deviation: {group}, {estimator}"),

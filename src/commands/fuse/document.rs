@@ -428,13 +428,11 @@ fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
             Mark::Zone(-1.96, 1.96),
         )];
         series.extend(fixes(&solution.fixes, &normalised));
-        Panel {
-            height: 0.55,
-            ..Panel::new(
-                Axis::linear(&format!("{name} (σ)")).including(-3.0, 3.0),
-                series,
-            )
-        }
+        Panel::new(
+            Axis::linear(&format!("{name} (σ)")).including(-3.0, 3.0),
+            series,
+        )
+        .of_height(0.55)
     };
     Chart::over_time(
         "Innovations of position, normalised",
