@@ -14,8 +14,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub use crate::app::Context;
-pub use crate::commands::calibrate::{Calibration, CalibrationOptions, calibrate};
+pub use crate::app::{Asked, Command, Context};
+pub use crate::commands::calibrate::{Calibrate, Calibration};
 pub use crate::commands::export::Target;
 pub use crate::commands::run::{NavigateInputs, Navigation, TrueImu, navigate};
 pub use crate::io::model_file::{ModelFile, read as read_model};

@@ -8,8 +8,8 @@ use crate::io::{curve_file, input, recordings};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
     self, Advance, Beginning, Bootstrap, CalibrationError, Diagnosis, Estimator, Group, Outcome,
-    Pool, Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve, grouped,
-    infer_telling, replicates, turn_on, warm_up,
+    Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve, infer_telling,
+    replicates, turn_on, warm_up,
 };
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::names::UnknownName;
@@ -74,36 +74,6 @@ impl EstimatorChoice {
     }
 }
 
-/// How to calibrate recordings.
-#[derive(Debug, Clone)]
-pub struct CalibrationOptions {
-    /// How recordings are read.
-    pub reading: ReadOptions,
-    /// Number of scales; `None`: of each recording one less than its length allows.
-    pub scales: Option<u32>,
-    /// Which estimators.
-    pub estimators: EstimatorChoice,
-    /// Which signals are replicates of one another; `None`: as the estimators need it ([`Settings::pool`]).
-    pub pool: Option<Pool>,
-    /// How models are fitted; the estimators and the rate in it follow from the recordings.
-    pub settings: Settings,
-    /// The bootstrap behind intervals and goodness of fit; `None`: neither is computed.
-    pub bootstrap: Option<Bootstrap>,
-}
-
-impl Default for CalibrationOptions {
-    fn default() -> Self {
-        Self {
-            reading: ReadOptions::default(),
-            scales: None,
-            estimators: EstimatorChoice::One(Estimator::default()),
-            pool: None,
-            settings: Settings::default(),
-            bootstrap: Some(Bootstrap::default()),
-        }
-    }
-}
-
 /// Recordings that were measured, none a copy of another.
 pub(crate) struct Measured {
     pub report: Report,
@@ -132,72 +102,30 @@ pub struct Calibration {
     pub(crate) note: CalibrationNote,
 }
 
-/// Calibrates recordings, or directories of them.
-///
-/// # Errors
-/// When a recording cannot be read, is too short, or is no replicate of its own; when the estimator takes one recording
-/// only, a trim leaves no replicate, or a curve is too short for the model.
-pub fn calibrate(
-    paths: &[PathBuf],
-    options: &CalibrationOptions,
-    context: &Context<'_>,
-) -> Result<Calibration, Failure> {
-    let Measured {
-        replicates,
-        beginnings,
-        settings,
-        ..
-    } = measure(paths, options, context)?;
-    let groups = grouped(replicates, options.pool.unwrap_or(settings.pool()));
-    let bootstrap = options.bootstrap;
-    let steps = settings.model.steps() + bootstrap.map_or(0, |bootstrap| bootstrap.draws as u64);
-    let fits = (groups.len() * settings.estimators.len()) as u64;
-    context.begin("steps of the fits", fits * steps);
-    let advance = |steps| context.advance(steps);
-    let outcomes = nav_sim_calibration::calibrate_telling(&groups, &settings, &advance)?;
-    let made = Calibration::new(groups, outcomes, settings, bootstrap, &advance);
-    context.end();
-    Ok(Calibration { beginnings, ..made })
-}
-
 /// Reads and measures recordings: errors in them are known before the long half begins.
 pub(crate) fn measure(
     paths: &[PathBuf],
-    options: &CalibrationOptions,
+    mut reading: ReadOptions,
+    scales: Option<u32>,
+    estimators: EstimatorChoice,
+    settings: &Settings,
     context: &Context<'_>,
 ) -> Result<Measured, Failure> {
-    let CalibrationOptions {
-        scales,
-        estimators,
-        pool,
-        settings,
-        ..
-    } = options;
     // As many scales as parameters, and one that the default leaves out.
-    let needed = scales.map_or(2 << settings.model.parameters(), |j| 1 << j);
-    let reading = ReadOptions {
-        min_samples: needed,
-        ..options.reading.clone()
-    };
-    let look = |recording: Recording| MeasuredRecording::new(recording, *scales, &settings.tuning);
+    reading.min_samples = scales.map_or(2 << settings.model.parameters(), |j| 1 << j);
+    let look = |recording: Recording| MeasuredRecording::new(recording, scales, &settings.tuning);
     let (looks, report) = visit(paths, &reading, &look, context)?;
     let looks = looks.into_iter().collect::<Result<Vec<_>, _>>()?;
     distinct(&looks)?;
     let rate_hz = report.files[0].rate_hz;
     let beginnings = beginnings(&looks, reading.skip_s, rate_hz);
-    shortest(&report, *scales, context);
+    shortest(&report, scales, context);
     let estimators = estimators.estimators(report.files.iter().map(|f| f.samples.len()).sum())?;
     let settings = Settings {
         estimators,
         rate_hz,
         ..settings.clone()
     };
-    if *pool == Some(Pool::Sensor) && settings.pool() == Pool::Axes {
-        return refused(
-            "--pool sensor: gmwm, rgmwm and avlr take one signal at a time",
-            "--pool axes",
-        );
-    }
     let mut measured: Vec<_> = looks.into_iter().flat_map(|look| look.replicates).collect();
     one_switching_on(&report, &mut measured);
     Ok(Measured {

@@ -1,6 +1,6 @@
 //! Calibration: from recordings, or directories of them, to noise models, their files and their document.
 //!
-//! [`calibrate()`] goes from a directory of recordings to models. From signals in memory:
+//! [`Calibrate`] goes from a directory of recordings to models. From signals in memory:
 //! ```
 //! use nav_sim::calibration::{ModelChoice, Pool, Settings, calibrate, grouped, replicates};
 //! use nav_sim::signal::imu::Channel;
@@ -25,7 +25,7 @@ mod document;
 mod measure;
 
 pub(crate) use document::CalibrationNote;
-pub use measure::{Calibration, CalibrationOptions, EstimatorChoice, calibrate};
+pub use measure::{Calibration, EstimatorChoice};
 pub(crate) use measure::{Measured, measure, visit};
 
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
@@ -38,6 +38,7 @@ use crate::report;
 use measure::{Curves, calibrate_curves, read_curves};
 use nav_sim_calibration::{
     Bootstrap, Estimator, ModelChoice, ModelSpec, Pool, Settings, Trim, Weighting,
+    calibrate_telling, grouped,
 };
 use nav_sim_document::Document;
 use nav_sim_signal::noise::Model;
@@ -160,15 +161,37 @@ impl Command for Calibrate {
                 calibrate_curves(curves, settings, self.draws(context))?
             }
             None => {
-                let options = CalibrationOptions {
-                    reading: self.recordings.options(),
-                    scales: self.tuning.levels(),
-                    estimators: self.estimator,
-                    pool: self.pool,
+                let (reading, scales) = (self.recordings.options(), self.tuning.levels());
+                let estimators = self.estimator;
+                let Measured {
+                    replicates,
+                    beginnings,
                     settings,
-                    bootstrap: self.draws(context),
-                };
-                calibrate(&self.inputs, &options, context)?
+                    ..
+                } = measure(
+                    &self.inputs,
+                    reading,
+                    scales,
+                    estimators,
+                    &settings,
+                    context,
+                )?;
+                if self.pool == Some(Pool::Sensor) && settings.pool() == Pool::Axes {
+                    return refused(
+                        "--pool sensor: gmwm, rgmwm and avlr take one signal at a time",
+                        "--pool axes",
+                    );
+                }
+                let groups = grouped(replicates, self.pool.unwrap_or(settings.pool()));
+                let bootstrap = self.draws(context);
+                let steps = settings.model.steps() + u64::from(self.bootstrap);
+                let fits = (groups.len() * settings.estimators.len()) as u64;
+                context.begin("steps of the fits", fits * steps);
+                let advance = |steps| context.advance(steps);
+                let outcomes = calibrate_telling(&groups, &settings, &advance)?;
+                let made = Calibration::new(groups, outcomes, settings, bootstrap, &advance);
+                context.end();
+                Calibration { beginnings, ..made }
             }
         };
         calibration.note = CalibrationNote {

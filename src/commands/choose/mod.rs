@@ -11,8 +11,7 @@ use crate::app::inputs::{self, SettingsArgs};
 use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
 use crate::app::{Command, Context, Inputs, Out, PlainAnswer, Result, refused};
 use crate::commands::calibrate::{
-    Calibration, CalibrationNote, CalibrationOptions, ESTIMATORS, EstimatorChoice, Measured,
-    measure,
+    Calibration, CalibrationNote, ESTIMATORS, EstimatorChoice, Measured, measure,
 };
 use crate::io::recordings::{self, FileReport, Gaps, ReadOptions};
 use crate::parse;
@@ -121,16 +120,22 @@ impl Command for Choose {
             );
         }
         // the candidates have estimators and models of their own
-        let options = CalibrationOptions {
-            reading: self.recordings.options(self.gaps),
-            settings: Settings {
-                trim: self.trim,
-                ..Settings::default()
-            },
-            estimators: EstimatorChoice::One(Estimator::Awv),
-            ..CalibrationOptions::default()
+        let settings = Settings {
+            trim: self.trim,
+            ..Settings::default()
         };
-        let mut measured = measure(&self.inputs, &options, context)?;
+        let (reading, estimator) = (
+            self.recordings.options(self.gaps),
+            EstimatorChoice::One(Estimator::Awv),
+        );
+        let mut measured = measure(
+            &self.inputs,
+            reading.clone(),
+            None,
+            estimator,
+            &settings,
+            context,
+        )?;
         let found_hz = measured.settings.rate_hz;
         let rate_hz = nominal_hz(found_hz, scenario.gnss.rate_hz);
         if rate_hz != found_hz {
@@ -143,7 +148,7 @@ impl Command for Choose {
         // The clocks of the files are not quite alike: one rate is that of all.
         let reading = ReadOptions {
             rate_hz: Some(rate_hz),
-            ..options.reading
+            ..reading
         };
         let files = &measured.report.files;
         if files.len() < FEWEST {
