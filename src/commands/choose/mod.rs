@@ -318,10 +318,7 @@ fn units(measured: &Measured) -> Vec<Unit> {
             .replicates
             .iter()
             .filter(|(_, r)| names.contains(&r.name));
-        Unit {
-            name: file.file.clone(),
-            replicates: own.cloned().collect(),
-        }
+        own.cloned().collect()
     };
     measured.report.files.iter().map(unit).collect()
 }
