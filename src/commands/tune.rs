@@ -241,18 +241,11 @@ impl Tune {
             aim: self.aim,
         };
         let factors = task.factors()?;
-        let ones: Vec<Factor> = factors
-            .iter()
-            .map(|f| Factor {
-                on_variance: 1.0,
-                ..*f
-            })
-            .collect();
         let after = task.consistency(task.filter, &factors)?;
         Ok(Tuning {
             filter: self.filter,
             filter_of_run,
-            before: Task { track, ..task }.consistency(task.filter, &ones)?,
+            before: Task { track, ..task }.consistency(task.filter, &[])?,
             aiding_sigmas,
             after,
             of_run: (self.filter != filter_of_run)

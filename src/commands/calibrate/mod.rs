@@ -125,7 +125,11 @@ impl Command for Calibrate {
     }
 
     fn endings(&self) -> Vec<Cow<'static, str>> {
-        endings(&self.estimator.possible())
+        let estimators = self.estimator.possible();
+        let names = estimators
+            .iter()
+            .flat_map(|e| names(&stem_of(*e, &estimators)));
+        names.map(Cow::Owned).collect()
     }
 
     /// A model has a sensor; what is only printed needs one for its units alone.
@@ -216,10 +220,7 @@ impl Answer for Calibration {
 
     fn files(&self) -> Vec<OutputFile<'_>> {
         let estimators = &self.settings.estimators;
-        let of_estimator = |estimator: &Estimator| {
-            let stem = stem_of(*estimator, estimators);
-            self.files_of(*estimator, (model_ending(&stem), stem), None)
-        };
+        let of_estimator = |e: &Estimator| self.files_of(*e, &stem_of(*e, estimators), None);
         let files = estimators.iter().flat_map(of_estimator);
         files
             .map(|(name, text)| OutputFile::whole(name, text))
@@ -297,36 +298,18 @@ fn stem_of(estimator: Estimator, estimators: &[Estimator]) -> String {
     }
 }
 
-/// The ending of a model file.
-fn model_ending(stem: &str) -> String {
-    match stem {
-        "" => String::new(),
-        stem => format!("{stem}.toml"),
-    }
-}
-
-/// Endings of all files of these estimators.
-fn endings(estimators: &[Estimator]) -> Vec<Cow<'static, str>> {
-    let of_estimator = |estimator: &Estimator| {
-        let stem = stem_of(*estimator, estimators);
-        [
-            model_ending(&stem).into(),
-            format!("{stem}.wv.json").into(),
-            format!("{stem}.draws.json").into(),
-            format!("{stem}.html").into(),
-            format!("{stem}.svg").into(),
-        ]
-    };
-    estimators.iter().flat_map(of_estimator).collect()
+/// Names of draws, curves, model, page and figures, or their endings: that of a model alone is none.
+fn names(stem: &str) -> [String; 5] {
+    let model = if stem.is_empty() { "" } else { ".toml" };
+    [".draws.json", ".wv.json", model, ".html", ".svg"].map(|ending| format!("{stem}{ending}"))
 }
 
 impl Calibration {
-    /// Draws, curves, model, page and figures of an estimator; names of the model and of what comes before the other
-    /// endings. A model that is inflated (and how) has no intervals and draws, which are of its own.
+    /// Draws, curves, model, page and figures of an estimator. A model that is inflated (and how) has no intervals and draws, which are of its own.
     pub(crate) fn files_of(
         &self,
         estimator: Estimator,
-        (model_name, stem): (String, String),
+        stem: &str,
         inflated: Option<(&Model, &str)>,
     ) -> Vec<(String, String)> {
         let shown = self.of(estimator);
@@ -344,17 +327,20 @@ impl Calibration {
             };
         }
         let page = shown.page();
-        let named = |ending: &str, text| (format!("{stem}{ending}"), text);
         let draws = draws.map(|draws| {
-            let text = serde_json::to_string(&draws).expect("plain structs are always JSON");
-            named(".draws.json", text + "\n")
+            serde_json::to_string(&draws).expect("plain structs are always JSON") + "\n"
         });
-        let others = [
-            named(".wv.json", curves),
-            (model_name, crate::io::model_file::to_toml(&model)),
-            named(".html", page.html()),
-            named(".svg", page.svg()),
+        let model = crate::io::model_file::to_toml(&model);
+        let texts = [
+            draws,
+            Some(curves),
+            Some(model),
+            Some(page.html()),
+            Some(page.svg()),
         ];
-        draws.into_iter().chain(others).collect()
+        let files = names(stem).into_iter().zip(texts);
+        files
+            .filter_map(|(name, text)| Some((name, text?)))
+            .collect()
     }
 }

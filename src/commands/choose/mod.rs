@@ -248,8 +248,7 @@ impl Command for Choose {
         tables(&json, &mut document);
         let how = winner.inflation.name();
         let inflated = (winner.inflation != Inflation::None).then_some((&model, how));
-        let names = ("model.toml".to_owned(), "model".to_owned());
-        let mut files = calibration.files_of(winner.estimator, names, inflated);
+        let mut files = calibration.files_of(winner.estimator, "model", inflated);
         files.push(("ranking.json".to_owned(), report::json(&json)));
         Ok(PlainAnswer::new(json, document).with(files))
     }
