@@ -7,7 +7,7 @@ use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::report::csv::{csv, flat, merged};
 use crate::report::verdict::{SPOKEN, axis_of, tone, verdict_counts};
-use crate::report::{in_order, json};
+use crate::report::{in_order, json, some};
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
     window,
@@ -362,12 +362,10 @@ impl Comparison {
                 format!("{name} {low} to {high} %")
             })
         };
-        let costs: Vec<String> = others.iter().take(NAMED).filter_map(cost).collect();
-        let more = if others.len() > NAMED { ", …" } else { "" };
+        let costs: Vec<String> = others.iter().filter_map(cost).collect();
         (!costs.is_empty()).then(|| {
-            let (reference, costs, state) =
-                (self.name_of_reference(), costs.join(", "), SPOKEN[state]);
-            format!("against {reference}: {costs}{more} of the uncertainty of {state}")
+            let (reference, costs, state) = (self.name_of_reference(), some(&costs), SPOKEN[state]);
+            format!("against {reference}: {costs} of the uncertainty of {state}")
         })
     }
 
@@ -477,9 +475,6 @@ impl Answer for Comparison {
         document
     }
 }
-
-/// Runs that the verdict names.
-const NAMED: usize = 3;
 
 const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's own standard deviation: 0 % is as the reference believes.";
 

@@ -15,14 +15,14 @@ use crate::app::{
 use crate::commands::run::{PreparedRun, Run, block_of, columns};
 use crate::io::toml_file::Source;
 use crate::io::{atomic, input, source};
-use crate::report::in_order;
+use crate::report::{in_order, some};
 use clap::Args;
 use indexmap::IndexMap;
 use nav_sim_document::{Importance, Note};
 use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::simulation::RunResult;
 use rayon::prelude::*;
-use results::{first_of, guard, withdraw};
+use results::{guard, withdraw};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Map;
@@ -197,7 +197,7 @@ impl BatchRequest {
             "{} of {} cells are missing: {}",
             missing.len(),
             cells.len(),
-            first_of(&missing)
+            some(&missing)
         ));
         Ok(Outcome::Partial(missing))
     }

@@ -6,7 +6,7 @@ use crate::commands::export::Quantity;
 use crate::io::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn, known};
 use crate::report::csv::merged;
 use crate::report::curves::{FittedCurve, band, curve, recording_names, sensor_name};
-use crate::report::in_order;
+use crate::report::{in_order, some};
 use nav_sim_calibration::{
     Beginning, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Miss, Outcome,
     ParameterInterval, ParameterSpread, Ranking, Settings, TurnOnFinding, TurnOnSpread,
@@ -329,16 +329,6 @@ fn recordings(
 }
 
 // A calibration in words: the verdict on models and recordings, the notes.
-
-/// The first of these names, and how many more there are.
-fn some(names: &[String]) -> String {
-    const NAMED: usize = 4;
-    let shown = names[..names.len().min(NAMED)].join(", ");
-    match names.len().saturating_sub(NAMED) {
-        0 => shown,
-        more => format!("{shown} and {more} more"),
-    }
-}
 
 /// `accel: N1 does not fit: data/model 0.33 at 0.02 s; 6 of 16 scales off (p = 0.005)`
 fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {

@@ -16,7 +16,7 @@ use crate::commands::calibrate::{
 use crate::io::recordings::{self, FileReport, Gaps, ReadOptions};
 use crate::parse;
 use crate::report::csv::merged;
-use crate::report::{self, six_digits};
+use crate::report::{self, six_digits, some};
 use candidates::{Candidate, Drive, Fold, Inflation, Laboratory, Unit};
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, model_of};
 use nav_sim_document::{Document, Importance, Table, Tone, readable, window};
@@ -327,7 +327,6 @@ fn units(measured: &Measured) -> Vec<Unit> {
 impl Ranking {
     /// The winner, what cannot be told from it, and how good it is.
     fn verdict(&self) -> Vec<String> {
-        const NAMED: usize = 3;
         let (winner, recordings) = (&self.candidates[0], self.candidates[0].folds.len());
         let name = &winner.candidate;
         let eligible = self.candidates.iter().filter(|p| p.eligible).count();
@@ -341,15 +340,7 @@ impl Ranking {
             ),
         }];
         if self.tells && !self.tied.is_empty() {
-            let named: Vec<&str> = self.tied.iter().map(String::as_str).take(NAMED).collect();
-            let more = match self.tied.len() - named.len() {
-                0 => String::new(),
-                more => format!(" and {more} more"),
-            };
-            lines.push(format!(
-                "cannot be told from it: {}{more}",
-                named.join("; ")
-            ));
+            lines.push(format!("cannot be told from it: {}", some(&self.tied)));
         }
         lines.push(format!(
             "its horizontal error at the ends of outages: {} m, believed {} m, NEES {} (9 if right)",
