@@ -36,12 +36,6 @@ impl Axis {
             ..self
         }
     }
-
-    /// The same with zero inside, as an axis of errors must be.
-    #[must_use]
-    pub fn with_zero(self) -> Self {
-        self.including(0.0, 0.0)
-    }
 }
 
 /// A colour of the palette, which the blind to red or green can tell apart too (Okabe and Ito).
@@ -156,11 +150,6 @@ impl Series {
         Self::new(name, colour, Mark::Line(points, Stroke::Plain))
     }
 
-    /// A thin line.
-    pub fn thin(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
-        Self::new(name, colour, Mark::Line(points, Stroke::Thin))
-    }
-
     /// Points (x, y, half of the interval; NaN: none).
     pub fn points(
         name: &str,
@@ -266,16 +255,9 @@ impl Chart {
 
     /// Panels over time with outages (start, end) marked, in the group of charts that are zoomed together.
     pub fn over_time(title: &str, panels: Vec<Panel>, outages: &[(f64, f64)]) -> Self {
-        Self::new(title, Axis::linear("time (s)"), panels)
-            .with_outages(outages)
-            .in_group("time")
-    }
-
-    /// The same with outages (start, end) marked.
-    pub fn with_outages(self, outages: &[(f64, f64)]) -> Self {
         Self {
             stripes: ("outage".to_owned(), outages.to_vec()),
-            ..self
+            ..Self::new(title, Axis::linear("time (s)"), panels).in_group("time")
         }
     }
 

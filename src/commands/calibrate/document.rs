@@ -13,8 +13,8 @@ use nav_sim_calibration::{
     Undetermined, Verdict, WIDEST, duration, model_of, percent, tau_s,
 };
 use nav_sim_document::{
-    Axis as ChartAxis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone,
-    readable,
+    Axis as ChartAxis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke,
+    Table, Tone, readable,
 };
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::practical::Horizon;
@@ -317,7 +317,7 @@ fn recordings(
         .map(|(replicate, name)| {
             let points = line(&replicate.wv);
             match abnormal.iter().position(|file| *file == replicate.file) {
-                None => Series::thin("recordings", Colour::Soft, points),
+                None => Series::new("recordings", Colour::Soft, Mark::Line(points, Stroke::Thin)),
                 Some(k) => Series::line(
                     &format!("{name} (abnormal)"),
                     Colour::Hue(ABNORMAL + k % 2),

@@ -390,7 +390,7 @@ fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
         }
         Chart::over_time(
             name,
-            vec![Panel::new(Axis::linear("").with_zero(), series)],
+            vec![Panel::new(Axis::linear("").including(0.0, 0.0), series)],
             outages,
         )
         .small()

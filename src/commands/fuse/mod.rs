@@ -2,6 +2,7 @@
 
 mod document;
 
+use crate::app::inputs::FilterArgs;
 use crate::app::{
     Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, inputs, refused,
 };
@@ -9,7 +10,7 @@ use crate::commands::run::reduction_of;
 use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
 use crate::io::model_file::ModelFile;
 use crate::io::trajectory_file::{self, load_reference};
-use crate::parse::{self, numbers};
+use crate::parse::numbers;
 use crate::report::json;
 use glam::{DMat3, DQuat, DVec3};
 use nav_sim_document::{Document, shortest, window};
@@ -126,7 +127,6 @@ pub struct Fuse {
     /// auto: level from the IMU, heading from the GNSS course
     #[arg(
         long,
-        alias = "heading",
         value_name = "FILE|DEG:SD|auto",
         default_value = "auto",
         allow_hyphen_values = true
@@ -151,14 +151,9 @@ pub struct Fuse {
     /// Window in which fixes are withheld, on the clock of the data in seconds (repeatable)
     #[arg(long = "outage", value_name = "START:END")]
     outages: Vec<Outage>,
-    /// States of the filter: 15 (one bias an axis, to which the model is reduced), 21 (and a scale factor an axis) or
-    /// full (a bias state for each process)
-    #[arg(long, value_name = "STATES", default_value = "15")]
-    filter: FilterStates,
-    /// Constant biases that the filter expects beside the model: standard deviations, accelerometer in m/s²,
-    /// gyroscope in rad/s
-    #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair)]
-    turn_on_bias: Option<[f64; 2]>,
+    /// States of the filter, and what it expects beside the model.
+    #[command(flatten)]
+    filter: FilterArgs,
     /// Standard deviations where the GNSS file states none: of the position in m, and after a colon of the velocity in
     /// m/s; each one number or north,east,down. x3 or x3:2: times what it states
     #[arg(long, value_name = "POS[:VEL]|xPOS[:VEL]", value_parser = gnss_sigma)]
@@ -208,18 +203,6 @@ impl Fuse {
         match self.initial {
             StartChoice::Heading(heading) => Some(heading),
             _ => None,
-        }
-    }
-
-    /// The filter's expectation of constant biases, over that of a file.
-    fn expected(&self, of_file: InitialSettings) -> InitialSettings {
-        let Some([accel, gyro]) = self.turn_on_bias else {
-            return of_file;
-        };
-        InitialSettings {
-            accel_bias_sigma_m_s2: Some(accel),
-            gyro_bias_sigma_rad_s: Some(gyro),
-            ..of_file
         }
     }
 
@@ -425,6 +408,7 @@ struct Drive<'a> {
     gnss: Vec<GnssFix>,
     wheel: Vec<WheelSpeed>,
     model: ModelFile,
+    states: FilterStates,
     expected: InitialSettings,
     initial: Option<Start>,
     reference: Option<Reference>,
@@ -464,7 +448,8 @@ impl<'a> Drive<'a> {
             .transpose()?;
         let model = inputs::model(&request.model, context)?;
         let of_file = initial.as_ref().map(|start| start.sigma.clone());
-        let mut expected = request.expected(of_file.unwrap_or_default());
+        let (mut states, mut expected) = (FilterStates::default(), of_file.unwrap_or_default());
+        request.filter.over(&mut states, &mut expected);
         inputs::expect_turn_on(&mut expected, model.turn_on, &request.model, context);
         expected.validate().refuse()?;
         let options = trajectory_file::Options::default();
@@ -481,6 +466,7 @@ impl<'a> Drive<'a> {
             gnss,
             wheel,
             model,
+            states,
             expected,
             initial,
             reference,
@@ -502,7 +488,7 @@ impl<'a> Drive<'a> {
         let aiding = self.request.aiding();
         let configuration = json!({
             "settings": settings,
-            "filter": self.request.filter,
+            "filter": self.states,
             "initial": self.expected,
             "gnss_sigma": self.request.gnss_sigma,
             "gnss_correlation": self.request.gnss_correlation,
@@ -511,7 +497,7 @@ impl<'a> Drive<'a> {
             "aiding": aiding,
         });
         let (belief, reduction) = belief(
-            (&self.model.model, self.request.filter, &self.expected),
+            (&self.model.model, self.states, &self.expected),
             self.imu_rate_hz,
             &self.gnss,
             &settings.outages,
