@@ -212,6 +212,9 @@ pub(crate) struct ScenarioArgs {
     /// Settings in one TOML file; flags override it (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     pub scenario: Option<PathBuf>,
+    /// Scenario file whose section gnss is used
+    #[arg(long, value_name = "FILE")]
+    pub gnss: Option<PathBuf>,
     /// A setting of the scenario, such as gnss.rate_hz=5 (repeatable)
     #[arg(long, value_name = "KEY=VALUE", hide = true)]
     pub set: Vec<String>,
@@ -221,17 +224,18 @@ impl ScenarioArgs {
     /// The file with the settings over it; not yet checked.
     pub(crate) fn read(&self) -> Result<Scenario> {
         let file = self.scenario.as_deref();
-        let scenario = file
-            .map(scenario_file::read)
-            .transpose()?
-            .unwrap_or_default();
-        if self.set.is_empty() {
-            return Ok(scenario);
+        let read = file.map(scenario_file::read).transpose()?;
+        let mut scenario = read.unwrap_or_default();
+        if !self.set.is_empty() {
+            let over: toml::Table = self.set.join("\n").parse().refuse_within("--set")?;
+            let mut table = toml::Table::try_from(&scenario).refuse()?;
+            merge(&mut table, over);
+            scenario = Source::new("", &toml::to_string(&table).refuse()?).get()?;
         }
-        let over: toml::Table = self.set.join("\n").parse().refuse_within("--set")?;
-        let mut table = toml::Table::try_from(&scenario).refuse()?;
-        merge(&mut table, over);
-        Source::new("", &toml::to_string(&table).refuse()?).get()
+        if let Some(path) = &self.gnss {
+            scenario.gnss = scenario_file::read(path)?.gnss;
+        }
+        Ok(scenario)
     }
 }
 

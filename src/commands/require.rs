@@ -6,7 +6,6 @@ use crate::io::datasheet::{self, CATALOGUE, Datasheet};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::input::listed;
 use crate::io::model_file::{self, ModelFile, PROGRAM, TurnOn, known};
-use crate::io::scenario_file;
 use crate::parse;
 use crate::report::csv::merged;
 use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds, window};
@@ -60,9 +59,6 @@ pub struct Require {
     /// yaw_deg
     #[arg(id = "require", long = "require", value_name = "NAME<=LIMIT")]
     limits: Vec<Limit>,
-    /// Scenario file whose section gnss is used
-    #[arg(long, value_name = "FILE")]
-    gnss: Option<PathBuf>,
     /// Receiver, start, IMU rate, aiding.
     #[command(flatten)]
     settings: ScenarioArgs,
@@ -164,9 +160,6 @@ impl Require {
             );
         }
         let mut scenario = self.settings.read()?;
-        if let Some(path) = &self.gnss {
-            scenario.gnss = scenario_file::read(path)?.gnss;
-        }
         if self.vehicle.is_some() {
             if !scenario.aiding.is_none() {
                 return refused(
