@@ -1,7 +1,7 @@
 //! `nav-sim trajectory`: reference trajectories.
 
+use crate::app::inputs::ScenarioArgs;
 use crate::app::{Asked, Command, Context, Failure, Out, PlainAnswer, Result, inputs};
-use crate::io::scenario_file;
 use crate::io::trajectory_file::{self, Instants, Options, parse_origin};
 use crate::parse;
 use crate::report::{gnss_csv, imu_csv, initial_toml};
@@ -64,23 +64,19 @@ struct Source {
     path: PathBuf,
     /// Origin of local coordinates, if the file does not state it: latitude, longitude, height
     #[arg(long, value_name = "LAT_DEG,LON_DEG,H_M", value_parser = origin, allow_hyphen_values = true)]
-    origin: Option<Origin>,
+    origin: Option<[f64; 3]>,
 }
 
 /// Latitude, longitude (rad), height (m).
-#[derive(Debug, Clone, Copy)]
-struct Origin([f64; 3]);
-
-fn origin(text: &str) -> Result<Origin, String> {
+fn origin(text: &str) -> Result<[f64; 3], String> {
     parse_origin(text)
-        .map(Origin)
         .ok_or_else(|| "not LAT_DEG,LON_DEG,H_M with a latitude within ±89.9".to_owned())
 }
 
 impl Source {
     /// Reads it, and warns of what is doubtful about it.
     fn read(&self, context: &Context<'_>) -> Result<(Trajectory, Vec<String>)> {
-        let origin = self.origin.map(|o| o.0);
+        let origin = self.origin;
         let read = trajectory_file::load(&self.path, &Options { origin })?;
         context.warn_each(&read.1);
         Ok(read)
@@ -282,9 +278,9 @@ pub struct Record {
     /// Noise model of the IMU
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// Scenario file whose [imu], [gnss] and [initial] sections are used
-    #[arg(long, value_name = "FILE")]
-    scenario: Option<PathBuf>,
+    /// Settings, of which [imu], [gnss] and [initial] are used.
+    #[command(flatten)]
+    settings: ScenarioArgs,
 }
 
 const RECORDED: [&str; 4] = ["imu.csv", "gnss.csv", "reference.csv", "initial.toml"];
@@ -300,12 +296,7 @@ impl Command for Record {
     const PAGE: bool = false;
 
     fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
-        let mut scenario = self
-            .scenario
-            .as_deref()
-            .map(scenario_file::read)
-            .transpose()?
-            .unwrap_or_default();
+        let mut scenario = self.settings.read()?;
         let (trajectory, _) = self.source.read(context)?;
         let file = inputs::model(&self.model, context)?;
         let model = continuous::at_rate(&file.model, scenario.imu.rate_hz)
