@@ -398,22 +398,6 @@ fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
     REPORTED_NAMES.iter().enumerate().map(chart).collect()
 }
 
-/// Fates of fixes, and their colours.
-const FATES: [(bool, &str, Colour); 2] = [
-    (true, "used", Colour::BELIEVED),
-    (false, "withheld", Colour::Soft),
-];
-
-/// A series for each fate of fixes.
-fn fixes(fixes: &[FixRecord], value: &dyn Fn(&FixRecord) -> f64) -> Vec<Series> {
-    let of_fate = |(fate, name, colour): (bool, &str, Colour)| {
-        let of_fate = fixes.iter().filter(|f| f.used == fate);
-        let points: Vec<_> = of_fate.map(|f| (f.t_s, value(f), f64::NAN)).collect();
-        (!points.is_empty()).then(|| Series::points(name, colour, points))
-    };
-    FATES.into_iter().filter_map(of_fate).collect()
-}
-
 fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let panel = |(i, name): (usize, &str)| {
         let normalised = |f: &FixRecord| {
@@ -427,7 +411,14 @@ fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
             Colour::RIGHT,
             Mark::Zone(-1.96, 1.96),
         )];
-        series.extend(fixes(&solution.fixes, &normalised));
+        for (used, name, colour) in [
+            (true, "used", Colour::BELIEVED),
+            (false, "withheld", Colour::Soft),
+        ] {
+            let of_fate = solution.fixes.iter().filter(|f| f.used == used);
+            let points: Vec<_> = of_fate.map(|f| (f.t_s, normalised(f), f64::NAN)).collect();
+            series.extend((!points.is_empty()).then(|| Series::points(name, colour, points)));
+        }
         Panel::new(
             Axis::linear(&format!("{name} (σ)")).including(-3.0, 3.0),
             series,
