@@ -728,7 +728,7 @@ fn ending(path: &Path) -> String {
 // `manifest.json`: where a result directory came from, and whether another command makes the same.
 
 /// Where a result directory came from.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Layout version.
     pub schema_version: u32,
@@ -770,15 +770,9 @@ impl Manifest {
             schema_version: Self::SCHEMA_VERSION,
             name: name.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            command: Vec::new(),
             options,
-            seed: None,
             inputs,
-            outputs: BTreeMap::new(),
-            key: String::new(),
-            threads: 0,
-            wall_s: 0.0,
-            record: Map::new(),
+            ..Self::default()
         };
         let decides = (
             name,

@@ -10,7 +10,7 @@ use crate::commands::run::reduction_of;
 use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
 use crate::io::model_file::ModelFile;
 use crate::io::trajectory_file::{self, load_reference};
-use crate::parse::numbers;
+use crate::parse::{numbers, positive};
 use crate::report::json;
 use glam::{DMat3, DQuat, DVec3};
 use nav_sim_document::{Document, shortest, window};
@@ -289,11 +289,9 @@ fn correlation(text: &str) -> Result<Correlation, &'static str> {
     match text {
         "auto" => Ok(Correlation::Auto),
         "none" => Ok(Correlation::None),
-        _ => number(text)
-            .ok()
-            .filter(|seconds| *seconds > 0.0)
+        _ => positive(text)
             .map(Correlation::Seconds)
-            .ok_or("expected auto, none, or a correlation time in seconds"),
+            .map_err(|_| "expected auto, none, or a correlation time in seconds"),
     }
 }
 
@@ -302,11 +300,10 @@ fn gnss_sigma(text: &str) -> Result<GnssSigma, &'static str> {
         return Ok((Some(fix_sigma(text)?), [1.0; 2]));
     };
     let (position, velocity) = factors.split_once(':').unwrap_or((factors, factors));
-    let factor = |text: &str| number(text).ok().filter(|factor| *factor > 0.0);
-    factor(position)
-        .zip(factor(velocity))
-        .map(|(position, velocity)| (None, [position, velocity]))
-        .ok_or("expected factors > 0: x3 or x3:2")
+    match (positive(position), positive(velocity)) {
+        (Ok(position), Ok(velocity)) => Ok((None, [position, velocity])),
+        _ => Err("expected factors > 0: x3 or x3:2"),
+    }
 }
 
 /// `POS` or `N,E,D` in metres, then `:VEL` or `:N,E,D` in m/s.
