@@ -2,7 +2,6 @@
 
 mod document;
 
-use crate::app::inputs::FilterArgs;
 use crate::app::{
     Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, inputs, refused,
 };
@@ -10,7 +9,7 @@ use crate::commands::run::reduction_of;
 use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
 use crate::io::model_file::ModelFile;
 use crate::io::trajectory_file::{self, load_reference};
-use crate::parse::{numbers, positive};
+use crate::parse::{numbers, pair, positive};
 use crate::report::json;
 use glam::{DMat3, DQuat, DVec3};
 use nav_sim_document::{Document, shortest, window};
@@ -151,9 +150,14 @@ pub struct Fuse {
     /// Window in which fixes are withheld, on the clock of the data in seconds (repeatable)
     #[arg(long = "outage", value_name = "START:END")]
     outages: Vec<Outage>,
-    /// States of the filter, and what it expects beside the model.
-    #[command(flatten)]
-    filter: FilterArgs,
+    /// States of the filter: 15 (one bias an axis, to which the model is reduced), 21 (and a scale factor an axis) or
+    /// full (a bias state for each process)
+    #[arg(long, value_name = "STATES", default_value = "15")]
+    filter: FilterStates,
+    /// Constant biases that the filter expects beside the model: standard deviations, accelerometer in m/s²,
+    /// gyroscope in rad/s
+    #[arg(long, value_name = "ACCEL,GYRO", value_parser = pair)]
+    turn_on_bias: Option<[f64; 2]>,
     /// Standard deviations where the GNSS file states none: of the position in m, and after a colon of the velocity in
     /// m/s; each one number or north,east,down. x3 or x3:2: times what it states
     #[arg(long, value_name = "POS[:VEL]|xPOS[:VEL]", value_parser = gnss_sigma)]
@@ -405,7 +409,6 @@ struct Drive<'a> {
     gnss: Vec<GnssFix>,
     wheel: Vec<WheelSpeed>,
     model: ModelFile,
-    states: FilterStates,
     expected: InitialSettings,
     initial: Option<Start>,
     reference: Option<Reference>,
@@ -445,8 +448,11 @@ impl<'a> Drive<'a> {
             .transpose()?;
         let model = inputs::model(&request.model, context)?;
         let of_file = initial.as_ref().map(|start| start.sigma.clone());
-        let (mut states, mut expected) = (FilterStates::default(), of_file.unwrap_or_default());
-        request.filter.over(&mut states, &mut expected);
+        let mut expected = of_file.unwrap_or_default();
+        if let Some([accel, gyro]) = request.turn_on_bias {
+            expected.accel_bias_sigma_m_s2 = Some(accel);
+            expected.gyro_bias_sigma_rad_s = Some(gyro);
+        }
         inputs::expect_turn_on(&mut expected, model.turn_on, &request.model, context);
         expected.validate().refuse()?;
         let options = trajectory_file::Options::default();
@@ -463,7 +469,6 @@ impl<'a> Drive<'a> {
             gnss,
             wheel,
             model,
-            states,
             expected,
             initial,
             reference,
@@ -485,7 +490,7 @@ impl<'a> Drive<'a> {
         let aiding = self.request.aiding();
         let configuration = json!({
             "settings": settings,
-            "filter": self.states,
+            "filter": self.request.filter,
             "initial": self.expected,
             "gnss_sigma": self.request.gnss_sigma,
             "gnss_correlation": self.request.gnss_correlation,
@@ -494,7 +499,7 @@ impl<'a> Drive<'a> {
             "aiding": aiding,
         });
         let (belief, reduction) = belief(
-            (&self.model.model, self.states, &self.expected),
+            (&self.model.model, self.request.filter, &self.expected),
             self.imu_rate_hz,
             &self.gnss,
             &settings.outages,
