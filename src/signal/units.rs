@@ -9,7 +9,6 @@
 //! ```
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::{Deserialize, Deserializer, Error as _};
 
 /// One degree in radians.
 pub const DEG: f64 = std::f64::consts::PI / 180.0;
@@ -94,27 +93,3 @@ number_in_schemas!(
     /// In schemas, a number between 0 and 1, neither of them.
     Probability, { "type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1 }
 );
-
-/// Reads a list of exactly `N` values (`deserialize_with`): readers of TOML drop what comes after them.
-///
-/// # Errors
-/// Another length.
-pub fn exactly<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
-    deserializer: D,
-) -> Result<[T; N], D::Error> {
-    let list = Vec::<T>::deserialize(deserializer)?;
-    let length = list.len();
-    let expected = format!("a list of {N}");
-    list.try_into()
-        .map_err(|_| D::Error::invalid_length(length, &expected.as_str()))
-}
-
-/// The same where the list may be missing (with `default`).
-///
-/// # Errors
-/// Another length.
-pub fn exactly_if<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
-    deserializer: D,
-) -> Result<Option<[T; N]>, D::Error> {
-    exactly(deserializer).map(Some)
-}

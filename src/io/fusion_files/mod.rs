@@ -5,7 +5,7 @@ use super::logs::LogOptions;
 use super::recordings::timing::{median_step, unit_of_step};
 use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
 use super::table::{Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table};
-use super::toml_file::{Between, Finite, Source};
+use super::toml_file::{Between, Source};
 use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
 use chrono::{DateTime, NaiveDateTime};
 use glam::DVec3;
@@ -831,30 +831,30 @@ fn doubt_units(path: &str, samples: &[ImuIncrement]) -> Result<Option<String>, E
 #[schemars(title = "Initial state", deny_unknown_fields)]
 struct Description {
     /// Time (s)
-    t_s: Finite,
+    t_s: f64,
     /// Latitude of the IMU (degrees)
     #[schemars(range(min = -MAX_LATITUDE_DEG, max = MAX_LATITUDE_DEG))]
-    lat_deg: Finite,
+    lat_deg: f64,
     /// Longitude of the IMU (degrees)
     lon_deg: Between<-360, 360, false>,
     /// Height of the IMU above the ellipsoid (m)
-    h_m: Finite,
+    h_m: f64,
     /// Velocity north (m/s; default: 0)
     #[serde(default)]
-    v_n_m_s: Finite,
+    v_n_m_s: f64,
     /// Velocity east (m/s; default: 0)
     #[serde(default)]
-    v_e_m_s: Finite,
+    v_e_m_s: f64,
     /// Velocity down (m/s; default: 0)
     #[serde(default)]
-    v_d_m_s: Finite,
+    v_d_m_s: f64,
     /// Roll of the vehicle (degrees)
     roll_deg: Between<-180, 180, false>,
     /// Pitch (degrees)
     pitch_deg: Between<-90, 90, false>,
     /// Yaw (degrees)
     yaw_deg: Between<-360, 360, false>,
-    #[schemars(flatten)]
+    #[serde(flatten)]
     sigma: InitialSettings,
 }
 
@@ -875,24 +875,20 @@ pub(crate) fn read_initial(path: &Path) -> Result<Start, Failure> {
 
 fn parse(source: &Source) -> Result<Start, Failure> {
     let d: Description = source.get()?;
-    if d.lat_deg.0.abs() > MAX_LATITUDE_DEG {
-        return Err(source.refused("lat_deg", format!("is not within ±{MAX_LATITUDE_DEG}")));
-    }
     let (roll, pitch, yaw) = (d.roll_deg.0 * DEG, d.pitch_deg.0 * DEG, d.yaw_deg.0 * DEG);
     let state = NavState {
-        lat: d.lat_deg.0 * DEG,
+        lat: d.lat_deg * DEG,
         lon: d.lon_deg.0 * DEG,
-        h: d.h_m.0,
-        v_n: DVec3::new(d.v_n_m_s.0, d.v_e_m_s.0, d.v_d_m_s.0),
+        h: d.h_m,
+        v_n: DVec3::new(d.v_n_m_s, d.v_e_m_s, d.v_d_m_s),
         q_b_n: RollPitchYaw { roll, pitch, yaw }.to_quat(),
     };
     let sigma = d.sigma;
     if sigma.perfect {
         return Err(source.refused("perfect", "is for simulations only"));
     }
-    sigma.validate().map_err(|e| source.setting(&e))?;
     Ok(Start {
-        t_s: d.t_s.0,
+        t_s: d.t_s,
         state,
         sigma,
         found: None,
@@ -918,17 +914,17 @@ mod initial_tests {
             (
                 "= 46",
                 "= 91",
-                "i.toml, line 2: \"lat_deg\" = 91 is not within ±89.9 | ",
+                "i.toml, line 2: \"lat_deg\" = 91 is refused: it must be a finite number ≥ -89.9 and ≤ 89.9 | ",
             ),
             (
                 "= 46",
                 "= 89.95",
-                "i.toml, line 2: \"lat_deg\" = 89.95 is not within ±89.9 | ",
+                "i.toml, line 2: \"lat_deg\" = 89.95 is refused: it must be a finite number ≥ -89.9 and ≤ 89.9 | ",
             ),
             (
                 "= 400",
                 "= inf",
-                "i.toml, line 4: \"h_m\" = inf is not a finite number such as 1.5e-4 | ",
+                "i.toml, line 4: \"h_m\" = inf is refused: it must be a finite number | ",
             ),
             (
                 "h_m = 400\n",
@@ -948,7 +944,7 @@ mod initial_tests {
             (
                 "t_s = 0",
                 "t_s = 0\npos_sigma_m = [1, 1, -1]",
-                "i.toml, line 2: \"pos_sigma_m\" = [1, 1, -1] is refused: it must be a finite number > 0 and ≤ 100000 | ",
+                "i.toml, line 2: \"pos_sigma_m\" = -1 is refused: it must be a finite number > 0 and ≤ 100000 | ",
             ),
         ] {
             assert_eq!(refused(&sound.replacen(old, new, 1)), expected);
