@@ -489,43 +489,31 @@ fn rtklib(
         let advice = "write the solution in GPS time, as the IMU's clock is";
         return Err(refuse(at, "times that are not GPST", advice));
     }
-    let cells = |line: &'_ str| -> Vec<String> {
-        let cells = line.split([' ', ',', '\t', '%']).filter(|c| !c.is_empty());
-        cells.map(str::to_owned).collect()
-    };
-    let mut columns: Vec<(String, Vec<f64>)> = cells(names)
-        .into_iter()
-        .map(|name| (name, vec![]))
-        .collect();
-    "t_s".clone_into(&mut columns[0].0);
-    let mut lines = Vec::new();
-    let rows = text.lines().enumerate();
-    for (i, line) in rows.filter(|(_, l)| !(l.starts_with('%') || l.trim().is_empty())) {
-        let row = cells(line);
-        let t_s = match &row[..] {
-            [first, second, ..] if row.len() > columns.len() => gps_time_s(first, second),
-            _ => None,
-        };
-        let t_s = t_s.ok_or_else(|| {
-            let message = "not a row of time, position, quality, satellites and standard deviations";
-            let advice = "2021/03/01 00:00:01.000 (or 2147 86401.000), latitude, longitude, height, Q, ns, sdn, sde, sdu";
-            refuse(i, message, advice)
-        })?;
-        columns[0].1.push(t_s);
-        for ((name, values), cell) in columns[1..].iter_mut().zip(&row[2..]) {
-            values.push(cell.parse().map_err(|_| {
-                Error::cell(
-                    path,
-                    i as u64 + 1,
-                    name,
-                    format!("\"{cell}\""),
-                    "is not a number",
-                )
-            })?);
+    // the time, which takes two columns, in one
+    let mut whole = String::new();
+    for (i, line) in text.lines().enumerate() {
+        let cells = line.split([' ', ',', '\t', '%']);
+        let cells: Vec<&str> = cells.filter(|cell| !cell.is_empty()).collect();
+        let is_row = !(line.starts_with('%') || cells.is_empty());
+        match cells[..] {
+            [_, ref names @ ..] if i == at => whole += &format!("t_s {}", names.join(" ")),
+            [first, second, ref rest @ ..] if is_row => {
+                let t_s = gps_time_s(first, second).ok_or_else(|| {
+                    let message = "not a row of time, position, quality, satellites and standard deviations";
+                    let advice = "2021/03/01 00:00:01.000 (or 2147 86401.000), latitude, longitude, height, Q, ns, sdn, sde, sdu";
+                    refuse(i, message, advice)
+                })?;
+                whole += &format!("{t_s} {}", rest.join(" "));
+            }
+            _ => {}
         }
-        lines.push(i as u64 + 1);
+        whole.push('\n');
     }
-    let t_s = &mut columns[0].1;
+    let mut table = table::parse(path, &whole, &SOLUTION)?;
+    let Some(time) = table.columns.iter_mut().find(|c| c.quantity.name == "t_s") else {
+        return Err(table.refused("no time"));
+    };
+    let t_s = &mut time.values;
     let span = t_s.first().copied().zip(t_s.last().copied());
     let (first_s, last_s) = span.unwrap_or_default();
     let gps_s = gps_origin_s(first_s + GPS_EPOCH_S as f64);
@@ -535,7 +523,6 @@ fn rtklib(
     // the difference of two numbers of 1e9 keeps 0.2 µs
     let on_clock = |t_s: f64| (1e6 * (t_s + gps_s - clock.origin_s)).round() / 1e6;
     t_s.iter_mut().for_each(|t_s| *t_s = on_clock(*t_s));
-    let mut table = table::of_columns(path, columns, lines, &SOLUTION)?;
     table.ignored.clear();
     Ok((table, format!("an RTKLIB solution, in {}", clock.name)))
 }
@@ -590,7 +577,7 @@ mod rtklib_tests {
         std::fs::write(file.path(), HEAD).unwrap();
         let refusal = read_gnss(file.path(), None, None, None).unwrap_err();
         assert!(
-            refusal.to_string().ends_with(": no fixes in it"),
+            refusal.to_string().ends_with(": no rows in it"),
             "{refusal}"
         );
     }
