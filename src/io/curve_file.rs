@@ -50,9 +50,9 @@ fn parse(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
 
 /// Columns of a curve.
 static QUANTITIES: [Quantity; 3] = [
-    Quantity::number("tau_samples", &["tau_samples"]),
-    Quantity::number("wv", &["wv"]),
-    Quantity::number("edof", &["edof"]),
+    Quantity::number("tau_samples", "tau_samples"),
+    Quantity::number("wv", "wv"),
+    Quantity::number("edof", "edof"),
 ];
 const DICTIONARY: Dictionary<'_> = Dictionary::new(&QUANTITIES, "the first line names them");
 

@@ -86,51 +86,26 @@ const MAX_SPEED: f64 = 8000.0;
 
 /// Quantities of fixes; a deviation up is one down.
 static FIX_QUANTITIES: [Quantity; 15] = [
-    Quantity::time(&["t", "time", "timestamp", "tow", "sow"]),
-    Quantity::angle("lat_deg", &["lat", "latitude"]).within(LATITUDE),
-    Quantity::angle("lon_deg", &["lon", "lng", "longitude"]).within(LONGITUDE),
-    Quantity::length("h_m", &["h", "height", "alt", "altitude"]),
+    Quantity::time("t time timestamp tow sow"),
+    Quantity::angle("lat_deg", "lat latitude").within(LATITUDE),
+    Quantity::angle("lon_deg", "lon lng longitude").within(LONGITUDE),
+    Quantity::length("h_m", "h height alt altitude"),
     Quantity::length("sd_n_m", SD_N).positive(),
     Quantity::length("sd_e_m", SD_E).positive(),
     Quantity::length("sd_d_m", SD_D).positive(),
-    Quantity::speed("v_n_m_s", &["v_n", "vn"]),
-    Quantity::speed("v_e_m_s", &["v_e", "ve"]),
+    Quantity::speed("v_n_m_s", "v_n vn"),
+    Quantity::speed("v_e_m_s", "v_e ve"),
     V_D,
-    V_D.reversed(&["v_u", "vu"]),
-    Quantity::speed("sd_vn_m_s", &["sd_vn", "sd_v_n", "vel_std_n", "sdvn"]).positive(),
-    Quantity::speed("sd_ve_m_s", &["sd_ve", "sd_v_e", "vel_std_e", "sdve"]).positive(),
-    Quantity::speed("sd_vd_m_s", &["sd_vd", "sd_v_d", "vel_std_d", "sdvu"]).positive(),
-    Quantity::number("week", &["week", "gps_week"]),
+    V_D.reversed("v_u vu"),
+    Quantity::speed("sd_vn_m_s", "sd_vn sd_v_n vel_std_n sdvn").positive(),
+    Quantity::speed("sd_ve_m_s", "sd_ve sd_v_e vel_std_e sdve").positive(),
+    Quantity::speed("sd_vd_m_s", "sd_vd sd_v_d vel_std_d sdvu").positive(),
+    Quantity::number("week", "week gps_week"),
 ];
-const SD_N: &[&str] = &[
-    "sd_n",
-    "std_n",
-    "sigma_n",
-    "pos_std_n",
-    "sd_north",
-    "sd_lat",
-    "sdn",
-];
-const SD_E: &[&str] = &[
-    "sd_e",
-    "std_e",
-    "sigma_e",
-    "pos_std_e",
-    "sd_east",
-    "sd_lon",
-    "sde",
-];
-const SD_D: &[&str] = &[
-    "sd_d",
-    "std_d",
-    "sigma_d",
-    "pos_std_d",
-    "sd_u",
-    "std_u",
-    "sd_h",
-    "sdu",
-];
-const V_D: Quantity = Quantity::speed("v_d_m_s", &["v_d", "vd"]);
+const SD_N: &str = "sd_n std_n sigma_n pos_std_n sd_north sd_lat sdn";
+const SD_E: &str = "sd_e std_e sigma_e pos_std_e sd_east sd_lon sde";
+const SD_D: &str = "sd_d std_d sigma_d pos_std_d sd_u std_u sd_h sdu";
+const V_D: Quantity = Quantity::speed("v_d_m_s", "v_d vd");
 const PLACE: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
 const PLACE_SIGMA: [&str; 3] = ["sd_n_m", "sd_e_m", "sd_d_m"];
 const VELOCITY: [&str; 3] = ["v_n_m_s", "v_e_m_s", "v_d_m_s"];
@@ -139,24 +114,8 @@ const VELOCITY_SIGMA: [&str; 3] = ["sd_vn_m_s", "sd_ve_m_s", "sd_vd_m_s"];
 /// Dictionary of fixes. Texts without a header are those of KF-GINS.
 const FIXES: Dictionary<'_> = Dictionary {
     bare: &[
-        &[
-            "t_s", "lat_deg", "lon_deg", "h_m", "sd_n_m", "sd_e_m", "sd_d_m",
-        ],
-        &[
-            "t_s",
-            "lat_deg",
-            "lon_deg",
-            "h_m",
-            "v_n_m_s",
-            "v_e_m_s",
-            "v_d_m_s",
-            "sd_n_m",
-            "sd_e_m",
-            "sd_d_m",
-            "sd_vn_m_s",
-            "sd_ve_m_s",
-            "sd_vd_m_s",
-        ],
+        "t_s lat_deg lon_deg h_m sd_n_m sd_e_m sd_d_m",
+        "t_s lat_deg lon_deg h_m v_n_m_s v_e_m_s v_d_m_s sd_n_m sd_e_m sd_d_m sd_vn_m_s sd_ve_m_s sd_vd_m_s",
     ],
     bad_cell: "remove the row: a fix that is not whole is no fix; angles are in degrees, or named lat_rad, lon_rad",
     ..Dictionary::new(
@@ -657,25 +616,8 @@ pub(crate) struct ImuFile {
 /// Dictionary of recordings under way. Texts without a header are those of KF-GINS, with or without an odometer.
 const SAMPLES: Dictionary<'_> = Dictionary {
     bare: &[
-        &[
-            "t_s",
-            "dtheta_x_rad",
-            "dtheta_y_rad",
-            "dtheta_z_rad",
-            "dv_x_m_s",
-            "dv_y_m_s",
-            "dv_z_m_s",
-        ],
-        &[
-            "t_s",
-            "dtheta_x_rad",
-            "dtheta_y_rad",
-            "dtheta_z_rad",
-            "dv_x_m_s",
-            "dv_y_m_s",
-            "dv_z_m_s",
-            "odometer_m_s",
-        ],
+        "t_s dtheta_x_rad dtheta_y_rad dtheta_z_rad dv_x_m_s dv_y_m_s dv_z_m_s",
+        "t_s dtheta_x_rad dtheta_y_rad dtheta_z_rad dv_x_m_s dv_y_m_s dv_z_m_s odometer_m_s",
     ],
     advice: "columns: t_s, gyro_x_rad_s … accel_z_m_s2 (rates) or t_s, dtheta_x_rad … dv_z_m_s (increments); without a header, \
              as KF-GINS has it, 7 of them (t_s, dtheta_x, dtheta_y, dtheta_z in rad, dv_x, dv_y, dv_z in m/s), or 8 with an \
@@ -946,21 +888,10 @@ static SPEED_QUANTITIES: [Quantity; 5] = [
     Quantity::time(OF_CLOCK),
     Quantity::time(STAMP),
     Quantity::time(OF_RECEIVER),
-    Quantity::new("t_s", &["timeus"], NONE, Bare::Is(1e-6)),
+    Quantity::new("t_s", "timeus", NONE, Bare::Is(1e-6)),
     Quantity::new(
         "speed",
-        &[
-            "speed",
-            "velocity",
-            "vel",
-            "v",
-            "wheel",
-            "wheel_speed",
-            "odometer",
-            "odo",
-            "forward",
-            "forward_speed",
-        ],
+        "speed velocity vel v wheel wheel_speed odometer odo forward forward_speed",
         SPEED,
         Bare::Unknown,
     ),

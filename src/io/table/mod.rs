@@ -24,10 +24,10 @@ mod quantity;
 pub(crate) struct Dictionary<'a> {
     /// Quantities; of several columns of one with a rank, the first by rank is taken.
     pub(crate) quantities: &'static [Quantity],
-    /// Names of the columns of texts without a header, by their number.
-    pub(crate) bare: &'static [&'static [&'static str]],
-    /// Names of the columns of arrays without names.
-    pub(crate) array: &'static [&'static [&'static str]],
+    /// Headers of texts without one, by the number of their columns.
+    pub(crate) bare: &'static [&'static str],
+    /// Those of arrays.
+    pub(crate) array: &'static [&'static str],
     /// True if cells that hold no number of their range are NaN: who reads them leaves those rows out.
     pub(crate) is_partial: bool,
     /// Advice where columns are not found.
@@ -284,7 +284,7 @@ impl Table {
         let endings = quantity
             .units
             .iter()
-            .map(|(names, _)| format!("_{}", names[0]));
+            .filter_map(|(names, _)| Some(format!("_{}", names.split(' ').next()?)));
         let endings: Vec<String> = endings.collect();
         self.refused(format!("column \"{name}\" {problem}"))
             .or_hint(format!("end its name in one of {}", endings.join(", ")))
@@ -697,10 +697,11 @@ impl Head {
     }
 }
 
-/// The names of so many columns.
-fn layout(layouts: &[&[&str]], columns: usize) -> Option<Vec<String>> {
-    let found = layouts.iter().find(|names| names.len() == columns)?;
-    Some(found.iter().map(|name| (*name).to_owned()).collect())
+/// The header of so many columns.
+fn layout(headers: &[&str], columns: usize) -> Option<Vec<String>> {
+    let names = headers.iter().map(|header| header.split(' '));
+    let found = names.into_iter().find(|names| names.clone().count() == columns)?;
+    Some(found.map(str::to_owned).collect())
 }
 
 fn no_header(path: &str, line: u64, text: &str, dictionary: &Dictionary<'_>) -> Failure {

@@ -103,39 +103,39 @@ const MAX_DURATION_S: f64 = 86_400.0;
 /// Quantities of a trajectory; x, y, z and quaternions are in the axes of ROS ([REP 103](https://www.ros.org/reps/rep-0103.html)):
 /// position east, north, up of the origin; body forward, left, up.
 static QUANTITIES: [Quantity; 23] = [
-    Quantity::time(&["t", "time", "timestamp"]),
-    Quantity::number("week", &["week", "gps_week"]),
-    Quantity::angle("lat_deg", &["lat", "latitude"]).within(LATITUDE),
-    Quantity::angle("lon_deg", &["lon", "lng", "longitude"]).within(LONGITUDE),
-    Quantity::length("h_m", &["h", "alt", "height", "altitude"]),
+    Quantity::time("t time timestamp"),
+    Quantity::number("week", "week gps_week"),
+    Quantity::angle("lat_deg", "lat latitude").within(LATITUDE),
+    Quantity::angle("lon_deg", "lon lng longitude").within(LONGITUDE),
+    Quantity::length("h_m", "h alt height altitude"),
     N,
     E,
     D,
-    D.reversed(&["u", "up"]),
-    Quantity::angle("roll_deg", &["roll"]).within((-180.0, 180.0, "is not a roll angle")),
-    Quantity::angle("pitch_deg", &["pitch"]).within((-90.0, 90.0, "is not a pitch angle")),
+    D.reversed("u up"),
+    Quantity::angle("roll_deg", "roll").within((-180.0, 180.0, "is not a roll angle")),
+    Quantity::angle("pitch_deg", "pitch").within((-90.0, 90.0, "is not a pitch angle")),
     // one that was unwrapped goes on below −180 and above 180: the same angle
-    Quantity::angle("yaw_deg", &["yaw", "heading", "azimuth"]).within((
+    Quantity::angle("yaw_deg", "yaw heading azimuth").within((
         -360.0,
         360.0,
         "is not a heading",
     )),
-    Quantity::speed("v_n_m_s", &["v_n", "vn", "v_north"]).with_unit(),
-    Quantity::speed("v_e_m_s", &["v_e", "ve", "v_east"]).with_unit(),
+    Quantity::speed("v_n_m_s", "v_n vn v_north").with_unit(),
+    Quantity::speed("v_e_m_s", "v_e ve v_east").with_unit(),
     V_D,
-    V_D.reversed(&["v_u", "v_up"]),
-    Quantity::length("x", &["x"]),
-    Quantity::length("y", &["y"]),
-    Quantity::length("z", &["z"]),
-    Quantity::number("qx", &["qx", "q_x"]),
-    Quantity::number("qy", &["qy", "q_y"]),
-    Quantity::number("qz", &["qz", "q_z"]),
-    Quantity::number("qw", &["qw", "q_w"]),
+    V_D.reversed("v_u v_up"),
+    Quantity::length("x", "x"),
+    Quantity::length("y", "y"),
+    Quantity::length("z", "z"),
+    Quantity::number("qx", "qx q_x"),
+    Quantity::number("qy", "qy q_y"),
+    Quantity::number("qz", "qz q_z"),
+    Quantity::number("qw", "qw q_w"),
 ];
-const N: Quantity = Quantity::length("n_m", &["n", "north"]).with_unit();
-const E: Quantity = Quantity::length("e_m", &["e", "east"]).with_unit();
-const D: Quantity = Quantity::length("d_m", &["d", "down"]).with_unit();
-const V_D: Quantity = Quantity::speed("v_d_m_s", &["v_d", "vd", "v_down"]).with_unit();
+const N: Quantity = Quantity::length("n_m", "n north").with_unit();
+const E: Quantity = Quantity::length("e_m", "e east").with_unit();
+const D: Quantity = Quantity::length("d_m", "d down").with_unit();
+const V_D: Quantity = Quantity::speed("v_d_m_s", "v_d vd v_down").with_unit();
 
 /// Dictionary of trajectories.
 const DICTIONARY: Dictionary<'_> = Dictionary {
@@ -147,21 +147,9 @@ const DICTIONARY: Dictionary<'_> = Dictionary {
 };
 /// A KF-GINS navigation result or truth: week, seconds of week, position, velocity, attitude, between blanks. Time is counted on
 /// from the first week.
-const KF_GINS: &[&str] = &[
-    "week",
-    "t_s",
-    "lat_deg",
-    "lon_deg",
-    "h_m",
-    "v_n_m_s",
-    "v_e_m_s",
-    "v_d_m_s",
-    "roll_deg",
-    "pitch_deg",
-    "yaw_deg",
-];
+const KF_GINS: &str = "week t_s lat_deg lon_deg h_m v_n_m_s v_e_m_s v_d_m_s roll_deg pitch_deg yaw_deg";
 /// A TUM file: time, position (m), quaternion, between blanks.
-const TUM: &[&str] = &["t_s", "x", "y", "z", "qx", "qy", "qz", "qw"];
+const TUM: &str = "t_s x y z qx qy qz qw";
 
 const GEODETIC: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
 const LOCAL: [&str; 3] = ["n_m", "e_m", "d_m"];
