@@ -59,7 +59,7 @@ const DICTIONARY: Dictionary<'_> = Dictionary::new(&QUANTITIES, "the first line 
 fn csv(path: &str, text: &str) -> Result<NamedCurve, Failure> {
     let table = parse_table(path, text, &DICTIONARY)?;
     let names = QUANTITIES.each_ref().map(|quantity| quantity.name);
-    let columns = table.columns(names, &DICTIONARY)?;
+    let columns = table.columns(names)?;
     let mut curve = Curve::default();
     for row in 0..table.rows() {
         push(&mut curve, columns.map(|column| column.si(row)))

@@ -22,10 +22,11 @@
 use super::Failure;
 use super::suggest::nearest;
 use super::toml_file::Source;
-use crate::io::toml_file::{Between, NonNegative, OneOrEach, Positive, Share, Stationary};
+use crate::io::toml_file::OneOrEach;
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Process;
 use nav_sim_signal::noise::contamination::{Contamination, Extent, Operation, Rule};
+use nav_sim_signal::units::{Between, NonNegative, Positive, Share, Stationary};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::num::NonZero;

@@ -5,7 +5,7 @@ use super::logs::LogOptions;
 use super::recordings::timing::{median_step, unit_of_step};
 use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
 use super::table::{Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table};
-use super::toml_file::{Between, Source};
+use super::toml_file::Source;
 use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
 use chrono::{DateTime, NaiveDateTime};
 use glam::DVec3;
@@ -18,6 +18,7 @@ use nav_sim_navigation::fusion::{LONGEST_GAP_S, Start, WheelSpeed, bridged};
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
 use nav_sim_navigation::strapdown::MAX_ROTATION;
 use nav_sim_signal::imu::ImuIncrement;
+use nav_sim_signal::units::Between;
 use nav_sim_signal::units::DEG;
 pub(crate) use nmea::is_nmea;
 use schemars::JsonSchema;
@@ -148,7 +149,7 @@ fn of_rows(
     let has = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
     let has_velocity = has(VELOCITY) || has(VELOCITY_SIGMA);
     let own = VELOCITY.into_iter().filter(|_| has_velocity);
-    table.require(["t_s"].into_iter().chain(PLACE).chain(own), &FIXES)?;
+    table.require(["t_s"].into_iter().chain(PLACE).chain(own))?;
     // what is missing in all of a position or velocity may be given for the whole file
     let is_unsaid = has_velocity && unsaid.is_none_or(|sigma| sigma.vel_m_s.is_none());
     let sigmas = [(PLACE_SIGMA, unsaid.is_none()), (VELOCITY_SIGMA, is_unsaid)];
@@ -156,9 +157,9 @@ fn of_rows(
         .into_iter()
         .filter(|(names, is_needed)| *is_needed || has(*names));
     // a receiver's log that has all but these
-    let found = table.require(sigmas.flat_map(|(names, _)| names), &FIXES);
+    let found = table.require(sigmas.flat_map(|(names, _)| names));
     found.map_err(|e| e.or_option(help::FIX_SIGMA))?;
-    let [time] = table.columns(["t_s"], &FIXES)?;
+    let [time] = table.columns(["t_s"])?;
     let groups = [PLACE, PLACE_SIGMA, VELOCITY, VELOCITY_SIGMA].map(|names| table.all(names));
     let fix = |row: usize| {
         let weeks = table.get("week").map_or(0.0, |week| week.si(row));
@@ -649,7 +650,7 @@ pub(crate) fn read_imu(
     let names = [
         "t_s", "accel.x", "accel.y", "accel.z", "gyro.x", "gyro.y", "gyro.z",
     ];
-    let [time, signals @ ..] = table.columns(names, &SAMPLES)?;
+    let [time, signals @ ..] = table.columns(names)?;
     let unit_s = |values| unit_of_step(median_step(values)).0;
     let unit_s = time.factor.unwrap_or_else(|| unit_s(&time.values));
     let from_gravity = gravity_factor(&table)?;
@@ -908,7 +909,7 @@ const SPEEDS: Dictionary<'_> = Dictionary::new(
 /// Whatever is wrong with it, with its line.
 pub(crate) fn read_wheel(path: &Path) -> Result<Vec<WheelSpeed>, Error> {
     let table = table::read(path, &SPEEDS)?;
-    let [time, speed] = table.columns(["t_s", "speed"], &SPEEDS)?;
+    let [time, speed] = table.columns(["t_s", "speed"])?;
     if speed.factor.is_none() {
         return Err(table.no_unit(speed));
     }

@@ -18,15 +18,14 @@
 //! [`ModelFile::missing`].
 
 use super::file_kind::FileKind;
-use super::toml_file::{Between, NonNegative, OneOrEach, Positive, Source, Stationary};
+use super::toml_file::{OneOrEach, Source};
 use super::{Failure, atomic, file_kind};
 use crate::report::readable;
 use nav_sim_calibration::duration;
 use nav_sim_navigation::sensors::defects::{MAX_BIAS_M_S2, MAX_BIAS_RAD_S};
 use nav_sim_signal::imu::{Axis, Channel, MAX_RATE_HZ, Sensor};
-use nav_sim_signal::noise::{
-    Composite, Kind, Law, Model, Parameter, Process, Spread, Variation,
-};
+use nav_sim_signal::noise::{Composite, Kind, Law, Model, Parameter, Process, Spread, Variation};
+use nav_sim_signal::units::{Between, NonNegative, Positive, Stationary};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde_json::{Map, json};
@@ -245,7 +244,10 @@ impl JsonSchema for ProcessTable {
                     }
                     _ => "a variance is never negative; 0 switches the process off",
                 };
-                if !matches!(parameter, Parameter::Theta | Parameter::Beta | Parameter::Slope) {
+                if !matches!(
+                    parameter,
+                    Parameter::Theta | Parameter::Beta | Parameter::Slope
+                ) {
                     schema.insert(HINT.to_owned(), hint.into());
                 }
                 let ends = json!({ "type": "array", "minItems": 2, "maxItems": 2 });
@@ -439,8 +441,12 @@ pub(super) fn parse(source: &Source) -> Result<ModelFile, Failure> {
         return Err(source.missing("", &Sensor::ALL.map(Sensor::name)));
     }
     file.turn_on = turn_on.map(|table| TurnOn {
-        accel_m_s2: table.accel_m_s2.map(|all| [0, 1, 2].map(|axis| all.of(axis))),
-        gyro_rad_s: table.gyro_rad_s.map(|all| [0, 1, 2].map(|axis| all.of(axis))),
+        accel_m_s2: table
+            .accel_m_s2
+            .map(|all| [0, 1, 2].map(|axis| all.of(axis))),
+        gyro_rad_s: table
+            .gyro_rad_s
+            .map(|all| [0, 1, 2].map(|axis| all.of(axis))),
     });
     if let Some(spread) = spread {
         let mut read = Spread::default();

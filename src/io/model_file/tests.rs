@@ -190,7 +190,10 @@ fn wrong_values_are_refused_with_line_key_and_value() {
         refusal("rate_hz = 0\n"),
         "m.toml, line 1: \"rate_hz\" = 0 is refused: it must be a finite number > 0 and ≤ 100000 | "
     );
-    assert!(refusal("rate_hz = 1e300\n").contains("\"rate_hz\" = 1e300 is refused: it must be a finite number > 0"));
+    assert!(
+        refusal("rate_hz = 1e300\n")
+            .contains("\"rate_hz\" = 1e300 is refused: it must be a finite number > 0")
+    );
     let twice = refusal("rate_hz = 1\nrate_hz = 2\n");
     assert_eq!(twice, "m.toml, line 2: duplicate key: \"rate_hz\" | ");
     assert_eq!(

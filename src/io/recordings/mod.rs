@@ -132,8 +132,7 @@ static QUANTITIES: [[Quantity; 3]; 8] = [
     gyro("gyro.z"),
 ];
 
-const SIX: &str =
-    "accel_x_m_s2 accel_y_m_s2 accel_z_m_s2 gyro_x_rad_s gyro_y_rad_s gyro_z_rad_s";
+const SIX: &str = "accel_x_m_s2 accel_y_m_s2 accel_z_m_s2 gyro_x_rad_s gyro_y_rad_s gyro_z_rad_s";
 const SEVEN: &str =
     "t_s accel_x_m_s2 accel_y_m_s2 accel_z_m_s2 gyro_x_rad_s gyro_y_rad_s gyro_z_rad_s";
 

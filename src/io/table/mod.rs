@@ -76,6 +76,8 @@ pub(crate) struct Table {
     lines: Vec<u64>,
     /// True if the text has no header.
     pub(crate) is_bare: bool,
+    /// Advice where columns are not found.
+    advice: &'static str,
     /// Notes on skipped and assumed parts.
     pub(crate) assumptions: Vec<String>,
     /// Warnings.
@@ -113,7 +115,7 @@ pub(crate) fn read(path: &Path, dictionary: &Dictionary<'_>) -> Result<Table, Fa
             .is_some_and(|e| e.eq_ignore_ascii_case(ending))
     };
     let name = path.display().to_string();
-    let of = |columns| of_columns(&name, columns, vec![], dictionary);
+    let of = |columns| of_columns(&name, columns, dictionary);
     let table = match logs::kind_of(path) {
         #[cfg(feature = "npz")]
         Some(LogKind::Npz) => {
@@ -210,6 +212,7 @@ impl Table {
         let mut table = Self {
             path: path.to_owned(),
             header_line,
+            advice: dictionary.advice,
             ..Self::default()
         };
         let unwanted = |quantity: &Quantity| dictionary.unwanted.is_some_and(|is| is(quantity));
@@ -443,7 +446,6 @@ impl Table {
     pub(crate) fn require<'a>(
         &self,
         needed: impl IntoIterator<Item = &'a str>,
-        dictionary: &Dictionary<'_>,
     ) -> Result<(), Failure> {
         let missing: Vec<&str> = needed.into_iter().filter(|q| !self.has(q)).collect();
         let slip = |name: &String| Some((name.clone(), nearest(name, missing.iter().copied())?));
@@ -457,7 +459,7 @@ impl Table {
             many => format!("columns {} are missing", many.join(", ")),
         };
         let refusal = self.refused(columns).passing_over(NO_COLUMN);
-        Err(refusal.or_hint(dictionary.advice))
+        Err(refusal.or_hint(self.advice))
     }
 
     /// Columns of quantities that are needed.
@@ -467,11 +469,9 @@ impl Table {
     pub(crate) fn columns<const N: usize>(
         &self,
         needed: [&str; N],
-        dictionary: &Dictionary<'_>,
     ) -> Result<[&Column; N], Failure> {
-        self.require(needed, dictionary)?;
-        self.all(needed)
-            .ok_or_else(|| self.refused(dictionary.advice))
+        self.require(needed)?;
+        self.all(needed).ok_or_else(|| self.refused(self.advice))
     }
 }
 
@@ -595,8 +595,16 @@ impl Head {
             let inside = text.trim_start_matches(['#', '%']).trim();
             let delimiter = delimiter_of(inside, dictionary);
             let cell = |cell: &Cow<'_, [u8]>| String::from_utf8_lossy(cell).trim().to_owned();
-            let mut cells: Vec<String> = split(inside.as_bytes(), delimiter).iter().map(cell).collect();
-            cells.truncate(cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |at| at + 1));
+            let mut cells: Vec<String> = split(inside.as_bytes(), delimiter)
+                .iter()
+                .map(cell)
+                .collect();
+            cells.truncate(
+                cells
+                    .iter()
+                    .rposition(|cell| !cell.is_empty())
+                    .map_or(0, |at| at + 1),
+            );
             let known = |cell: &&String| {
                 find(dictionary.quantities, cell).is_some_and(|(q, _)| q.rank.is_none())
             };
@@ -648,7 +656,9 @@ impl Head {
         while is_there {
             let line = lines.number;
             let cells = split(&lines.line, self.delimiter);
-            let first = cells.first().map_or(&[][..], |cell| cell.trim_ascii_start());
+            let first = cells
+                .first()
+                .map_or(&[][..], |cell| cell.trim_ascii_start());
             let is_empty = |cell: &Cow<'_, [u8]>| cell.trim_ascii().is_empty();
             if first.starts_with(b"#") || first.starts_with(b"%") {
                 let text = String::from_utf8_lossy(&lines.line);
@@ -700,7 +710,9 @@ impl Head {
 /// The header of so many columns.
 fn layout(headers: &[&str], columns: usize) -> Option<Vec<String>> {
     let names = headers.iter().map(|header| header.split(' '));
-    let found = names.into_iter().find(|names| names.clone().count() == columns)?;
+    let found = names
+        .into_iter()
+        .find(|names| names.clone().count() == columns)?;
     Some(found.map(str::to_owned).collect())
 }
 
@@ -740,8 +752,15 @@ fn split(line: &[u8], delimiter: u8) -> Vec<Cow<'_, [u8]>> {
     let line = &line[..line.iter().rposition(|b| !is_end(b)).map_or(0, |at| at + 1)];
     if line.contains(&b'"') {
         let mut reader = csv::ReaderBuilder::new();
-        let mut reader = reader.has_headers(false).delimiter(delimiter).from_reader(line);
-        let record = reader.byte_records().next().and_then(Result::ok).unwrap_or_default();
+        let mut reader = reader
+            .has_headers(false)
+            .delimiter(delimiter)
+            .from_reader(line);
+        let record = reader
+            .byte_records()
+            .next()
+            .and_then(Result::ok)
+            .unwrap_or_default();
         return record.iter().map(|cell| cell.to_vec().into()).collect();
     }
     let is_between = |b: &u8| *b == delimiter || delimiter == b' ' && *b == b'\t';
@@ -790,13 +809,8 @@ pub(super) fn number(cell: &[u8], delimiter: u8) -> Option<f64> {
 /// Columns by their names.
 type Columns = Vec<(String, Vec<f64>)>;
 
-/// The table of such columns; the rows stand in these lines, or are counted from 1.
-pub(crate) fn of_columns(
-    path: &str,
-    columns: Columns,
-    lines: Vec<u64>,
-    dictionary: &Dictionary<'_>,
-) -> Result<Table, Failure> {
+/// The table of such columns.
+fn of_columns(path: &str, columns: Columns, dictionary: &Dictionary<'_>) -> Result<Table, Failure> {
     let names: Vec<String> = match dictionary.names {
         Some(names) if names.len() != columns.len() => {
             return Err(Failure::row_length(path, 1, columns.len(), names.len()));
@@ -805,7 +819,6 @@ pub(crate) fn of_columns(
         None => columns.iter().map(|(name, _)| name.clone()).collect(),
     };
     let mut table = Table::new(path, 0, &names, dictionary, false)?;
-    table.lines = lines;
     table.fits(columns.first().map_or(0, |(_, values)| values.len() as u64))?;
     for column in 0..table.columns.len() {
         let (_, values) = &columns[table.columns[column].place];

@@ -26,10 +26,7 @@ pub(crate) const TIME: Units = &[
     ("ns nsec nanos nanoseconds", 1e-9),
 ];
 pub(crate) const ACCELERATION: Units = &[
-    (
-        "m_s2 m_s_2 m_s_s mps2 ms2 ms_2 m_sec2 m_sec_2",
-        1.0,
-    ),
+    ("m_s2 m_s_2 m_s_s mps2 ms2 ms_2 m_sec2 m_sec_2", 1.0),
     ("g", STANDARD_GRAVITY),
     ("mg", 1e-3 * STANDARD_GRAVITY),
     ("ug", 1e-6 * STANDARD_GRAVITY),

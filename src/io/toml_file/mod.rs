@@ -9,11 +9,10 @@ use super::table::shown;
 use super::{Failure, Place, source};
 use nav_sim_navigation::sensors::check_number;
 use nav_sim_signal::units::SettingError;
-use schemars::{JsonSchema, SchemaGenerator, json_schema, schema_for};
+use schemars::{JsonSchema, schema_for};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value as Schema;
-use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::ErrorKind;
 use std::iter::once;
@@ -277,7 +276,10 @@ impl<'a> Checker<'a> {
             Some("boolean") => "true or false",
             Some("array") => "a list",
             Some(_) => "a table",
-            None => self.kinds(schema).first().map_or("", |kind| self.expected(kind)),
+            None => self
+                .kinds(schema)
+                .first()
+                .map_or("", |kind| self.expected(kind)),
         }
     }
 
@@ -293,10 +295,15 @@ impl<'a> Checker<'a> {
         }
         let mut properties = kinds[0]["properties"].as_object().into_iter().flatten();
         if let Some((tag, _)) = properties.find(|(_, schema)| schema["const"].is_string()) {
-            let words = kinds.iter().map(|kind| kind["properties"][tag]["const"].as_str());
+            let words = kinds
+                .iter()
+                .map(|kind| kind["properties"][tag]["const"].as_str());
             let missing = || self.source.missing(path, &[tag]);
             let word = table.get(tag).ok_or_else(missing)?.as_str();
-            let found = kinds.iter().zip(words.clone()).find(|(_, own)| *own == word);
+            let found = kinds
+                .iter()
+                .zip(words.clone())
+                .find(|(_, own)| *own == word);
             let all: Vec<&str> = words.flatten().collect();
             let key = dotted(path, tag);
             let no_word = || self.source.no_word(&key, word.unwrap_or_default(), &all);
@@ -340,7 +347,9 @@ impl<'a> Checker<'a> {
         let listed: Vec<&str> = once(schema).chain(kinds.clone()).flat_map(words).collect();
         let kind = match value {
             _ if !listed.is_empty() => {
-                let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+                let text = value
+                    .as_str()
+                    .map_or_else(|| value.to_string(), str::to_owned);
                 return match listed.contains(&text.as_str()) {
                     true => Ok(vec![schema]),
                     false => Err(self.source.no_word(path, &text, &listed)),
@@ -392,11 +401,15 @@ impl<'a> Checker<'a> {
 
     fn check_table(&self, parts: &[&'a Schema], table: &Table, path: &str) -> Result<(), Failure> {
         let named = || {
-            let properties = parts.iter().filter_map(|part| part["properties"].as_object());
+            let properties = parts
+                .iter()
+                .filter_map(|part| part["properties"].as_object());
             properties.flatten()
         };
         let rest = ["additionalProperties", "unevaluatedProperties"];
-        let rest = rest.iter().flat_map(|name| parts.iter().filter_map(|part| part.get(*name)));
+        let rest = rest
+            .iter()
+            .flat_map(|name| parts.iter().filter_map(|part| part.get(*name)));
         let rest = rest.last();
         let schema = |key: &str| {
             let own = named().find(|(name, _)| *name == key);
@@ -420,46 +433,7 @@ impl<'a> Checker<'a> {
     }
 }
 
-// Numbers with bounds, and one value or a list of them.
-
-/// A number between two whole ones, or one of them unless it is open; `i64::MAX` is no end.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
-pub(crate) struct Between<const LOW: i64, const HIGH: i64, const OPEN: bool>(pub(crate) f64);
-
-/// A part of a whole.
-pub(crate) type Share = Between<0, 1, false>;
-pub(crate) type NonNegative = Between<0, { i64::MAX }, false>;
-pub(crate) type Positive = Between<0, { i64::MAX }, true>;
-/// Coefficients of a stationary AR(1), as [`Process::ar1`](nav_sim_signal::noise::Process::ar1) takes them.
-pub(crate) type Stationary = Between<-1, 1, true>;
-
-impl<const LOW: i64, const HIGH: i64, const OPEN: bool> From<Between<LOW, HIGH, OPEN>> for f64 {
-    fn from(value: Between<LOW, HIGH, OPEN>) -> Self {
-        value.0
-    }
-}
-
-impl<const LOW: i64, const HIGH: i64, const OPEN: bool> JsonSchema for Between<LOW, HIGH, OPEN> {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "Between".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> schemars::Schema {
-        let [least, most] = match OPEN {
-            true => ["exclusiveMinimum", "exclusiveMaximum"],
-            false => ["minimum", "maximum"],
-        };
-        let mut schema = json_schema!({ "type": "number", least: LOW });
-        if HIGH < i64::MAX {
-            schema.insert(most.to_owned(), HIGH.into());
-        }
-        schema
-    }
-}
+// One value or a list of them.
 
 /// One value for all, or a list with one for each.
 #[derive(Debug, Deserialize, JsonSchema)]

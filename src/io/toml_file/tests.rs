@@ -1,6 +1,7 @@
 //! What is refused, and where it is said to stand.
 
 use super::*;
+use nav_sim_signal::units::{Positive, Share};
 use serde::Deserialize;
 
 #[derive(Debug, Deserialize, JsonSchema)]

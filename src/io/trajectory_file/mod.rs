@@ -115,11 +115,7 @@ static QUANTITIES: [Quantity; 23] = [
     Quantity::angle("roll_deg", "roll").within((-180.0, 180.0, "is not a roll angle")),
     Quantity::angle("pitch_deg", "pitch").within((-90.0, 90.0, "is not a pitch angle")),
     // one that was unwrapped goes on below −180 and above 180: the same angle
-    Quantity::angle("yaw_deg", "yaw heading azimuth").within((
-        -360.0,
-        360.0,
-        "is not a heading",
-    )),
+    Quantity::angle("yaw_deg", "yaw heading azimuth").within((-360.0, 360.0, "is not a heading")),
     Quantity::speed("v_n_m_s", "v_n vn v_north").with_unit(),
     Quantity::speed("v_e_m_s", "v_e ve v_east").with_unit(),
     V_D,
@@ -147,7 +143,8 @@ const DICTIONARY: Dictionary<'_> = Dictionary {
 };
 /// A KF-GINS navigation result or truth: week, seconds of week, position, velocity, attitude, between blanks. Time is counted on
 /// from the first week.
-const KF_GINS: &str = "week t_s lat_deg lon_deg h_m v_n_m_s v_e_m_s v_d_m_s roll_deg pitch_deg yaw_deg";
+const KF_GINS: &str =
+    "week t_s lat_deg lon_deg h_m v_n_m_s v_e_m_s v_d_m_s roll_deg pitch_deg yaw_deg";
 /// A TUM file: time, position (m), quaternion, between blanks.
 const TUM: &str = "t_s x y z qx qy qz qw";
 
@@ -282,12 +279,12 @@ fn rows(
         .into_iter()
         .chain(position)
         .chain(optional.flatten());
-    table.require(needed, &DICTIONARY)?;
+    table.require(needed)?;
     check_units(&table)?;
     let left_out = table.keep_whole();
     let origin = is_local.then(|| origin(&table, options)).transpose()?;
-    let [time] = table.columns(["t_s"], &DICTIONARY)?;
-    let place = table.columns(position, &DICTIONARY)?;
+    let [time] = table.columns(["t_s"])?;
+    let place = table.columns(position)?;
     let (attitude, velocity) = (table.all(ATTITUDE), table.all(VELOCITY));
     let (quaternion, week) = (table.all(["qx", "qy", "qz", "qw"]), table.get("week"));
     let triad = |columns: [&Column; 3], row| columns.map(|column| column.si(row));

@@ -1,10 +1,11 @@
 //! Motion profiles in TOML.
 
 use crate::io::file_kind::FileKind;
-use crate::io::toml_file::{Between, Positive, Source};
+use crate::io::toml_file::Source;
 use crate::io::{Failure, file_kind};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::profile::{Bank, Kind, Profile, Segment, Start};
+use nav_sim_signal::units::{Between, Positive};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::Path;
@@ -66,7 +67,11 @@ pub(super) fn build(source: &Source) -> Result<Trajectory, Failure> {
         let path = match e.segment {
             Some(i) => {
                 let is_climb = matches!(profile.segments[i].kind, Kind::Climb { .. });
-                let key = if is_climb && key == "climb_m" { "height_m" } else { key };
+                let key = if is_climb && key == "climb_m" {
+                    "height_m"
+                } else {
+                    key
+                };
                 format!("segment[{}].{key}", i + 1)
             }
             None if key == "segment" => key.to_owned(),

@@ -18,9 +18,9 @@
 //! ```
 
 use super::{Trajectory, TrajectorySample};
+use crate::earth::MAX_LATITUDE_DEG;
 use crate::earth::{moved, radii};
 use crate::frames::{RollPitchYaw, wrap_angle};
-use crate::earth::MAX_LATITUDE_DEG;
 use crate::units::{DEG, NonNegative, Positive, STANDARD_GRAVITY};
 use glam::DVec3;
 use schemars::JsonSchema;
