@@ -298,6 +298,7 @@ fn expand(paths: &[PathBuf]) -> Result<Vec<(PathBuf, bool)>, Failure> {
                 let name = file_name(path);
                 !name.starts_with('.') && is_recording(&name)
             });
+            inside.sort_by_key(|path| natural(&file_name(path)));
             if inside.is_empty() {
                 return Err(no_files(path.display().to_string()));
             }
@@ -330,6 +331,19 @@ fn file_name(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
+/// Sort key: digits compare by value, so that `replicate_9` is before `replicate_10`.
+fn natural(name: &str) -> (String, String) {
+    let is_digit = |text: &[u8]| text[0].is_ascii_digit();
+    let parts = name
+        .as_bytes()
+        .chunk_by(|a, b| is_digit(&[*a]) == is_digit(&[*b]));
+    let padded = parts.map(|part| match String::from_utf8_lossy(part) {
+        number if is_digit(part) => format!("{number:0>20}"),
+        word => word.into_owned(),
+    });
+    (padded.collect(), name.to_owned())
+}
+
 /// Whether a name ends like a recording's.
 fn is_recording(name: &str) -> bool {
     let lower = name.to_lowercase();
@@ -342,6 +356,16 @@ fn is_recording(name: &str) -> bool {
 #[cfg(test)]
 mod listing_tests {
     use super::*;
+
+    #[test]
+    fn name_order_counts() {
+        let mut names = ["run10.csv", "run9.csv", "a.csv", "run1.csv", "run01.csv"];
+        names.sort_by_key(|n| natural(n));
+        assert_eq!(
+            names,
+            ["a.csv", "run01.csv", "run1.csv", "run9.csv", "run10.csv"]
+        );
+    }
 
     #[test]
     fn endings() {

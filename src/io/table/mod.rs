@@ -503,15 +503,26 @@ struct Lines<'a> {
 }
 
 impl Lines<'_> {
-    /// Reads a line; false at the end.
-    fn next(&mut self) -> Result<bool, Failure> {
-        self.line.clear();
+    /// Appends a line to the last one; false at the end.
+    fn more(&mut self) -> Result<bool, Failure> {
         let mut reader = self.reader.by_ref().take(LONGEST);
         let read = reader.read_until(b'\n', &mut self.line);
         let count = read.map_err(|e| unreadable(Path::new(self.path), e))?;
         self.number += 1;
         self.bytes += count as u64;
         Ok(count > 0)
+    }
+
+    /// Reads a line; false at the end.
+    fn next(&mut self) -> Result<bool, Failure> {
+        self.line.clear();
+        self.more()
+    }
+
+    /// True if a quote is open at the end of the line.
+    fn is_open(&self) -> bool {
+        let quotes = self.line.iter().filter(|b| **b == b'"').count();
+        quotes % 2 > 0 && !self.line.starts_with(b"#")
     }
 }
 
@@ -655,6 +666,7 @@ impl Head {
         let mut is_there = self.has_row || lines.next()?;
         while is_there {
             let line = lines.number;
+            while lines.is_open() && lines.line.len() < LONGEST as usize && lines.more()? {}
             let cells = split(&lines.line, self.delimiter);
             let first = cells
                 .first()
@@ -671,7 +683,7 @@ impl Head {
                 table.assumptions.push(text);
             } else if cells.len() < expected || !cells[expected..].iter().all(is_empty) {
                 let found = cells.len();
-                if lines.line.iter().filter(|b| **b == b'"').count() % 2 > 0 {
+                if lines.is_open() {
                     return Err(Failure::contents(path, line, "a quote is not closed")
                         .or_hint("close it, or remove it"));
                 }

@@ -286,7 +286,7 @@ impl<'a> Checker<'a> {
     /// The kind of a table, told by the word or the key that it has and others have not.
     fn kind_of_table(
         &self,
-        kinds: &[&'a Schema],
+        (schema, kinds): (&Schema, &[&'a Schema]),
         table: &Table,
         path: &str,
     ) -> Result<&'a Schema, Failure> {
@@ -314,7 +314,15 @@ impl<'a> Checker<'a> {
         match (given.next(), given.next()) {
             (None, _) => {
                 let keys: Vec<&str> = kinds.iter().filter_map(|kind| key_of(kind)).collect();
-                Err(self.source.missing(path, &keys))
+                let is_slip = |key: &&String| {
+                    schema["properties"][*key].is_null() && nearest(key, keys.clone()).is_some()
+                };
+                Err(match table.keys().find(is_slip) {
+                    Some(key) => self
+                        .source
+                        .unknown(&dotted(path, key), keys.iter().copied()),
+                    None => self.source.missing(path, &keys),
+                })
             }
             (Some(only), None) => Ok(only),
             (Some(first), Some(second)) => {
@@ -356,7 +364,7 @@ impl<'a> Checker<'a> {
                 };
             }
             Value::Table(table) if !kinds.is_empty() => {
-                Some(self.kind_of_table(&kinds, table, path)?)
+                Some(self.kind_of_table((schema, &kinds), table, path)?)
             }
             _ => kinds.first().copied(),
         };
