@@ -2,7 +2,7 @@
 
 use crate::app::{Answer, Asked, Command, Context, Failure, Out, OutputFile, Result, inputs};
 use crate::io::scenario_file;
-use crate::io::trajectory_file::{self, Instants, Options, parse_origin};
+use crate::io::trajectory_file::{self, Options, parse_origin};
 use crate::parse;
 use crate::report::{gnss_csv, imu_csv, initial_toml};
 use nav_sim_document::{Document, Table, Tone};
@@ -131,13 +131,12 @@ impl Command for Convert {
 
     fn run(&self, context: &Context<'_>) -> Result<TrajectoryTable> {
         let (trajectory, _) = self.source.read(context)?;
-        let rows = self.rate_hz.map_or(Instants::Knots, Instants::Rate);
         Ok(TrajectoryTable {
             schema_version: 1,
             start_s: trajectory.start_s(),
             end_s: trajectory.end_s(),
-            rows: rows.times(&trajectory).len(),
-            text: trajectory_file::csv(&trajectory, rows),
+            rows: trajectory_file::instants(&trajectory, self.rate_hz).len(),
+            text: trajectory_file::csv(&trajectory, self.rate_hz),
         })
     }
 }
@@ -381,7 +380,7 @@ impl Command for Record {
             texts: [
                 imu_csv(&recording.imu),
                 gnss_csv(&recording.gnss),
-                trajectory_file::csv(&trajectory, Instants::Rate(10.0)),
+                trajectory_file::csv(&trajectory, Some(10.0)),
                 initial_toml(trajectory.start_s(), &recording.start, &scenario.initial),
             ],
         })

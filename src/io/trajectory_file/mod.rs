@@ -901,26 +901,14 @@ mod gpx_tests {
 
 // Trajectories as CSV.
 
-/// Which instants become rows.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Instants {
-    /// Evenly spaced ones, from the start (Hz).
-    Rate(f64),
-    /// Those the trajectory was made from.
-    Knots,
-}
-
-impl Instants {
-    pub(crate) fn times(self, trajectory: &Trajectory) -> Vec<f64> {
-        match self {
-            Self::Knots => trajectory.knots().to_vec(),
-            Self::Rate(rate_hz) => {
-                let start_s = trajectory.start_s();
-                let steps = ((trajectory.end_s() - start_s) * rate_hz + 1e-6).floor() as u64;
-                (0..=steps).map(|k| start_s + k as f64 / rate_hz).collect()
-            }
-        }
-    }
+/// Instants of a trajectory: evenly spaced ones from the start (Hz), or those that it was made from.
+pub(crate) fn instants(trajectory: &Trajectory, rate_hz: Option<f64>) -> Vec<f64> {
+    let Some(rate_hz) = rate_hz else {
+        return trajectory.knots().to_vec();
+    };
+    let start_s = trajectory.start_s();
+    let steps = ((trajectory.end_s() - start_s) * rate_hz + 1e-6).floor() as u64;
+    (0..=steps).map(|k| start_s + k as f64 / rate_hz).collect()
 }
 
 /// The header of a trajectory as CSV.
@@ -929,9 +917,9 @@ pub(crate) const HEADER: &str =
 
 /// A trajectory as CSV. Positions are written with the digits that read back to them, since accelerations are their second
 /// differences; times to the nanosecond, velocities to 1e-9 m/s, angles to 1e-12 degrees.
-pub(crate) fn csv(trajectory: &Trajectory, rows: Instants) -> String {
+pub(crate) fn csv(trajectory: &Trajectory, rate_hz: Option<f64>) -> String {
     let mut text = HEADER.to_owned();
-    for t_s in rows.times(trajectory) {
+    for t_s in instants(trajectory, rate_hz) {
         let state = trajectory.state(t_s);
         let (v, rpy) = (state.v_n, RollPitchYaw::from_quat(state.q_b_n));
         let [v_n, v_e, v_d] = v.to_array().map(|v| tidy(v, 9));

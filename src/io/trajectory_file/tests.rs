@@ -343,7 +343,7 @@ fn what_is_written_reads_back_the_same() {
     let (t, _) = read(&drive(None)).unwrap();
     {
         let path = dir.path().join("t.csv");
-        std::fs::write(&path, csv(&t, Instants::Rate(10.0))).unwrap();
+        std::fs::write(&path, csv(&t, Some(10.0))).unwrap();
         let (back, warnings) = load(&path, &Options::default()).unwrap();
         assert!(warnings.is_empty(), "{warnings:?}");
         assert_eq!((back.knots().len(), back.end_s()), (96, 9.5));
@@ -355,7 +355,7 @@ fn what_is_written_reads_back_the_same() {
         );
     }
     let path = dir.path().join("knots.csv");
-    std::fs::write(&path, csv(&t, Instants::Knots)).unwrap();
+    std::fs::write(&path, csv(&t, None)).unwrap();
     assert_eq!(
         load(&path, &Options::default()).unwrap().0.knots(),
         t.knots()
