@@ -450,20 +450,23 @@ fn rtklib(
         return Err(refuse(at, "times that are not GPST", advice));
     }
     // the time, which takes two columns, in one
-    let mut whole = String::new();
+    let (mut whole, mut count) = (String::new(), 0);
     for (i, line) in text.lines().enumerate() {
         let cells = line.split([' ', ',', '\t', '%']);
         let cells: Vec<&str> = cells.filter(|cell| !cell.is_empty()).collect();
         let is_row = !(line.starts_with('%') || cells.is_empty());
         match cells[..] {
-            [_, ref names @ ..] if i == at => whole += &format!("t_s {}", names.join(" ")),
+            [_, ref names @ ..] if i == at => {
+                count = names.len();
+                whole += &format!("t_s {}", names.join(" "));
+            }
             [first, second, ref rest @ ..] if is_row => {
                 let t_s = gps_time_s(first, second).ok_or_else(|| {
                     let message = "not a row of time, position, quality, satellites and standard deviations";
                     let advice = "2021/03/01 00:00:01.000 (or 2147 86401.000), latitude, longitude, height, Q, ns, sdn, sde, sdu";
                     refuse(i, message, advice)
                 })?;
-                whole += &format!("{t_s} {}", rest.join(" "));
+                whole += &format!("{t_s} {}", rest[..count.min(rest.len())].join(" "));
             }
             _ => {}
         }
@@ -868,7 +871,7 @@ mod initial_tests {
             ),
             (
                 "t_s = 0",
-                "pos_sigma_m = [1, 1, -1]",
+                "pos_sigma_m = [1, 1, 1]",
                 "i.toml, line 1: \"t_s\" is missing | add t_s",
             ),
             (

@@ -429,15 +429,17 @@ impl<'a> Checker<'a> {
                 return Err(self.source.unknown(&dotted(path, key), legal));
             }
         }
+        for (key, value) in table {
+            if let Some(schema) = schema(key) {
+                self.check(schema, value, &dotted(path, key))?;
+            }
+        }
         let required = parts.iter().filter_map(|part| part["required"].as_array());
         let mut required = required.flatten().filter_map(Schema::as_str);
-        if let Some(key) = required.find(|key| !table.contains_key(*key)) {
-            return Err(self.source.missing(path, &[key]));
+        match required.find(|key| !table.contains_key(*key)) {
+            Some(key) => Err(self.source.missing(path, &[key])),
+            None => Ok(()),
         }
-        table.iter().try_for_each(|(key, value)| {
-            let check = |schema| self.check(schema, value, &dotted(path, key));
-            schema(key).map_or(Ok(()), check)
-        })
     }
 }
 
