@@ -1,8 +1,8 @@
 //! Containers of messages in chunks, as MCAP and the bags of ROS 1 are.
 
-use crate::channel::{Channel, Content, Each, Fix, ImuSample, NS, Sample, Stamp, stated};
+use crate::channel::{Content, Fix, ImuSample, NS, Sample, Scan, Stamp, stated};
 use crate::input::{Bytes, Error, Fault, Input, text};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::io;
 use std::io::Read;
 
@@ -65,18 +65,32 @@ fn walk(
     Ok(())
 }
 
-/// Finds the channels of a container.
-pub(crate) fn survey(
-    input: &mut Input,
-    channels: &mut BTreeMap<u32, Channel>,
-) -> Result<(), Error> {
+/// Largest message that is read (bytes): an IMU's has 400.
+const LARGEST_MESSAGE: u64 = 1 << 20;
+
+/// Finds and counts the channels of a container, or reads the messages of one, which may stand out of order in the file.
+pub(crate) fn scan(input: &mut Input, scan: &mut Scan<'_>) -> Result<(), Error> {
+    let mut found = Vec::new();
+    let channels = &mut scan.channels;
     let outcome = walk(input, &mut |record, input| {
-        match record {
-            Record::Message(head) => {
+        match (record, scan.wanted) {
+            (Record::Message(head), Some((channel, stamp))) if head.channel == channel.id => {
+                let message = Message {
+                    log_ns: (stamp == Stamp::Log).then_some(head.log_ns),
+                    offset: input.offset(),
+                    data: input.bytes(head.size, LARGEST_MESSAGE)?,
+                };
+                let sample = match channel.content {
+                    Content::Imu => imu(&channel.encoding, &message).map(Some)?,
+                    _ => fix(&channel.encoding, &message)?,
+                };
+                found.extend(sample.map(|sample| (head.log_ns, message.offset, sample)));
+            }
+            (Record::Message(head), _) => {
                 input.skip(head.size)?;
                 channels.entry(head.channel).or_default().count(head.log_ns);
             }
-            Record::Channel(id, [topic, type_name, encoding]) => {
+            (Record::Channel(id, [topic, type_name, encoding]), _) => {
                 let channel = channels.entry(id).or_default();
                 if channel.topic.is_empty() {
                     channel.content = match type_name.as_str() {
@@ -88,7 +102,7 @@ pub(crate) fn survey(
                     channel.encoding = encoding;
                 }
             }
-            Record::Chunk(_) | Record::Other => {}
+            _ => {}
         }
         Ok(())
     });
@@ -96,6 +110,11 @@ pub(crate) fn survey(
         channel.id = *id;
         !channel.topic.is_empty()
     });
+    found.sort_by_key(|(log_ns, ..)| *log_ns);
+    let found = found
+        .into_iter()
+        .map(|(_, offset, sample)| (offset, sample));
+    scan.samples.extend(found);
     outcome
 }
 
@@ -163,43 +182,6 @@ impl Chunk {
 }
 
 // Logs of ROS: topics of a container.
-
-/// Largest message that is read (bytes): an IMU's has 400.
-const LARGEST_MESSAGE: u64 = 1 << 20;
-
-/// Reads the messages of a topic, which may stand out of order in the file.
-pub(crate) fn read(
-    input: &mut Input,
-    channel: &Channel,
-    stamp: Stamp,
-    each: Each<'_>,
-) -> Result<(), Error> {
-    let mut found = Vec::new();
-    let outcome = walk(input, &mut |record, input| {
-        let Record::Message(head) = record else {
-            return Ok(());
-        };
-        if head.channel != channel.id {
-            return input.skip(head.size);
-        }
-        let message = Message {
-            log_ns: (stamp == Stamp::Log).then_some(head.log_ns),
-            offset: input.offset(),
-            data: input.bytes(head.size, LARGEST_MESSAGE)?,
-        };
-        let sample = match channel.content {
-            Content::Imu => imu(&channel.encoding, &message).map(Some)?,
-            _ => fix(&channel.encoding, &message)?,
-        };
-        found.extend(sample.map(|sample| (head.log_ns, message.offset, sample)));
-        Ok(())
-    });
-    found.sort_by_key(|(log_ns, ..)| *log_ns);
-    for (_, offset, sample) in found {
-        each(offset, sample)?;
-    }
-    outcome
-}
 
 /// Message of a channel.
 struct Message {
