@@ -11,7 +11,7 @@ pub(crate) fn drift(recordings: &Path, drive: &Path) -> Result<f64, Box<dyn std:
     };
     let model =
         calibrate(&[recordings.to_owned()], &options, &Context::default())?.model(Estimator::DrAwv);
-    let (trajectory, _) = load_trajectory(drive, &TrajectoryOptions::default())?;
+    let (trajectory, _) = load_trajectory(drive, None)?;
     let inputs = NavigateInputs::new(trajectory, model, TrueImu::AsBelieved);
     let mut scenario = Scenario::default();
     scenario.run.runs = 16;

@@ -2,7 +2,7 @@
 
 use crate::app::{Answer, Asked, Command, Context, Failure, Out, OutputFile, Result, inputs};
 use crate::io::scenario_file;
-use crate::io::trajectory_file::{self, Options, parse_origin};
+use crate::io::trajectory_file::{self, parse_origin};
 use crate::parse;
 use crate::report::{gnss_csv, imu_csv, initial_toml};
 use nav_sim_document::{Document, Table, Tone};
@@ -82,7 +82,7 @@ impl Source {
     /// Reads it, and warns of what is doubtful about it.
     fn read(&self, context: &Context<'_>) -> Result<(Trajectory, Vec<String>)> {
         let origin = self.origin.map(|o| o.0);
-        let read = trajectory_file::load(&self.path, &Options { origin })?;
+        let read = trajectory_file::load(&self.path, origin)?;
         context.warn_each(&read.1);
         Ok(read)
     }

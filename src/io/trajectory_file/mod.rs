@@ -23,14 +23,6 @@ use std::path::Path;
 
 mod profile;
 
-/// How to read a trajectory file.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Options {
-    /// Where local coordinates begin: latitude, longitude (rad), height (m). Without it: the file's own
-    /// `# origin:` line.
-    pub origin: Option<[f64; 3]>,
-}
-
 const KNOWN: &str =
     ".toml (motion profile), .csv, .tsv, .txt, .nav (KF-GINS), .tum or .gpx (also .gz)";
 
@@ -43,8 +35,8 @@ const KNOWN: &str =
 ///
 /// # Errors
 /// Whatever is wrong with the file, with its line.
-pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<String>), Failure> {
-    match read(path, options, false)? {
+pub fn load(path: &Path, origin: Option<[f64; 3]>) -> Result<(Trajectory, Vec<String>), Failure> {
+    match read(path, origin, false)? {
         None => Ok((profile::load(path)?, Vec::new())),
         Some(rows) => rows.trajectory(),
     }
@@ -56,18 +48,15 @@ pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<String>),
 ///
 /// # Errors
 /// What cannot be read at all, with its line; rows of which no stretch is usable.
-pub(crate) fn load_reference(
-    path: &Path,
-    options: &Options,
-) -> Result<(Reference, Vec<String>), Failure> {
-    match read(path, options, true)? {
+pub(crate) fn load_reference(path: &Path) -> Result<(Reference, Vec<String>), Failure> {
+    match read(path, None, true)? {
         None => Ok((profile::load(path)?.into(), Vec::new())),
         Some(rows) => rows.reference(),
     }
 }
 
 /// The rows of a file; none of a motion profile.
-fn read(path: &Path, options: &Options, is_partial: bool) -> Result<Option<Rows>, Failure> {
+fn read(path: &Path, origin: Option<[f64; 3]>, is_partial: bool) -> Result<Option<Rows>, Failure> {
     let name = path.display().to_string();
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
@@ -76,7 +65,7 @@ fn read(path: &Path, options: &Options, is_partial: bool) -> Result<Option<Rows>
         "gpx" => gpx(&name, &source::table_text(path)?).map(Some),
         ending @ ("nav" | "tum" | "csv" | "tsv" | "txt") => {
             let text = source::table_text(path)?;
-            rows(&name, &text, ending, options, is_partial).map(Some)
+            rows(&name, &text, ending, origin, is_partial).map(Some)
         }
         _ => {
             let message = format!("a trajectory file ends in {KNOWN}");
@@ -253,7 +242,7 @@ fn rows(
     path: &str,
     text: &str,
     ending: &str,
-    options: &Options,
+    origin: Option<[f64; 3]>,
     is_partial: bool,
 ) -> Result<Rows, Error> {
     let dictionary = Dictionary {
@@ -282,7 +271,7 @@ fn rows(
     table.require(needed)?;
     check_units(&table)?;
     let left_out = table.keep_whole();
-    let origin = is_local.then(|| origin(&table, options)).transpose()?;
+    let origin = is_local.then(|| local_origin(&table, origin)).transpose()?;
     let [time] = table.columns(["t_s"])?;
     let place = table.columns(position)?;
     let (attitude, velocity) = (table.all(ATTITUDE), table.all(VELOCITY));
@@ -382,9 +371,9 @@ fn local(t_s: f64, [lat0, lon0, h0]: [f64; 3], r_n0: DVec3, q_b_n0: DQuat) -> Tr
     }
 }
 
-/// The origin of local coordinates: the option, or the file's `# origin: lat, lon, h` line.
-fn origin(table: &Table, options: &Options) -> Result<[f64; 3], Error> {
-    if let Some(origin) = options.origin {
+/// The origin of local coordinates: the one given, or the file's `# origin: lat, lon, h` line.
+fn local_origin(table: &Table, given: Option<[f64; 3]>) -> Result<[f64; 3], Error> {
+    if let Some(origin) = given {
         return Ok(origin);
     }
     let line = table.comments.iter().find_map(|c| c.strip_prefix("origin"));
@@ -643,11 +632,11 @@ mod import_tests {
     type Loaded = Result<(Trajectory, Vec<String>), Error>;
 
     fn nav(text: &str) -> Loaded {
-        rows("truth.nav", text, "nav", &Options::default(), false)?.trajectory()
+        rows("truth.nav", text, "nav", None, false)?.trajectory()
     }
 
-    fn tum(path: &str, text: &str, options: &Options) -> Loaded {
-        rows(path, text, "tum", options, false)?.trajectory()
+    fn tum(path: &str, text: &str, origin: Option<[f64; 3]>) -> Loaded {
+        rows(path, text, "tum", origin, false)?.trajectory()
     }
 
     #[test]
@@ -684,10 +673,8 @@ mod import_tests {
         let text: String = (0..6)
             .map(|k| format!("{k}.5 {} 0 0 0 0 0 1\n", 3 * k))
             .collect();
-        let options = Options {
-            origin: Some([0.8, 0.1, 50.0]),
-        };
-        let (t, warnings) = tum("a.tum", &text, &options).unwrap();
+        let options = Some([0.8, 0.1, 50.0]);
+        let (t, warnings) = tum("a.tum", &text, options).unwrap();
         assert!(warnings[0].contains("ROS"));
         let state = t.state(2.0);
         let rpy = RollPitchYaw::from_quat(state.q_b_n);
@@ -700,12 +687,12 @@ mod import_tests {
             (rpy.yaw - 0.5 * PI).abs() < 1e-5 && rpy.roll.abs() < 1e-5 && rpy.pitch.abs() < 1e-5,
             "{rpy:?}"
         );
-        let e = tum("a.tum", &text, &Options::default()).unwrap_err();
+        let e = tum("a.tum", &text, None).unwrap_err();
         assert!(
             e.to_string().contains("needs an origin on the Earth"),
             "{e}"
         );
-        let e = tum("a.tum", "0 0 0 0 0 0 0 2\n", &options)
+        let e = tum("a.tum", "0 0 0 0 0 0 0 2\n", options)
             .unwrap_err()
             .to_string();
         assert_eq!(
@@ -812,7 +799,7 @@ mod gpx_tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.gpx");
         std::fs::write(&path, format!("\u{feff}{}", track())).unwrap();
-        let (t, _) = super::load(&path, &Options::default()).unwrap();
+        let (t, _) = super::load(&path, None).unwrap();
         assert_eq!((t.start_s(), t.end_s()), (0.0, 8.0));
     }
 
