@@ -293,7 +293,7 @@ fn expand(paths: &[PathBuf]) -> Result<Vec<(PathBuf, bool)>, Failure> {
     for path in paths {
         let io = |e| unreadable(path, e);
         if std::fs::metadata(path).map_err(io)?.is_dir() && !is_oxts(path) {
-            let mut inside = listed(&[path.clone()])?;
+            let mut inside = listed(std::slice::from_ref(path))?;
             inside.retain(|path| {
                 let name = file_name(path);
                 !name.starts_with('.') && is_recording(&name)
