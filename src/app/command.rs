@@ -633,7 +633,7 @@ impl<C: Command> Asked<C> {
                 let before = std::fs::read_to_string(out.join(MANIFEST)).unwrap_or_default();
                 let before = serde_json::from_str::<Manifest>(&before).ok();
                 let mut directory = AtomicDir::create(out)?;
-                let give = |file: OutputFile<'_>| directory.write_parts(&file.name, file.parts);
+                let give = |file: OutputFile<'_>| directory.write(&file.name, file.parts);
                 let page = C::PAGE.then_some(document);
                 each_file(answer, page, &mut manifest, context, give)?;
                 directory.commit()?;

@@ -21,7 +21,7 @@ use std::str::FromStr;
 
 /// A trajectory; where no vehicle moves so.
 pub(crate) fn trajectory(path: &Path, context: &Context<'_>) -> Result<Trajectory> {
-    let (trajectory, warnings) = trajectory_file::load(path, &trajectory_file::Options::default())?;
+    let (trajectory, warnings) = trajectory_file::load(path, None)?;
     context.warn_each(&warnings);
     let (_, beyond) = examine(&trajectory, &LIMITS);
     let farthest = |e: &&Excess| e.worst / e.limit;

@@ -2,7 +2,7 @@
 
 use crate::app::inputs::ScenarioArgs;
 use crate::app::{Asked, Command, Context, Failure, Out, PlainAnswer, Result, inputs};
-use crate::io::trajectory_file::{self, Instants, Options, parse_origin};
+use crate::io::trajectory_file::{self, parse_origin};
 use crate::parse;
 use crate::report::{gnss_csv, imu_csv, initial_toml};
 use nav_sim_document::{Document, Table, Tone};
@@ -76,8 +76,7 @@ fn origin(text: &str) -> Result<[f64; 3], String> {
 impl Source {
     /// Reads it, and warns of what is doubtful about it.
     fn read(&self, context: &Context<'_>) -> Result<(Trajectory, Vec<String>)> {
-        let origin = self.origin;
-        let read = trajectory_file::load(&self.path, &Options { origin })?;
+        let read = trajectory_file::load(&self.path, self.origin)?;
         context.warn_each(&read.1);
         Ok(read)
     }
@@ -105,8 +104,7 @@ impl Command for Convert {
 
     fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let (trajectory, _) = self.source.read(context)?;
-        let rows = self.rate_hz.map_or(Instants::Knots, Instants::Rate);
-        let count = rows.times(&trajectory).len();
+        let count = trajectory_file::instants(&trajectory, self.rate_hz).len();
         let json = json!({
             "schema_version": 1,
             "start_s": trajectory.start_s(),
@@ -114,7 +112,7 @@ impl Command for Convert {
             "rows": count,
         });
         let document = Document::new("Trajectory", Tone::Good, [format!("{count} rows")]);
-        let text = trajectory_file::csv(&trajectory, rows);
+        let text = trajectory_file::csv(&trajectory, self.rate_hz);
         Ok(PlainAnswer::new(json, document).with([("", text)]))
     }
 }
@@ -315,7 +313,7 @@ impl Command for Record {
         let texts = [
             imu_csv(&recording.imu),
             gnss_csv(&recording.gnss),
-            trajectory_file::csv(&trajectory, Instants::Rate(10.0)),
+            trajectory_file::csv(&trajectory, Some(10.0)),
             initial_toml(trajectory.start_s(), &recording.start, &scenario.initial),
         ];
         let json = json!({ "schema_version": 1, "files": RECORDED });

@@ -49,16 +49,16 @@ fn parse(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
 
 /// Columns of a curve.
 static QUANTITIES: [Quantity; 3] = [
-    Quantity::number("tau_samples", &["tau_samples"]),
-    Quantity::number("wv", &["wv"]),
-    Quantity::number("edof", &["edof"]),
+    Quantity::number("tau_samples", "tau_samples"),
+    Quantity::number("wv", "wv"),
+    Quantity::number("edof", "edof"),
 ];
 const DICTIONARY: Dictionary<'_> = Dictionary::new(&QUANTITIES, "the first line names them");
 
 fn csv(path: &str, text: &str) -> Result<NamedCurve, Failure> {
     let table = parse_table(path, text, &DICTIONARY)?;
     let names = QUANTITIES.each_ref().map(|quantity| quantity.name);
-    let columns = table.columns(names, &DICTIONARY)?;
+    let columns = table.columns(names)?;
     let mut curve = Curve::default();
     for row in 0..table.rows() {
         push(&mut curve, columns.map(|column| column.si(row)))

@@ -229,7 +229,7 @@ impl StudyAnswer {
                 .into_iter()
                 .zip([csv(&self.rows), json(self), self.document().html()])
         {
-            files.write(name, text)?;
+            files.write(name, [text])?;
         }
         files.commit()
     }

@@ -8,7 +8,7 @@ use crate::app::{
 use crate::commands::run::reduction_of;
 use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
 use crate::io::model_file::ModelFile;
-use crate::io::trajectory_file::{self, load_reference};
+use crate::io::trajectory_file::load_reference;
 use crate::parse::{numbers, pair, positive};
 use crate::report::json;
 use glam::{DMat3, DQuat, DVec3};
@@ -455,9 +455,8 @@ impl<'a> Drive<'a> {
         }
         inputs::expect_turn_on(&mut expected, model.turn_on, &request.model, context);
         expected.validate().refuse()?;
-        let options = trajectory_file::Options::default();
         let reference = request.reference.as_deref().map(|path| {
-            let (reference, warnings) = load_reference(path, &options)?;
+            let (reference, warnings) = load_reference(path)?;
             context.warn_each(&warnings);
             Ok::<_, Failure>(reference)
         });

@@ -74,7 +74,11 @@ fn check(
     }
 }
 
-fn check_number(schema: &Schema, number: f64, key: &str) -> Result<(), SettingError> {
+/// Checks a number against the bounds that its schema states.
+///
+/// # Errors
+/// The key whose value is refused.
+pub fn check_number(schema: &Schema, number: f64, key: &str) -> Result<(), SettingError> {
     let mut is_within = number.is_finite();
     let mut words = Vec::new();
     let bounds = [

@@ -58,8 +58,7 @@ const LARGEST_SD: f64 = 10.0;
 
 /// A distribution, as in model files.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase", deny_unknown_fields)]
-#[schemars(tag = "distribution", !deny_unknown_fields)]
+#[serde(rename_all = "lowercase", tag = "distribution")]
 pub enum Law {
     /// low + width × a beta law
     Beta {
