@@ -102,7 +102,10 @@ pub fn check_number(schema: &Schema, number: f64, key: &str) -> Result<(), Setti
         return Ok(());
     }
     let bounds = words.join(" and ");
-    let mut requirement = format!("it must be a finite number {bounds}");
+    let mut requirement = match (schema["minimum"].as_f64(), schema["maximum"].as_f64()) {
+        (Some(only), Some(most)) if only == most => format!("it must be {only}"),
+        _ => format!("it must be a finite number {bounds}"),
+    };
     requirement.truncate(requirement.trim_end().len());
     let slips = [
         ("_m_s2", "mg or g named m/s²?"),
