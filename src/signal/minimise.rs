@@ -105,9 +105,9 @@ where
             self.descent.damping *= MORE;
         };
         let enough = (self.descent.enough)(before);
-        // No gain at all where it is not a number.
-        let mut is_last = !(expected > enough) || step.iter().all(|s| s.abs() < SMALL_STEP);
-        if !is_last {
+        // A gain that is not a number is none.
+        let mut goes_on = expected > enough && step.iter().any(|s| s.abs() >= SMALL_STEP);
+        if goes_on {
             let there: Vec<f64> = self.at.iter().zip(&step).map(|(x, s)| x + s).collect();
             let next = problem.problem("evaluations", |evaluate| Ok(evaluate(&there)))?;
             let gain = before - (self.cost)(&next);
@@ -116,15 +116,15 @@ where
             }
             if gain > 0.1 * expected {
                 (self.at, self.value) = (there, next);
-                is_last = gain < enough;
+                goes_on = gain >= enough;
             } else {
                 self.descent.damping *= MORE;
                 self.model = Some(model);
             }
         }
-        let state = match is_last {
-            true => state.terminate_with(TerminationReason::SolverConverged),
-            false => state,
+        let state = match goes_on {
+            true => state,
+            false => state.terminate_with(TerminationReason::SolverConverged),
         };
         Ok((state, None))
     }

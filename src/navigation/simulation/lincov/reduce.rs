@@ -157,7 +157,7 @@ impl Search<'_> {
         };
         let value = |free: &[f64]| self.value(&factors(free));
         let start: Vec<f64> = self.free.iter().map(|i| START[*i]).collect();
-        let found = minimum(&value, &start, (-MAX_LN, MAX_LN), |_| ENOUGH);
+        let found = minimum(value, &start, (-MAX_LN, MAX_LN), |_| ENOUGH);
         if found.value.cost.is_finite() {
             factors(&found.at)
         } else {

@@ -121,7 +121,7 @@ impl Task<'_> {
             let value = self.value(&set(factors, ln), &track, draw_factors);
             value.with_ridge(RIDGE, ln)
         };
-        let minimum = |start: &[f64]| minimum(&value, start, (0.0, MAX_LN), |_| ENOUGH);
+        let minimum = |start: &[f64]| minimum(value, start, (0.0, MAX_LN), |_| ENOUGH);
         // From the model as it is, which keeps factors small; and from one factor on all that makes it consistent, since between
         // the two the valley may be flat. The second counts where it is better by what can be seen.
         let unchanged = vec![0.0; factors.len()];
