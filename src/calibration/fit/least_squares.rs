@@ -535,8 +535,6 @@ mod tests {
         }
     }
 
-    /// An AR1 that has to stand for a random walk takes the longest correlation time that is sought, 20 times 2^12 samples, and
-    /// is told to lie at the end; what is not there is told to be zero, and lies nowhere.
     /// The exact curve of a process of each kind gives its parameters back.
     #[test]
     fn the_curve_of_each_kind_is_fitted_by_it() {
@@ -566,6 +564,8 @@ mod tests {
         }
     }
 
+    /// An AR1 that has to stand for a random walk takes the longest correlation time that is sought, 20 times 2^12 samples, and
+    /// is told to lie at the end; what is not there is told to be zero, and lies nowhere.
     #[test]
     fn a_process_at_the_end_of_its_range_is_told() {
         let white = Process::white(1.0).unwrap();

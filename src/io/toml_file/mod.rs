@@ -145,7 +145,10 @@ impl Source {
     pub(crate) fn refused(&self, key: &str, reason: impl Display) -> Failure {
         let (span, is_set) = self.place(key);
         let line = self.line(span.start);
-        let written = self.text.get(span).filter(|_| is_set).unwrap_or_default();
+        if !is_set {
+            return self.at(line, format!("\"{key}\" {reason}"));
+        }
+        let written = self.text.get(span).unwrap_or_default();
         let value: String = written.split_whitespace().collect::<Vec<_>>().join(" ");
         let value: String = value.chars().take(60).collect();
         let entry = key.strip_suffix(']').and_then(|key| key.rsplit_once('['));
@@ -344,11 +347,18 @@ impl<'a> Checker<'a> {
         let schema = self.resolved(schema);
         if !self.admits(schema, value) {
             let expected = self.expected(schema);
-            let name = path.rsplit('.').next().unwrap_or_default();
-            let several = format!("there may be several: write [[{name}]], in double brackets");
-            let is_one = expected == "a list" && value.is_table();
+            let several = || {
+                let names = path.split('.').map(|part| part.split('[').next());
+                let names: Vec<&str> = names.flatten().collect();
+                let name = names.join(".");
+                format!("there may be several: write [[{name}]], in double brackets")
+            };
+            // Tables, each under its own header; a list of numbers has none.
+            let is_one = expected == "a list"
+                && value.is_table()
+                && self.admits(self.resolved(&schema["items"]), value);
             let refusal = self.source.refused(path, format!("is not {expected}"));
-            return Err(refusal.or_hint_if(is_one.then_some(several)));
+            return Err(refusal.or_hint_if(is_one.then(several)));
         }
         let mut kinds = self.kinds(schema);
         kinds.retain(|kind| self.admits(kind, value));

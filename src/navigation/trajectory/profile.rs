@@ -18,8 +18,7 @@
 //! ```
 
 use super::{Trajectory, TrajectorySample};
-use crate::earth::MAX_LATITUDE_DEG;
-use crate::earth::{moved, radii};
+use crate::earth::{MAX_LATITUDE_DEG, moved, radii};
 use crate::frames::{RollPitchYaw, wrap_angle};
 use crate::units::{DEG, NonNegative, Positive, STANDARD_GRAVITY};
 use glam::DVec3;
@@ -58,6 +57,7 @@ pub struct Start {
     pub lat: f64,
     /// Longitude.
     #[serde(rename = "lon_deg", deserialize_with = "degrees")]
+    #[schemars(range(min = -360, max = 360))]
     pub lon: f64,
     /// Height above the ellipsoid (m).
     #[serde(rename = "h_m")]
@@ -65,6 +65,7 @@ pub struct Start {
     pub h: f64,
     /// Heading from north.
     #[serde(rename = "heading_deg", deserialize_with = "degrees")]
+    #[schemars(range(min = -360, max = 360))]
     pub heading: f64,
     /// Speed (m/s).
     #[serde(rename = "speed_m_s", default)]
@@ -679,6 +680,7 @@ pub enum Place {
         lat: f64,
         /// Longitude.
         #[serde(rename = "lon_deg", deserialize_with = "degrees")]
+        #[schemars(range(min = -360, max = 360))]
         lon: f64,
     },
     /// North and east of the profile's start (m), curvilinear.

@@ -116,7 +116,6 @@ fn axes_and_replicates_draw_for_themselves_and_repeat() {
     assert_eq!(x, drawn(&s, 3, 0, (0, 0)));
 }
 
-/// About a centre of twice the variance and half the correlation time the same draws are twice and half as large.
 #[test]
 fn what_is_not_drawn_keeps_its_value() {
     let s = spread("WN", "sigma2", Law::Normal { sd: 1e-6 });
