@@ -190,6 +190,9 @@ fn wrong_values_are_refused_with_line_key_and_value() {
         refusal("rate_hz = 0\n"),
         "m.toml, line 1: \"rate_hz\" = 0 is refused: it must be a finite number > 0 and ≤ 100000 | "
     );
+    let in_one_bracket = refusal("rate_hz = 100.0\n[gyro.z.processes]\ntype = \"WN\"\n");
+    let hint = "there may be several: write [[gyro.z.processes]], in double brackets";
+    assert!(in_one_bracket.ends_with(hint), "{in_one_bracket}");
     assert!(
         refusal("rate_hz = 1e300\n")
             .contains("\"rate_hz\" = 1e300 is refused: it must be a finite number > 0")

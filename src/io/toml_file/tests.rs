@@ -79,6 +79,10 @@ fn refusals_name_file_line_key_and_value() {
             "line 4: \"part.xyz\" = [1, 2] is not a list of 3 | ",
         ),
         (
+            "count = 1\n[part]\nx = 1\nxyz = {}\n",
+            "line 4: \"part.xyz\" = {} is not a list | ",
+        ),
+        (
             "count = 1\nwords = \"north\"",
             "line 2: \"words\" = \"north\" is not a list | ",
         ),
