@@ -13,7 +13,7 @@ use nav_sim::document::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg}
 use nav_sim::io::contamination_file;
 use nav_sim::prelude::*;
 use nav_sim::signal::noise::Kind;
-use nav_sim::signal::noise::contamination::Contamination;
+use nav_sim::signal::noise::contamination::{Contamination, Operation};
 use nav_sim::signal::wavelet::{Tuning, default_levels};
 use rayon::prelude::*;
 use std::error::Error;
@@ -66,7 +66,14 @@ fn design(
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
     let file = read_model(&examples.join(model))?;
     let contamination = |name: &&str| -> Result<Contamination, Failure> {
-        Ok(contamination_file::find(name, file.model.rate_hz)?)
+        let mut contamination = contamination_file::find(name, file.model.rate_hz)?;
+        for rule in &mut contamination.rules {
+            // As large beside the random walk of a record of this length as in the paper.
+            if let Operation::Step { amplitude, .. } = &mut rule.operation {
+                *amplitude *= (samples as f64 / 524_284.0).sqrt();
+            }
+        }
+        Ok(contamination)
     };
     Ok(Design {
         seed: 1,

@@ -135,6 +135,7 @@ impl Anticipated<'_> {
             alike: None,
             varying: Vec::new(),
             indistinct: None,
+            reading: None,
         });
         Ok(outcome)
     }

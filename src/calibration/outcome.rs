@@ -258,6 +258,8 @@ pub struct Inference {
     pub indistinct: Option<Indistinct>,
     /// Intervals of N, K and B.
     pub practical: PracticalIntervals,
+    /// N, K and B of a curve that the model does not fit: slopes fitted to the widest band of scales that they describe.
+    pub reading: Option<Box<Outcome>>,
 }
 
 /// Practitioners' parameters of a fit.

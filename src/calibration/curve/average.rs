@@ -277,6 +277,10 @@ pub fn average(
     let mut curve = Curve {
         quantization,
         differing,
+        bias: match estimator.is_robust() {
+            true => tuning.bias() * kept_of_all,
+            false => 0.0,
+        },
         ..Curve::default()
     };
     for level in 1..=levels as u32 {

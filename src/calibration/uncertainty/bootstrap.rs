@@ -15,13 +15,15 @@ use super::spread::{LEVEL as ALIKE_LEVEL, Spread, alike_p_value};
 use super::varying::{parameter_spreads, simpler};
 use crate::curve::sampling::{SamplingLaw, implied};
 use crate::curve::{Estimator, Group, Replicate, average, median, p_value};
-use crate::fit::Fit;
-use crate::noise::ParameterRef;
+use crate::fit::{Fit, LARGEST_BIAS, Weighting, fit};
+use crate::model::ModelSpec;
 use crate::outcome::{
     Advance, Bootstrap, Goodness, Indistinct, Inference, LevelSpread, Outcome, Settings, tau_s,
 };
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Curve, RobustVariance, Status};
+use rand::RngExt;
+use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
 /// Sources of scatter in the draws.
@@ -32,10 +34,6 @@ pub enum Scattering {
     /// Recordings differ, each of them endless.
     BetweenRecordings,
 }
-
-/// Largest relative bias of a robust variance, beyond which its expansion fails: the most that was measured
-/// (docs/limits.md: 21 % with two lengths of the scale in the record).
-const LARGEST_BIAS: f64 = 0.2;
 
 /// Draws curves as a fitted model and the spread of the replicates would give them.
 pub(crate) struct CurveSampler<'a> {
@@ -227,16 +225,9 @@ pub(crate) fn like(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
 fn goodness(outcome: &Outcome, draws: &[Fit]) -> Goodness {
     let Outcome { fit, .. } = outcome;
     let objectives: Vec<f64> = draws.iter().map(|d| d.objective).collect();
-    // A parameter of a process without amplitude took nothing from the curve.
-    let free = |of: &ParameterRef| !fit.zero.contains(&of.process);
-    let parameters = fit
-        .composite
-        .parameters()
-        .filter(|(of, _)| free(of))
-        .count();
     Goodness {
         statistic: fit.objective,
-        dof: outcome.counted_levels().len().saturating_sub(parameters),
+        dof: (outcome.counted_levels().len()).saturating_sub(fit.free_parameters()),
         expected: median(&objectives),
         p_value: p_value(fit.objective, &objectives),
     }
@@ -276,7 +267,52 @@ pub(crate) fn inference(
         indistinct.adopt(outcome, &mut own.intervals);
         own.indistinct = Some(indistinct);
     }
+    if own.goodness.as_ref().is_some_and(Goodness::is_rejected)
+        && let Some(reading) = slopes(outcome, settings)
+    {
+        let settings = Settings {
+            weighting: Weighting::Model,
+            ..settings.clone()
+        };
+        own.practical = by_bootstrap(group, &reading, &settings, bootstrap, &|_| {}).practical;
+        own.reading = Some(Box::new(reading));
+    }
     own
+}
+
+/// White noise, random walk, flicker noise and quantization noise fitted to the widest band of scales that they describe, the
+/// shortest scales if several are as wide; none where they describe no more scales than it takes to tell.
+///
+/// A vibration, a low-pass filter or rows that are repeated spoil some scales, and the others read N and K as well as ever.
+fn slopes(outcome: &Outcome, settings: &Settings) -> Option<Outcome> {
+    let spec: ModelSpec = "WN+QN+FN+RW".parse().ok()?;
+    let counted = outcome.counted_levels();
+    let fewest = spec.parameters() + 2;
+    let bands = (fewest..=counted.len())
+        .rev()
+        .flat_map(|width| counted.windows(width));
+    let fitted = |band: &[u32]| {
+        let outside = |level: &u32| !band.contains(level);
+        let curve = Curve {
+            ignored: outcome
+                .curve
+                .levels
+                .iter()
+                .copied()
+                .filter(outside)
+                .collect(),
+            ..outcome.curve.clone()
+        };
+        let fit = fit(&curve, &spec, settings.rate_hz, Weighting::Model).ok()?;
+        let is_described = fit.lack_of_fit == 0.0;
+        is_described.then(|| Outcome {
+            spec: spec.clone(),
+            curve,
+            fit,
+            ..outcome.clone()
+        })
+    };
+    bands.into_iter().find_map(fitted)
 }
 
 fn by_bootstrap(
@@ -288,16 +324,30 @@ fn by_bootstrap(
 ) -> Inference {
     let name = group.scope.name();
     let sampler = CurveSampler::new(&name, &group.replicates, outcome, settings);
-    let draw = |run: usize| {
-        let curve = sampler.draw_as_recorded(sampler.generator(bootstrap.seed, "bootstrap", run));
-        let fit = curve.and_then(|curve| outcome.estimate_again(&curve, settings).ok());
-        advance(1);
-        fit
+    // The scatter that the model lacks at each scale belongs to its intervals, and not to the test of whether it lacks any.
+    let draw = |run: usize, lack_of_fit: f64| {
+        let generator = |scenario| sampler.generator(bootstrap.seed, scenario, run);
+        let mut curve = sampler.draw_as_recorded(generator("bootstrap"))?;
+        let mut misfit = generator("misfit");
+        for wv in curve.wv.iter_mut().filter(|_| lack_of_fit > 0.0) {
+            *wv *= (lack_of_fit.sqrt() * misfit.sample::<f64, _>(StandardNormal)).exp();
+        }
+        outcome.estimate_again(&curve, settings).ok()
     };
-    let fits: Vec<Fit> = (0..bootstrap.draws)
-        .into_par_iter()
-        .filter_map(draw)
+    let runs = || (0..bootstrap.draws).into_par_iter();
+    let mut fits: Vec<Fit> = runs()
+        .filter_map(|run| {
+            let fit = draw(run, 0.0);
+            advance(1);
+            fit
+        })
         .collect();
+    let goodness = (outcome.estimator != Estimator::Avlr).then(|| goodness(outcome, &fits));
+    if outcome.fit.lack_of_fit > 0.0 {
+        fits = runs()
+            .filter_map(|run| draw(run, outcome.fit.lack_of_fit))
+            .collect();
+    }
     let spread = sampler.spread.as_ref();
     let stretch = spread.map_or(1.0, Spread::student);
     let intervals = intervals(outcome, &fits, stretch);
@@ -315,13 +365,14 @@ fn by_bootstrap(
         drawn: fits.iter().map(|fit| fit.composite.clone()).collect(),
         stretch,
         intervals,
-        goodness: (outcome.estimator != Estimator::Avlr).then(|| goodness(outcome, &fits)),
+        goodness,
         spread: spread.map_or(Vec::new(), |s| {
             level_spreads(s, &outcome.curve.levels, settings.rate_hz)
         }),
         alike,
         varying,
         indistinct: None,
+        reading: None,
         practical: practical_intervals(outcome, &fits, stretch, settings.rate_hz),
     }
 }

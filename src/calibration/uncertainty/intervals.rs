@@ -309,13 +309,12 @@ impl Outcome {
     /// without noise.
     pub fn practical(&self, rate_hz: f64) -> Option<Practical> {
         let (horizon, policy) = (Horizon::default(), Policy::Matched);
-        let range_s = observed_s(self, rate_hz)?;
-        let model = &self.fit.composite;
+        let inference = self.inference.as_ref();
+        let read = inference.and_then(|i| i.reading.as_deref()).unwrap_or(self);
+        let range_s = observed_s(read, rate_hz)?;
+        let model = &read.fit.composite;
         let parameters = AxisParameters::of(&[model], rate_hz, horizon, policy, range_s).ok()?;
-        let intervals = self
-            .inference
-            .as_ref()
-            .map_or(PracticalIntervals::default(), |i| i.practical);
+        let intervals = inference.map_or(PracticalIntervals::default(), |i| i.practical);
         let walk_until_s = parameters
             .walk
             .departs_s(model, rate_hz, range_s, Practical::BESIDE);

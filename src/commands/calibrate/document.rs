@@ -485,6 +485,14 @@ fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
                 )
             }),
     );
+    if let Some(reading) = outcome.inference.as_ref().and_then(|i| i.reading.as_ref()) {
+        let counted = reading.counted_levels();
+        let [from, to] = [counted[0], counted[counted.len() - 1]].map(|level| seconds(&level));
+        notes.push(format!(
+            "N, K and B are those of the scales {} to {}, which {} describes: --scales {from}s:{to}s --model {}",
+            duration(from), duration(to), reading.spec, reading.spec
+        ));
+    }
     for i in intervals(outcome)
         .iter()
         .filter(|i| !i.of.parameter.is_shape() && i.absent.is_none())
