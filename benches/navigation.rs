@@ -72,8 +72,7 @@ fn run_epochs(c: &mut Criterion) {
 fn covariance_analysis(c: &mut Criterion) {
     let model = model().expect(VALID);
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories/land_vehicle.toml");
-    let (path, _) =
-        trajectory_file::load(&file, &trajectory_file::Options::default()).expect(VALID);
+    let (path, _) = trajectory_file::load(&file, None).expect(VALID);
     let (scenario, outages) = (Scenario::default(), Outage::PAPER);
     let track = scenario.track(&path, &model, &outages).expect(VALID);
     let beliefs = [Belief::new(&model, FilterStates::Reduced15, 1.0, 800.0).expect(VALID)];

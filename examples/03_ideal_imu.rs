@@ -1,14 +1,14 @@
 //! From a motion profile to the samples of a perfect IMU, and what they are at rest.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
-use nav_sim::io::trajectory_file::{Options, load};
+use nav_sim::io::trajectory_file::load;
 use nav_sim::navigation::earth::GravityModel;
 use nav_sim::navigation::sensors::ideal_imu::ideal_imu;
 use std::path::Path;
 
 pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories/land_vehicle.toml");
-    let (trajectory, _) = load(&path, &Options::default())?;
+    let (trajectory, _) = load(&path, None)?;
     let samples = ideal_imu(&trajectory, 100.0, GravityModel::Wgs84)?;
     let seconds = trajectory.end_s() - trajectory.start_s();
     println!("{seconds:.0} s, {} samples", samples.len());

@@ -2,7 +2,7 @@
 //! times as steady. Prints the errors that they claim and the true ones.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
-use nav_sim::io::trajectory_file::{Options, load};
+use nav_sim::io::trajectory_file::load;
 use nav_sim::navigation::ekf::{Belief, FilterStates};
 use nav_sim::navigation::metrics::{Summary, epochs};
 use nav_sim::navigation::monte_carlo;
@@ -22,7 +22,7 @@ fn model(gyro_bias_sigma: f64) -> Result<Model, Box<dyn std::error::Error>> {
 
 pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories/land_vehicle.toml");
-    let (trajectory, _) = load(&path, &Options::default())?;
+    let (trajectory, _) = load(&path, None)?;
     let truth = model(1e-4)?;
     let belief = |m: &Model| Belief::new(m, FilterStates::Full, 1.0, 800.0);
     let beliefs = [belief(&truth)?, belief(&model(1e-5)?)?];

@@ -5,13 +5,10 @@ use nav_sim::prelude::*;
 use std::path::Path;
 
 pub(crate) fn drift(recordings: &Path, drive: &Path) -> Result<f64, Box<dyn std::error::Error>> {
-    let options = CalibrationOptions {
-        bootstrap: None,
-        ..CalibrationOptions::default()
-    };
-    let model =
-        calibrate(&[recordings.to_owned()], &options, &Context::default())?.model(Estimator::DrAwv);
-    let (trajectory, _) = load_trajectory(drive, &TrajectoryOptions::default())?;
+    let words = [recordings.as_os_str(), "--bootstrap=0".as_ref()];
+    let calibrate = Asked::<Calibrate>::of(words)?.request;
+    let model = calibrate.run(&Context::default())?.model(Estimator::DrAwv);
+    let (trajectory, _) = load_trajectory(drive, None)?;
     let inputs = NavigateInputs::new(trajectory, model, TrueImu::AsBelieved);
     let mut scenario = Scenario::default();
     scenario.run.runs = 16;

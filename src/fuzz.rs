@@ -4,7 +4,7 @@
 use crate::commands::batch::{Study, part_of};
 use crate::commands::run::directory as run_directory;
 use crate::io::recordings::ReadOptions;
-use crate::io::trajectory_file::{self, Options};
+use crate::io::trajectory_file;
 use crate::io::{contamination_file, curve_file, datasheet, draws_file, fusion_files, model_file};
 use crate::io::{recordings, scenario_file};
 use nav_sim_logs::{Content, Log, Stamp};
@@ -118,11 +118,9 @@ fn fixes(path: &Path) {
 
 /// To drive along, and to compare with.
 fn trajectory(path: &Path) {
-    let options = Options {
-        origin: Some([0.8, 0.1, 400.0]),
-    };
-    _ = trajectory_file::load(path, &options);
-    _ = trajectory_file::load_reference(path, &options);
+    let origin = Some([0.8, 0.1, 400.0]);
+    _ = trajectory_file::load(path, origin);
+    _ = trajectory_file::load_reference(path);
 }
 
 /// As read, and with a checksum that is right, so that more than the checksum is tried.

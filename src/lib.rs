@@ -7,7 +7,7 @@
 //! use nav_sim::prelude::*;
 //!
 //! let model = read_model("calib_data/tactical.toml".as_ref())?.model;
-//! let (drive, _) = load_trajectory("trajectories/figure_eight.toml".as_ref(), &TrajectoryOptions::default())?;
+//! let (drive, _) = load_trajectory("trajectories/figure_eight.toml".as_ref(), None)?;
 //! let inputs = NavigateInputs::new(drive, model, TrueImu::AsBelieved);
 //! let mut scenario = Scenario::default();
 //! scenario.run.method = Method::Lincov;

@@ -14,12 +14,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub use crate::app::Context;
-pub use crate::commands::calibrate::{Calibration, CalibrationOptions, calibrate};
+pub use crate::app::{Asked, Command, Context};
+pub use crate::commands::calibrate::{Calibrate, Calibration};
 pub use crate::commands::export::Target;
 pub use crate::commands::run::{NavigateInputs, Navigation, TrueImu, navigate};
 pub use crate::io::model_file::{ModelFile, read as read_model};
-pub use crate::io::trajectory_file::{Options as TrajectoryOptions, load as load_trajectory};
+pub use crate::io::trajectory_file::load as load_trajectory;
 pub use nav_sim_calibration::Estimator;
 pub use nav_sim_navigation::scenario::{Method, Scenario};
 pub use nav_sim_navigation::sensors::outage::Outage;

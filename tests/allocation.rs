@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test")]
 #![allow(unsafe_code, reason = "an allocator that counts")]
 
-use nav_sim::io::trajectory_file::{Options, load};
+use nav_sim::io::trajectory_file::load;
 use nav_sim::navigation::ekf::{Belief, FilterStates};
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
@@ -47,7 +47,7 @@ fn allocations(duration_s: u32) -> u64 {
          segment = [{{ kind = \"straight\", duration_s = {duration_s} }}]\n"
     );
     std::fs::write(&file, profile).unwrap();
-    let (trajectory, _) = load(&file, &Options::default()).unwrap();
+    let (trajectory, _) = load(&file, None).unwrap();
     let model = throughput::model().unwrap();
     let beliefs = [FilterStates::Reduced15, FilterStates::Full]
         .map(|states| Belief::new(&model, states, 1.0, 800.0).unwrap());

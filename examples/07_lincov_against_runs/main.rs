@@ -182,7 +182,7 @@ fn main() -> Result<(), Failure> {
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
     for name in &names {
         let file = here.join(format!("trajectories/{name}.toml"));
-        let (trajectory, _) = trajectory_file::load(&file, &trajectory_file::Options::default())?;
+        let (trajectory, _) = trajectory_file::load(&file, None)?;
         for (seed, (case, settings, truth)) in (1..).zip(&truths) {
             if wanted.is_empty() || wanted.iter().any(|w| w == case) {
                 compare(

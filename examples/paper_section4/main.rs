@@ -192,7 +192,8 @@ fn print(rows: &[Row]) {
 
 /// Figure 2: a chart a parameter, scenarios side by side, estimators beside one another in each; bars are 95 % intervals.
 fn figure2(design: &Design, rows: &[Row]) -> String {
-    let scenarios: Vec<String> = design.scenarios.iter().map(|s| s.name.clone()).collect();
+    let scenarios = design.scenarios.iter().enumerate();
+    let scenarios: Vec<String> = scenarios.map(|(k, s)| format!("{k} {}", s.name)).collect();
     let width = design.estimators.len();
     let chart = |parameter: &String| {
         let series = |(k, estimator): (usize, &Estimator)| {
@@ -218,7 +219,7 @@ fn figure2(design: &Design, rows: &[Row]) -> String {
         );
         Chart::new(
             &format!("Accuracy of {parameter}"),
-            Axis::names(scenarios.clone()),
+            Axis::linear(&scenarios.join(", ")),
             vec![panel],
         )
     };

@@ -128,7 +128,7 @@ def calibrate(
     weighting: str | None = None,
     efficiency: float = 0.6,
     scales: int | str | None = None,
-    skip_s: float | str | None = None,
+    skip_s: float | None = None,
     gaps: str | None = None,
     bootstrap: int | None = None,
     seed: int = 1,
@@ -163,7 +163,7 @@ def calibrate(
     scales
         How many, or those that are fitted: "1s:1000s".
     skip_s
-        Seconds to leave out at the beginning; "auto": the warm-up, as it is found.
+        Seconds to leave out at the beginning.
     gaps
         Recordings with samples missing: "keep" (NaN in their place), "refuse", "split", "ignore".
     bootstrap

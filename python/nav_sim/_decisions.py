@@ -30,7 +30,6 @@ def tune(
     model: AnyModel,
     *,
     truth: AnyModel | Sequence[AnyModel] | None = None,
-    intervals: bool = False,
     trajectory: AnyTrajectory | None = None,
     outages: Outages = None,
     aim: str | None = None,
@@ -43,8 +42,7 @@ def tune(
     """The smallest factors on a model that make its filter consistent with other truths: `nav-sim tune`.
 
     `truth` are models that may make the errors, such as those of single recordings, by default the model with the
-    errors in the scenario; `intervals=True` takes the draws of its own calibration instead. `aim` is "worst" or "mean"
-    (the option --for). Without a `trajectory` it is a drive of the program's own;
+    errors in the scenario. `aim` is "worst" or "mean" (the option --for). Without a `trajectory` it is a drive of the program's own;
     `outages`, `filter`, `scenario`, `seed`, `threads` and `progress` as of `run`. `.model` is the tuned one.
     """
     truths = truth or [] if isinstance(truth, (list, tuple, type(None))) else [truth]
@@ -57,7 +55,6 @@ def tune(
             threads,
             model=_model.staged(model, "model", staging),
             truth=[_model.staged(one, f"truth[{k}]", staging) for k, one in enumerate(truths)],
-            intervals=intervals,
             trajectory=None if trajectory is None else _trajectory.staged(trajectory, staging),
             outage=windows(outages),
             filter=filter,
@@ -167,7 +164,7 @@ def choose(
     runs: int | None = None,
     trim: int | str | None = None,
     scenario: Settings | None = None,
-    skip_s: float | str | None = None,
+    skip_s: float | None = None,
     gaps: str | None = None,
     seed: int | None = None,
     threads: int | None = None,

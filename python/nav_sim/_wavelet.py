@@ -131,7 +131,7 @@ def _finite(values: list[float | None]) -> FloatArray:
 
 
 def reading(
-    rate_hz: float | None, skip_s: float | str | None, gaps: str | None, axes: str | Sequence[str] | None
+    rate_hz: float | None, skip_s: float | None, gaps: str | None, axes: str | Sequence[str] | None
 ) -> dict[str, Any]:
     """How recordings are read, as a request has it."""
     return {"rate_hz": rate_hz, "skip_s": skip_s, "gaps": gaps, "axes": axes}
@@ -145,7 +145,7 @@ def wv(
     efficiency: float = 0.6,
     scales: int | None = None,
     intervals: str = "eta3",
-    skip_s: float | str | None = None,
+    skip_s: float | None = None,
     gaps: str | None = None,
     threads: int | None = None,
     progress: Progress = None,
@@ -153,7 +153,7 @@ def wv(
     """Wavelet variances (classical, robust) of static recordings: `nav-sim wv`.
 
     The recordings are given as to `calibrate`, with `rate_hz` where there is no time in them. `axes` takes some of the signals ("gyro", "accel.x"); `intervals` is
-    "eta3" or "large-sample"; `skip_s` leaves out seconds at the beginning, "auto" what is not as the rest; `gaps` is
+    "eta3" or "large-sample"; `skip_s` leaves out seconds at the beginning; `gaps` is
     "keep", "refuse", "split" or "ignore"; `efficiency`, `scales`, `threads` and `progress` are as of `calibrate`.
     """
     with Staging() as staging:

@@ -128,6 +128,64 @@ pub trait Answer: Serialize {
     }
 }
 
+/// An answer whose JSON, document and files are made with it.
+#[derive(Debug, Serialize)]
+#[serde(transparent)]
+pub struct PlainAnswer {
+    json: Value,
+    #[serde(skip)]
+    document: Document,
+    #[serde(skip)]
+    files: Vec<(String, String)>,
+    #[serde(skip)]
+    unmet: Option<Failure>,
+}
+
+impl PlainAnswer {
+    pub(crate) fn new(json: Value, document: Document) -> Self {
+        Self {
+            json,
+            document,
+            files: Vec::new(),
+            unmet: None,
+        }
+    }
+
+    /// The same with files: names or endings, and texts.
+    pub(crate) fn with<N: Into<String>>(
+        self,
+        files: impl IntoIterator<Item = (N, String)>,
+    ) -> Self {
+        let files = files.into_iter().map(|(name, text)| (name.into(), text));
+        Self {
+            files: files.collect(),
+            ..self
+        }
+    }
+
+    /// The same with a bound that may not be met.
+    pub(crate) fn judged(self, unmet: Option<Failure>) -> Self {
+        Self { unmet, ..self }
+    }
+}
+
+impl Answer for PlainAnswer {
+    fn document(&self) -> Document {
+        self.document.clone()
+    }
+
+    fn files(&self) -> Vec<OutputFile<'_>> {
+        let files = self.files.iter();
+        files
+            .map(|(name, text)| OutputFile::whole(name, text.clone()))
+            .collect()
+    }
+
+    fn unmet(&self) -> Option<Failure> {
+        self.unmet.clone()
+    }
+}
+
 /// A file to be written.
 pub struct OutputFile<'a> {
     /// Name in the directory, or ending.
@@ -575,7 +633,7 @@ impl<C: Command> Asked<C> {
                 let before = std::fs::read_to_string(out.join(MANIFEST)).unwrap_or_default();
                 let before = serde_json::from_str::<Manifest>(&before).ok();
                 let mut directory = AtomicDir::create(out)?;
-                let give = |file: OutputFile<'_>| directory.write_parts(&file.name, file.parts);
+                let give = |file: OutputFile<'_>| directory.write(&file.name, file.parts);
                 let page = C::PAGE.then_some(document);
                 each_file(answer, page, &mut manifest, context, give)?;
                 directory.commit()?;
@@ -670,7 +728,7 @@ fn ending(path: &Path) -> String {
 // `manifest.json`: where a result directory came from, and whether another command makes the same.
 
 /// Where a result directory came from.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Layout version.
     pub schema_version: u32,
@@ -712,15 +770,9 @@ impl Manifest {
             schema_version: Self::SCHEMA_VERSION,
             name: name.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            command: Vec::new(),
             options,
-            seed: None,
             inputs,
-            outputs: BTreeMap::new(),
-            key: String::new(),
-            threads: 0,
-            wall_s: 0.0,
-            record: Map::new(),
+            ..Self::default()
         };
         let decides = (
             name,

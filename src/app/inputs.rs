@@ -21,7 +21,7 @@ use std::str::FromStr;
 
 /// A trajectory; where no vehicle moves so.
 pub(crate) fn trajectory(path: &Path, context: &Context<'_>) -> Result<Trajectory> {
-    let (trajectory, warnings) = trajectory_file::load(path, &trajectory_file::Options::default())?;
+    let (trajectory, warnings) = trajectory_file::load(path, None)?;
     context.warn_each(&warnings);
     let (_, beyond) = examine(&trajectory, &LIMITS);
     let farthest = |e: &&Excess| e.worst / e.limit;
@@ -110,16 +110,11 @@ pub(crate) fn expect_turn_on(
     path: &Path,
     context: &Context<'_>,
 ) {
-    let (accel, gyro) = (
+    let settings = [
         &mut initial.accel_bias_sigma_m_s2,
         &mut initial.gyro_bias_sigma_rad_s,
-    );
-    set_turn_on(
-        [accel, gyro],
-        stated,
-        context,
-        &format!("{}: the filter expects", path.display()),
-    );
+    ];
+    set_turn_on(settings, stated, path, "the filter expects", context);
 }
 
 /// Gives the true IMU the turn-on bias that the model of its errors states, where settings are silent; a 0 is a setting.
@@ -129,30 +124,27 @@ pub(crate) fn make_turn_on(
     path: &Path,
     context: &Context<'_>,
 ) {
-    let (accel, gyro) = (
+    let settings = [
         &mut imu.turn_on_bias_accel_m_s2,
         &mut imu.turn_on_bias_gyro_rad_s,
-    );
-    set_turn_on(
-        [accel, gyro],
-        stated,
-        context,
-        &format!("{}: the true IMU has", path.display()),
-    );
+    ];
+    set_turn_on(settings, stated, path, "the true IMU has", context);
 }
 
 fn set_turn_on(
     settings: [&mut Option<f64>; 2],
     stated: Option<TurnOn>,
-    context: &Context<'_>,
+    path: &Path,
     who: &str,
+    context: &Context<'_>,
 ) {
     for (sensor, setting) in Sensor::ALL.into_iter().zip(settings) {
         if let (None, Some(sigma)) = (&setting, stated.unwrap_or_default().sigma(sensor)) {
             *setting = Some(sigma);
             let (sigma, unit) = (readable(sigma), sensor.unit());
             context.remark(format!(
-                "{who} a turn-on bias of {sigma} {unit} ({sensor}, standard deviation)"
+                "{}: {who} a turn-on bias of {sigma} {unit} ({sensor}, standard deviation)",
+                path.display()
             ));
         }
     }
@@ -220,6 +212,9 @@ pub(crate) struct ScenarioArgs {
     /// Settings in one TOML file; flags override it (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     pub scenario: Option<PathBuf>,
+    /// Scenario file whose section gnss is used
+    #[arg(long, value_name = "FILE")]
+    pub gnss: Option<PathBuf>,
     /// A setting of the scenario, such as gnss.rate_hz=5 (repeatable)
     #[arg(long, value_name = "KEY=VALUE", hide = true)]
     pub set: Vec<String>,
@@ -229,17 +224,18 @@ impl ScenarioArgs {
     /// The file with the settings over it; not yet checked.
     pub(crate) fn read(&self) -> Result<Scenario> {
         let file = self.scenario.as_deref();
-        let scenario = file
-            .map(scenario_file::read)
-            .transpose()?
-            .unwrap_or_default();
-        if self.set.is_empty() {
-            return Ok(scenario);
+        let read = file.map(scenario_file::read).transpose()?;
+        let mut scenario = read.unwrap_or_default();
+        if !self.set.is_empty() {
+            let over: toml::Table = self.set.join("\n").parse().refuse_within("--set")?;
+            let mut table = toml::Table::try_from(&scenario).refuse()?;
+            merge(&mut table, over);
+            scenario = Source::new("", &toml::to_string(&table).refuse()?).get()?;
         }
-        let over: toml::Table = self.set.join("\n").parse().refuse_within("--set")?;
-        let mut table = toml::Table::try_from(&scenario).refuse()?;
-        merge(&mut table, over);
-        Source::new("", &toml::to_string(&table).refuse()?).get()
+        if let Some(path) = &self.gnss {
+            scenario.gnss = scenario_file::read(path)?.gnss;
+        }
+        Ok(scenario)
     }
 }
 

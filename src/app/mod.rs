@@ -8,6 +8,8 @@ pub mod reading;
 pub use crate::failure::{Failure, Result};
 pub(crate) use crate::failure::{Refuse, refused};
 pub use crate::io::input::Input;
-pub use command::{Answer, Answered, Asked, Command, Inputs, Manifest, Out, OutputFile, answered};
+pub use command::{
+    Answer, Answered, Asked, Command, Inputs, Manifest, Out, OutputFile, PlainAnswer, answered,
+};
 pub(crate) use command::{argument, is_path, is_repeated};
 pub use context::{Context, DEFAULT_SEED, Front};

@@ -21,9 +21,9 @@ pub struct ReadingRequest {
     /// Sample rate (Hz) of files without a time column
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
     pub rate_hz: Option<f64>,
-    /// Seconds to leave out at the beginning of each file (warm-up); auto: what differs from the rest of each file
-    #[arg(long, value_name = "S|auto", default_value = "0")]
-    pub skip_s: Skip,
+    /// Seconds to leave out at the beginning of each file (warm-up)
+    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = parse::non_negative)]
+    pub skip_s: f64,
     /// Names of the columns, for files without a header or instead of it
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub columns: Vec<String>,
@@ -64,28 +64,6 @@ pub struct RecordingRequest {
 /// What to do with gaps in windows that are navigated, in which nothing may be missing.
 pub(crate) const WHOLE: &[&str] = &["refuse", "split", "ignore"];
 
-/// The beginning that is left out.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Skip {
-    /// So many seconds.
-    Seconds(f64),
-    /// The stretch that differs from the rest.
-    Auto,
-}
-
-impl FromStr for Skip {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "auto" => Ok(Self::Auto),
-            _ => parse::non_negative(text)
-                .map(Self::Seconds)
-                .map_err(|e| format!("{e}, nor auto")),
-        }
-    }
-}
-
 /// The axes that one word of `--axes` stands for: all, those of a sensor (`accel`), an axis of both (`x`), one (`accel.x`).
 pub type ChannelSet = Vec<Channel>;
 
@@ -98,18 +76,10 @@ pub(crate) fn channel_set(word: &str) -> Result<ChannelSet, &'static str> {
 }
 
 impl ReadingRequest {
-    /// True if each recording's own warm-up is left out.
-    pub(crate) fn skips_warm_up(&self) -> bool {
-        self.skip_s == Skip::Auto
-    }
-
     /// Options that decide which samples are read, for the provenance of a result.
     pub(crate) fn provenance(&self, gaps: Gaps) -> toml::Table {
         known(json!({
-            "skip_s": match self.skip_s {
-                Skip::Seconds(s) => json!(s),
-                Skip::Auto => json!("auto"),
-            },
+            "skip_s": self.skip_s,
             "gaps": gaps.name(),
             "rate_hz_given": self.rate_hz,
             "columns": (!self.columns.is_empty()).then_some(&self.columns),
@@ -123,10 +93,7 @@ impl ReadingRequest {
         ReadOptions {
             columns: (!self.columns.is_empty()).then(|| self.columns.clone()),
             rate_hz: self.rate_hz,
-            skip_s: match self.skip_s {
-                Skip::Seconds(s) => s,
-                Skip::Auto => 0.0,
-            },
+            skip_s: self.skip_s,
             gaps,
             log: LogOptions {
                 topic: self.topic.clone(),

@@ -50,8 +50,8 @@ mod anticipated;
 
 pub use anticipated::Anticipated;
 pub use curve::{
-    Beginning, Beginnings, CalibrationError, Cause, Estimator, Group, Pool, Replicate, Scope, Trim,
-    WarmUp, average, grouped, implied, median, replicates, trend, warm_up,
+    Beginning, CalibrationError, Cause, Estimator, Group, Pool, Replicate, Scope, Trim, WarmUp,
+    average, grouped, implied, median, replicates, trend, warm_up,
 };
 pub use diagnosis::{
     Alarm, CommonCause, CommonFinding, Diagnosis, FEWEST_TO_COMPARE, Verdict, diagnose,

@@ -330,9 +330,10 @@ pub struct LevelSpread {
 }
 
 /// How a parameter differs between recordings: its logarithm (of phi and beta that of the correlation time) is normal.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct ParameterSpread {
     /// The parameter.
+    #[serde(skip)]
     pub of: ParameterRef,
     /// Its median (units of the parameter).
     pub median: f64,
@@ -409,8 +410,6 @@ pub struct Indistinct {
     pub processes: Vec<usize>,
     /// The model with one of them less, which describes the curve as well.
     pub spec: ModelSpec,
-    /// Its parameters.
-    pub composite: Composite,
     /// Probability of so large a gain by the further process if the simpler model is true.
     pub p_value: f64,
     /// Intervals of the simpler model's parameters.

@@ -63,7 +63,7 @@ nav_sim_signal::named!(
 );
 
 /// Scatter of the means of a sensor, and the finding.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct TurnOnSpread {
     /// The sensor.
     pub sensor: Sensor,

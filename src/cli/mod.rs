@@ -407,12 +407,12 @@ fn drive<C: crate::app::Command>(asked: &Asked<C>, session: &Session) -> Result<
     let context = session.context().reading(manifest.inputs.clone());
     let answer = asked.request.run(&context)?;
     let document = answer.document();
-    let file = || match asked.out {
-        Some(_) => None,
-        None => answer.files().into_iter().next(),
-    };
-    let file = C::PRINTS_FILE.then(|| file().map_or_else(String::new, |f| f.parts.collect()));
-    session.show(&answer, &document, answer.text().or(file));
+    let file = answer.files().into_iter().next();
+    let text = file.filter(|_| C::PRINTS_FILE).map(|f| match &asked.out {
+        Some(_) => String::new(),
+        None => f.parts.collect(),
+    });
+    session.show(&answer, &document, answer.text().or(text));
     let written = asked.write(&answer, &document, manifest, &context)?;
     if !written.is_empty() {
         let names: Vec<_> = written.iter().map(|path| path.to_string_lossy()).collect();

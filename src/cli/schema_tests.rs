@@ -216,9 +216,7 @@ fn read(kind: Kind, path: &Path) -> Result<(), Failure> {
         Kind::Study => unreachable!("what a run takes is for its options to say"),
         Kind::Model => model_file::read(path).map(|_| ()),
         Kind::Initial => fusion_files::read_initial(path).map(|_| ()),
-        Kind::Profile => {
-            trajectory_file::load(path, &trajectory_file::Options::default()).map(|_| ())
-        }
+        Kind::Profile => trajectory_file::load(path, None).map(|_| ()),
         Kind::Contamination => contamination_file::find(&path.to_string_lossy(), 100.0).map(|_| ()),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::batch::Study;
 use super::inspect::inspect;
-use crate::app::{Answer, Command, Context, Failure, Inputs, Result, inputs};
+use crate::app::{Command, Context, Failure, Inputs, PlainAnswer, Result, inputs};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::fusion_files::{ImuFile, read_gnss, read_imu, read_initial};
 use crate::io::{contamination_file, curve_file, datasheet, scenario_file};
@@ -12,7 +12,7 @@ use nav_sim_document::{Document, Note, Tone};
 use nav_sim_logs::Stamp;
 use nav_sim_navigation::fusion::alignment::moves;
 use nav_sim_navigation::gnss::FixSigma;
-use serde::Serialize;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Check scenario, study, model, trajectory and recording files without running anything
@@ -38,25 +38,8 @@ pub struct CheckFiles {
     rate_hz: Option<f64>,
 }
 
-/// Files that were looked at.
-#[derive(Debug, Serialize)]
-#[serde(transparent)]
-pub struct Checked {
-    files: Vec<CheckedFile>,
-    #[serde(skip)]
-    unmet: Option<Failure>,
-}
-
-#[derive(Debug, Serialize)]
-struct CheckedFile {
-    file: String,
-    ok: bool,
-    /// Its kind, or its error.
-    found: String,
-}
-
 impl Command for CheckFiles {
-    type Answer = Checked;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "check";
     const PLOT: bool = false;
 
@@ -64,18 +47,22 @@ impl Command for CheckFiles {
         Ok(Vec::new())
     }
 
-    fn run(&self, context: &Context<'_>) -> Result<Checked> {
-        let (mut files, mut failures) = (Vec::new(), Vec::new());
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
+        let (mut files, mut lines, mut failures) = (Vec::new(), Vec::new(), Vec::new());
         for path in &self.files {
-            let found = check(path, self.rate_hz, context);
-            let ok = found.is_ok();
-            let found = found.unwrap_or_else(|failure| {
-                let message = failure.to_string();
-                failures.push(failure);
-                message
-            });
-            let file = path.display().to_string();
-            files.push(CheckedFile { file, ok, found });
+            let (found, file) = (
+                check(path, self.rate_hz, context),
+                path.display().to_string(),
+            );
+            files.push(json!({
+                "file": file,
+                "ok": found.is_ok(),
+                "found": found.as_ref().map_or_else(ToString::to_string, Clone::clone),
+            }));
+            match found {
+                Ok(found) => lines.push(format!("{file}: {found}")),
+                Err(failure) => failures.push(failure),
+            }
         }
         let unmet = match failures.len() {
             0 => None,
@@ -94,22 +81,8 @@ impl Command for CheckFiles {
                 })
             }
         };
-        Ok(Checked { files, unmet })
-    }
-}
-
-impl Answer for Checked {
-    fn document(&self) -> Document {
-        let lines = self
-            .files
-            .iter()
-            .filter(|file| file.ok)
-            .map(|CheckedFile { file, found, .. }| format!("{file}: {found}"));
-        Document::new("Files", Tone::Good, lines)
-    }
-
-    fn unmet(&self) -> Option<Failure> {
-        self.unmet.clone()
+        let document = Document::new("Files", Tone::Good, lines);
+        Ok(PlainAnswer::new(files.into(), document).judged(unmet))
     }
 }
 

@@ -7,7 +7,7 @@ use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::report::csv::{csv, flat, merged};
 use crate::report::verdict::{SPOKEN, axis_of, tone, verdict_counts};
-use crate::report::{in_order, json};
+use crate::report::{in_order, json, some};
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
     window,
@@ -152,13 +152,45 @@ pub(crate) fn between<'a>(
         }
         let is_paired = differences.is_empty();
         found.paired &= is_paired;
-        found.candidates.push(compared(
-            run.to_owned(),
-            candidate,
-            directory,
-            is_paired,
+        if candidate.manifest.hashes("trajectory") != directory.manifest.hashes("trajectory") {
+            return refused(
+                format!("{run}: not the trajectory of the reference"),
+                "compare runs along one and the same trajectory file",
+            );
+        }
+        let [own, other] = [candidate, directory].map(|side| &side.experiment);
+        let [runs, of_reference] = [own, other].map(|side| side.runs.len());
+        if is_paired && runs != of_reference {
+            return refused(
+                format!(
+                    "{run}: {runs} runs against {of_reference} of the reference, of the same seed"
+                ),
+                "make both with one number of --runs",
+            );
+        }
+        let mut outages = metrics::compare(own, other, is_paired).refuse_within(run)?;
+        let calibrated = candidate.asee_mean_ci95.iter();
+        for (outage, ends) in outages
+            .iter_mut()
+            .zip(calibrated.zip(&directory.asee_mean_ci95))
+        {
+            // the reference is itself, whatever its calibration leaves open
+            if let (Some(interval), Some(of_reference), false) = (ends.0, ends.1, is_reference) {
+                outage.widen(interval, of_reference);
+            }
+        }
+        let pct = |a: f64, b: f64| 100.0 * (a / b - 1.0);
+        let both = own.epochs.iter().zip(&other.epochs);
+        let curve = both.map(|(c, r)| (c.t_s, std::array::from_fn(|i| pct(c.asee[i], r.asee[i]))));
+        found.candidates.push(CandidateResult {
+            curve: curve.collect(),
+            label: Label::of(run, candidate.origin.estimator.as_deref()),
+            run: run.to_owned(),
             is_reference,
-        )?);
+            is_paired,
+            verdict: candidate.summary["verdict"].clone(),
+            outages,
+        });
     }
     separate(&mut found.candidates);
     for candidate in &found.candidates {
@@ -205,62 +237,6 @@ pub(crate) fn between<'a>(
         }
     }
     Ok(found)
-}
-
-/// One run.
-fn compared(
-    run: String,
-    candidate: &RunDirectory,
-    reference: &RunDirectory,
-    is_paired: bool,
-    is_reference: bool,
-) -> Result<CandidateResult> {
-    if candidate.manifest.hashes("trajectory") != reference.manifest.hashes("trajectory") {
-        return refused(
-            format!("{run}: not the trajectory of the reference"),
-            "compare runs along one and the same trajectory file",
-        );
-    }
-    let runs = [candidate, reference].map(|side| side.experiment.runs.len());
-    if is_paired && runs[0] != runs[1] {
-        let [own, other] = runs;
-        return refused(
-            format!("{run}: {own} runs against {other} of the reference, of the same seed"),
-            "make both with one number of --runs",
-        );
-    }
-    let mut outages = metrics::compare(&candidate.experiment, &reference.experiment, is_paired)
-        .refuse_within(&run)?;
-    // the reference is itself, whatever its calibration leaves open
-    if !is_reference {
-        for (outage, ends) in outages.iter_mut().zip(
-            candidate
-                .asee_mean_ci95
-                .iter()
-                .zip(&reference.asee_mean_ci95),
-        ) {
-            if let (Some(interval), Some(of_reference)) = ends {
-                outage.widen(interval, of_reference);
-            }
-        }
-    }
-    let label = Label::of(&run, candidate.origin.estimator.as_deref());
-    let both = candidate
-        .experiment
-        .epochs
-        .iter()
-        .zip(&reference.experiment.epochs);
-    let pct = |a: f64, b: f64| 100.0 * (a / b - 1.0);
-    let curve = both.map(|(c, r)| (c.t_s, std::array::from_fn(|i| pct(c.asee[i], r.asee[i]))));
-    Ok(CandidateResult {
-        curve: curve.collect(),
-        run,
-        label,
-        is_reference,
-        is_paired,
-        verdict: candidate.summary["verdict"].clone(),
-        outages,
-    })
 }
 
 /// What makes two runs differ beside the model in the filter; then run k did not see the same noise.
@@ -358,20 +334,6 @@ impl Comparison {
         ratio_table(&self.candidates, &self.states, &self.outages)
     }
 
-    /// The ratios of the states that are shown, for other programs.
-    fn rows_csv(&self) -> String {
-        csv(&self
-            .rows
-            .iter()
-            .filter(|row| {
-                self.states
-                    .iter()
-                    .any(|k| row["state"] == REPORTED_NAMES[*k])
-            })
-            .map(flat)
-            .collect::<Vec<_>>())
-    }
-
     /// The candidates but for the reference itself, with short names.
     fn others(&self) -> Vec<(String, &CandidateResult)> {
         let others: Vec<_> = self.candidates.iter().filter(|c| !c.is_reference).collect();
@@ -400,12 +362,10 @@ impl Comparison {
                 format!("{name} {low} to {high} %")
             })
         };
-        let costs: Vec<String> = others.iter().take(NAMED).filter_map(cost).collect();
-        let more = if others.len() > NAMED { ", …" } else { "" };
+        let costs: Vec<String> = others.iter().filter_map(cost).collect();
         (!costs.is_empty()).then(|| {
-            let (reference, costs, state) =
-                (self.name_of_reference(), costs.join(", "), SPOKEN[state]);
-            format!("against {reference}: {costs}{more} of the uncertainty of {state}")
+            let (reference, costs, state) = (self.name_of_reference(), some(&costs), SPOKEN[state]);
+            format!("against {reference}: {costs} of the uncertainty of {state}")
         })
     }
 
@@ -426,10 +386,7 @@ impl Comparison {
             let series = std::iter::once(zero)
                 .chain(others.iter().enumerate().map(line))
                 .collect();
-            Panel {
-                height: 0.8,
-                ..Panel::new(axis, series)
-            }
+            Panel::new(axis, series).of_height(0.8)
         };
         Chart::over_time(
             &format!("ASEE against {}", self.name_of_reference()),
@@ -467,7 +424,19 @@ impl Answer for Comparison {
     fn text(&self) -> Option<String> {
         Some(match self.form? {
             TableForm::Markdown => self.table().markdown(),
-            TableForm::Csv => self.rows_csv(),
+            TableForm::Csv => {
+                let is_shown = |row: &&Value| {
+                    self.states
+                        .iter()
+                        .any(|k| row["state"] == REPORTED_NAMES[*k])
+                };
+                csv(&self
+                    .rows
+                    .iter()
+                    .filter(is_shown)
+                    .map(flat)
+                    .collect::<Vec<_>>())
+            }
             TableForm::Latex => self.table().latex(),
         })
     }
@@ -506,9 +475,6 @@ impl Answer for Comparison {
         document
     }
 }
-
-/// Runs that the verdict names.
-const NAMED: usize = 3;
 
 const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's own standard deviation: 0 % is as the reference believes.";
 

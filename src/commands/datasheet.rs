@@ -1,13 +1,12 @@
 //! `nav-sim datasheet`: models from data sheets, and the catalogue of IMUs.
 
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Result};
+use crate::app::{Command, Context, Failure, Out, PlainAnswer, Refuse, Result};
 use crate::io::datasheet::{CATALOGUE, Datasheet, Entry, Figure, Quantity, catalogued, read};
-use crate::io::model_file::{self, ModelFile};
+use crate::io::model_file;
 use crate::io::suggest::nearest;
 use crate::parse;
 use nav_sim_document::{Document, Tone};
 use nav_sim_signal::imu::Sensor;
-use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -40,16 +39,8 @@ pub struct DatasheetArgs {
     rate_hz: f64,
 }
 
-/// A model of a data sheet, or the catalogue.
-pub enum DatasheetAnswer {
-    /// The model.
-    Model(Box<ModelFile>),
-    /// The catalogue as JSON.
-    Catalogue(Vec<Value>),
-}
-
 impl Command for DatasheetArgs {
-    type Answer = DatasheetAnswer;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "datasheet";
     const OUT: Out = Out::File {
         name: "model.toml",
@@ -58,14 +49,13 @@ impl Command for DatasheetArgs {
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
 
-    fn run(&self, context: &Context<'_>) -> Result<DatasheetAnswer> {
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         if self.list {
-            return Ok(DatasheetAnswer::Catalogue(
-                CATALOGUE
-                    .iter()
-                    .map(|(name, _)| catalogued_unit(name))
-                    .collect::<Result<_>>()?,
-            ));
+            let units = CATALOGUE.iter().map(|(name, _)| catalogued_unit(name));
+            let units = units.collect::<Result<Vec<_>>>()?;
+            let document = Document::new("Data sheets", Tone::Good, units.iter().map(text));
+            let json = json!({ "schema_version": 1, "units": units });
+            return Ok(PlainAnswer::new(json, document));
         }
         let mut sheet = match (&self.entry, &self.unit) {
             (Some(path), _) => read(path)?,
@@ -86,43 +76,11 @@ impl Command for DatasheetArgs {
             .chain(made.doubts)
             .for_each(|doubt| context.warn(doubt));
         context.remark("an assumption, not a calibration");
-        Ok(DatasheetAnswer::Model(Box::new(made.file)))
-    }
-}
-
-impl Serialize for DatasheetAnswer {
-    /// A model file with the same keys as JSON.
-    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Model(file) => {
-                let table: Result<toml::Table, _> = model_file::to_toml(file).parse();
-                table.map_err(serde::ser::Error::custom)?.serialize(to)
-            }
-            Self::Catalogue(units) => json!({ "schema_version": 1, "units": units }).serialize(to),
-        }
-    }
-}
-
-impl Answer for DatasheetAnswer {
-    fn document(&self) -> Document {
-        Document::new("Data sheet", Tone::Good, [""; 0])
-    }
-
-    fn text(&self) -> Option<String> {
-        match self {
-            Self::Model(_) => None,
-            Self::Catalogue(units) => {
-                let lines: Vec<String> = units.iter().map(text).collect();
-                Some(lines.join("\n"))
-            }
-        }
-    }
-
-    fn files(&self) -> Vec<OutputFile<'_>> {
-        match self {
-            Self::Model(file) => vec![OutputFile::whole("", model_file::to_toml(file))],
-            Self::Catalogue(..) => Vec::new(),
-        }
+        // a model file with the same keys as JSON
+        let text = model_file::to_toml(&made.file);
+        let json = text.parse::<toml::Table>().refuse()?;
+        let document = Document::new("Data sheet", Tone::Good, [""; 0]);
+        Ok(PlainAnswer::new(json!(json), document).with([("", text)]))
     }
 }
 

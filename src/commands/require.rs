@@ -1,20 +1,18 @@
 //! The IMU that a limit needs, what a given one makes of it, and a ranking of several.
 
 use crate::app::inputs::{self, ScenarioArgs};
-use crate::app::{
-    Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, refused,
-};
+use crate::app::{Command, Context, Failure, Inputs, Out, PlainAnswer, Refuse, Result, refused};
 use crate::io::datasheet::{self, CATALOGUE, Datasheet};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::input::listed;
 use crate::io::model_file::{self, ModelFile, PROGRAM, TurnOn, known};
-use crate::io::scenario_file;
 use crate::parse;
+use crate::report::csv::merged;
 use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds, window};
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
-    Answer as Bound, Course, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need, Quantity,
-    RequireError, Worst, evenly,
+    Answer as Bound, Course, Drift, ImuParameters, Limit, Margins, Need, Quantity, RequireError,
+    Worst, evenly,
 };
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::aiding::AidingSettings;
@@ -61,9 +59,6 @@ pub struct Require {
     /// yaw_deg
     #[arg(id = "require", long = "require", value_name = "NAME<=LIMIT")]
     limits: Vec<Limit>,
-    /// Scenario file whose section gnss is used
-    #[arg(long, value_name = "FILE")]
-    gnss: Option<PathBuf>,
     /// Receiver, start, IMU rate, aiding.
     #[command(flatten)]
     settings: ScenarioArgs,
@@ -94,20 +89,8 @@ impl FromStr for Ask {
     }
 }
 
-/// What a limit needs, or what one or several IMUs make of it.
-#[derive(Debug, Serialize)]
-#[serde(untagged)]
-pub enum RequireAnswer {
-    /// The IMU that is needed.
-    Needed(Box<NeededImu>),
-    /// What a given one makes of the limits.
-    Given(Box<GivenImu>),
-    /// Several of them, the best first.
-    Ranked(Ranking),
-}
-
 impl Command for Require {
-    type Answer = RequireAnswer;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "require";
     const OUT: Out = Out::File {
         name: "needed.toml",
@@ -145,59 +128,21 @@ impl Command for Require {
         Ok(given)
     }
 
-    fn run(&self, context: &Context<'_>) -> Result<RequireAnswer> {
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let asked = self.requirements(context)?;
-        Ok(match (&self.model, &self.catalogue) {
-            (Some(path), _) => {
-                RequireAnswer::Given(Box::new(asked.given(path, self.vehicle.is_some(), context)?))
-            }
-            (None, Some(directory)) => {
-                let units = if directory.as_os_str() == BUILT_IN { asked.catalogue()? } else { asked.units_of(directory, context)? };
-                RequireAnswer::Ranked(asked.ranked(&units)?)
-            }
-            (None, None) => RequireAnswer::Needed(Box::new(asked.needed().map_err(|e| {
+        match (&self.model, &self.catalogue) {
+            (Some(path), _) => asked.given(path, self.vehicle.is_some(), context),
+            (None, Some(directory)) => asked.ranked(&match directory.as_os_str() == BUILT_IN {
+                true => asked.catalogue()?,
+                false => asked.units_of(directory, context)?,
+            }),
+            (None, None) => asked.needed().map_err(|e| {
                 let hint = match e {
                     RequireError::Loose { .. } => "a smaller limit, or a longer outage",
                     _ => "a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)",
                 };
                 Failure::input(e).hint(hint)
-            })?)),
-        })
-    }
-}
-
-impl Answer for RequireAnswer {
-    fn document(&self) -> Document {
-        match self {
-            Self::Needed(needed) => needed.document(),
-            Self::Given(given) => given.document(),
-            Self::Ranked(ranking) => ranking.document(),
-        }
-    }
-
-    fn files(&self) -> Vec<OutputFile<'_>> {
-        match self {
-            Self::Needed(needed) => {
-                vec![OutputFile::whole("", model_file::to_toml(&needed.file))]
-            }
-            _ => Vec::new(),
-        }
-    }
-
-    /// The limits that are not kept.
-    fn unmet(&self) -> Option<Failure> {
-        match self {
-            Self::Needed(_) => None,
-            Self::Given(given) => {
-                let Worst { limit, value, .. } =
-                    given.judgement.margins.as_ref().filter(|m| !m.met)?.worst;
-                let [value, most] = [value, limit.most].map(|x| limit.quantity.shown(x));
-                Some(Failure::bound(format!(
-                    "{} is {value}, the limit is {most}",
-                    limit.quantity
-                )))
-            }
-            Self::Ranked(ranking) => ranking.best().is_none().then(|| Failure::bound(NONE)),
+            }),
         }
     }
 }
@@ -215,9 +160,6 @@ impl Require {
             );
         }
         let mut scenario = self.settings.read()?;
-        if let Some(path) = &self.gnss {
-            scenario.gnss = scenario_file::read(path)?.gnss;
-        }
         if self.vehicle.is_some() {
             if !scenario.aiding.is_none() {
                 return refused(
@@ -240,7 +182,7 @@ impl Require {
 
 impl Requirements {
     /// What a given IMU makes of the limits.
-    fn given(&self, path: &Path, has_vehicle: bool, context: &Context<'_>) -> Result<GivenImu> {
+    fn given(&self, path: &Path, has_vehicle: bool, context: &Context<'_>) -> Result<PlainAnswer> {
         let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
         let file = inputs::model(path, context)?;
         let mut scenario = self.scenario.clone();
@@ -254,21 +196,79 @@ impl Requirements {
             ));
         }
         let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
-        let aidings = if has_vehicle {
-            self.aidings(&scenario, &model).map_err(unusable)?
-        } else {
-            Vec::new()
-        };
         let outages = match self.ask {
             Ask::Longest => self.long_outages(),
             _ => self.outages(),
         };
-        Ok(GivenImu {
-            schema_version: 1,
-            question: self.question(outages),
-            judgement: self.judged(&scenario, &model).map_err(unusable)?,
-            aidings,
-        })
+        let judgement = self.judged(&scenario, &model).map_err(unusable)?;
+        let margins = judgement.margins.as_ref();
+        let is_good = margins.map_or(judgement.outage.length_s() > 0.0, |margins| margins.met);
+        let mut document = Document::new(
+            "An IMU against its limits",
+            Tone::from(is_good),
+            self.verdict(&judgement, &outages),
+        );
+        if let Some(Outage { start_s, end_s }) = judgement.beyond_linear {
+            note_beyond(
+                &format!("in outage {}", window(start_s, end_s)),
+                &mut document,
+            );
+        }
+        let mut json = merged([
+            json!({ "schema_version": 1, "question": self.question(&outages) }),
+            json!(judgement),
+        ]);
+        if has_vehicle {
+            json["aidings"] = self.aidings(&scenario, &model).map_err(unusable)?;
+            document.section("What the car knows of its own motion");
+            let columns = [
+                ("aiding", "aiding"),
+                ("error after the outage", "value"),
+                ("quantity", "quantity"),
+                ("limit", "limit"),
+                ("longest outage within the limits", "outage/text"),
+            ];
+            document.table(Table::of(&json, "/aidings/*", &columns));
+        }
+        document.section("Error against the length of an outage");
+        let columns = [("limit on", "quantity"), ("{outage_s} s", "points/*/value")];
+        document.table(Table::of(&json, "/curves/*", &columns));
+        let unmet = margins.filter(|margins| !margins.met).map(|margins| {
+            let Worst { limit, value, .. } = margins.worst;
+            let [value, most] = [value, limit.most].map(|x| limit.quantity.shown(x));
+            Failure::bound(format!(
+                "{} is {value}, the limit is {most}",
+                limit.quantity
+            ))
+        });
+        Ok(PlainAnswer::new(json, document).judged(unmet))
+    }
+
+    fn verdict(&self, judgement: &Judgement, outages: &[Outage]) -> Vec<String> {
+        let longest = &judgement.outage.text;
+        let Some(margins) = &judgement.margins else {
+            let (limits, starts) = (self.limits_in_words(), starts(outages));
+            return vec![format!(
+                "longest outage within {limits}: {longest} ({starts})"
+            )];
+        };
+        let word = if margins.met { "met" } else { "NOT met" };
+        let times = readable(margins.worst.value / margins.worst.limit.most);
+        let without = &margins.without_imu_errors;
+        let (name, left) = (without.limit.quantity, readable(without.value));
+        vec![
+            format!(
+                "{word}: {}, {times} times the limit",
+                in_words(&margins.worst, outages)
+            ),
+            format!("asked: {}", self.in_words(outages)),
+            format!("longest outage within the limits, from the same starts: {longest}"),
+            if without.margin() >= 0.0 {
+                format!("an IMU without errors would leave {name} {left}")
+            } else {
+                format!("no IMU keeps the limit: GNSS and start alone leave {name} {left}")
+            },
+        ]
     }
 
     /// The units that are known by name.
@@ -337,76 +337,52 @@ const CURVE_S: [u32; 7] = [1, 3, 10, 30, 60, 120, 300];
 const LONGEST_S: f64 = 600.0;
 /// What confirms a figure of covariance analysis.
 const CONFIRM: &str = "confirm with nav-sim run --method both";
-/// Warns of an outage in which errors are beyond linear theory.
-fn note_beyond(beyond: Option<Outage>, document: &mut Document) {
-    if let Some(Outage { start_s, end_s }) = beyond {
-        let place = window(start_s, end_s);
-        document.note(
-            Importance::Warning,
-            format!("beyond linear theory in outage {place}: {CONFIRM}"),
-        );
+/// Warns of errors that are beyond linear theory.
+fn note_beyond(place: &str, document: &mut Document) {
+    let text = format!("beyond linear theory {place}: {CONFIRM}");
+    document.note(Importance::Warning, text);
+}
+
+/// Places where an outage was tried: `541 starts tried, 300 to 840 s`, or `from 300 s on`.
+fn starts(outages: &[Outage]) -> String {
+    let count = outages.len();
+    let [first, last] = [&outages[0], &outages[count - 1]].map(|o| seconds(o.start_s));
+    match count {
+        1 => format!("from {first} s on"),
+        _ => format!("{count} starts tried, {first} to {last} s"),
     }
 }
 
-/// What was asked, and where.
-#[derive(Debug, Serialize)]
-struct Question {
-    /// The limits.
-    limits: Vec<Limit>,
-    /// The places of the outage.
-    outages: Vec<Outage>,
+/// `p95_m 4.87 at the end of outage 300–360 s`
+fn in_words(worst: &Worst, outages: &[Outage]) -> String {
+    let outage = outages.get(worst.place).unwrap_or(&outages[0]);
+    let place = window(outage.start_s, outage.end_s);
+    format!(
+        "{} {} at the end of outage {place}",
+        worst.limit.quantity,
+        readable(worst.value)
+    )
 }
 
-impl Question {
+impl Requirements {
     /// `p95_m ≤ 5 after an outage of 60 s (the worst of 541 starts tried, 300 to 840 s)`
-    fn in_words(&self) -> String {
-        let first = self.outages[0];
-        let worst = if self.outages.len() > 1 {
+    fn in_words(&self, outages: &[Outage]) -> String {
+        let length = seconds(outages[0].end_s - outages[0].start_s);
+        let worst = if outages.len() > 1 {
             "the worst of "
         } else {
             ""
         };
-        let length = seconds(first.end_s - first.start_s);
         format!(
             "{} after an outage of {length} s ({worst}{})",
             self.limits_in_words(),
-            self.starts()
+            starts(outages)
         )
-    }
-
-    /// Places where the outage was tried: `541 starts tried, 300 to 840 s`, or `from 300 s on`.
-    fn starts(&self) -> String {
-        let [first, last] =
-            [self.outages.first(), self.outages.last()].map(|o| o.map_or(0.0, |o| o.start_s));
-        if last > first {
-            format!(
-                "{} starts tried, {} to {} s",
-                self.outages.len(),
-                seconds(first),
-                seconds(last)
-            )
-        } else {
-            format!("from {} s on", seconds(first))
-        }
     }
 
     fn limits_in_words(&self) -> String {
-        self.limits
-            .iter()
-            .map(|l| format!("{} ≤ {}", l.quantity, readable(l.most)))
-            .collect::<Vec<_>>()
-            .join(", ")
-    }
-
-    /// `p95_m 4.87 at the end of outage 300–360 s`
-    fn worst(&self, worst: &Worst) -> String {
-        let outage = self.outages.get(worst.place).unwrap_or(&self.outages[0]);
-        let place = window(outage.start_s, outage.end_s);
-        format!(
-            "{} {} at the end of outage {place}",
-            worst.limit.quantity,
-            readable(worst.value)
-        )
+        let word = |l: &Limit| format!("{} ≤ {}", l.quantity, readable(l.most));
+        self.limits.iter().map(word).collect::<Vec<_>>().join(", ")
     }
 }
 
@@ -423,77 +399,6 @@ const fn quantity_in_words(quantity: Quantity) -> &'static str {
 }
 
 // The IMU that a limit needs.
-
-/// The IMU that a limit needs.
-#[derive(Debug, Serialize)]
-pub struct NeededImu {
-    schema_version: u32,
-    question: Question,
-    t_corr_s: f64,
-    turn_on_bias: TurnOnBias,
-    figures: Vec<NeededFigure>,
-    /// The hardest limit, and where.
-    #[serde(flatten)]
-    worst: Worst,
-    /// The outage of the answer, where it is beyond linear theory.
-    beyond_linear: Option<Outage>,
-    #[serde(skip)]
-    file: ModelFile,
-}
-
-/// Turn-on biases that it has.
-#[derive(Debug, Serialize)]
-struct TurnOnBias {
-    accel_m_s2: f64,
-    gyro_rad_s: f64,
-}
-
-#[derive(Debug, Serialize)]
-struct NeededFigure {
-    figure: &'static str,
-    /// With equal shares.
-    allocated: f64,
-    /// If there were no other; `any`, or null where none will do.
-    alone: Value,
-    /// If the others are ten times better.
-    others_10_times_better: Value,
-}
-
-impl NeededImu {
-    /// The turn-on biases that the answer takes for granted.
-    fn turn_on_in_words(&self) -> String {
-        let TurnOnBias {
-            accel_m_s2,
-            gyro_rad_s,
-        } = self.turn_on_bias;
-        if accel_m_s2 == 0.0 && gyro_rad_s == 0.0 {
-            return "without turn-on bias ([imu] of --scenario states one)".to_owned();
-        }
-        let [accel, gyro] = [accel_m_s2, gyro_rad_s].map(readable);
-        format!("with turn-on biases of {accel} m/s² (accel) and {gyro} rad/s (gyro)")
-    }
-
-    /// Verdict, tables and charts.
-    fn document(&self) -> Document {
-        let lines = [
-            format!("needed for {}", self.question.in_words()),
-            format!("an IMU {}", self.turn_on_in_words()),
-            format!("hardest: {}", self.question.worst(&self.worst)),
-        ];
-        let mut document = Document::new("The IMU that a limit needs", Tone::Good, lines);
-        note_beyond(self.beyond_linear, &mut document);
-        document.section("Figures, at most");
-        document.text("If alone: without any other error of the IMU. Others 10 × better: every other figure ten times smaller.");
-        let columns = [
-            ("figure", "figure"),
-            ("at most, equal shares", "allocated"),
-            ("if alone", "alone"),
-            ("others 10 × better", "others_10_times_better"),
-        ];
-        document.table(Table::of(self, "/figures/*", &columns));
-        document
-    }
-}
 
 fn bound(which: usize, found: &Bound) -> Value {
     match found {
@@ -595,7 +500,7 @@ impl Requirements {
     ///
     /// # Errors
     /// When no IMU keeps the limits, or trajectory and rates do not fit together.
-    fn needed(&self) -> Result<NeededImu, RequireError> {
+    fn needed(&self) -> Result<PlainAnswer, RequireError> {
         let outages = self.outages();
         let course = self.course(&outages)?;
         let scenario = &self.with_stated_turn_on();
@@ -609,44 +514,71 @@ impl Requirements {
         let model = imu.model(self.scenario.imu.rate_hz);
         let worst = Worst::of(&self.limits, &course.drifts(scenario, &model)?)
             .expect("at least one limit and one place");
-        let figure = |i: usize| {
-            Ok::<_, RequireError>(NeededFigure {
-                figure: ImuParameters::NAMES[i],
-                allocated: ImuParameters::in_datasheets(i, imu.values[i]),
-                alone: bound(i, &need.quite_alone(&imu, i)?),
-                others_10_times_better: bound(i, &need.alone(&imu, i, 0.1)?),
-            })
-        };
         let turn_on = |sensor| scenario.imu.turn_on_bias(sensor).unwrap_or(0.0);
-        let mut needed = NeededImu {
-            schema_version: 1,
-            t_corr_s: imu.t_corr_s,
-            turn_on_bias: TurnOnBias {
-                accel_m_s2: turn_on(Sensor::Accel),
-                gyro_rad_s: turn_on(Sensor::Gyro),
-            },
-            figures: (0..IMU_PARAMETERS).map(figure).collect::<Result<_, _>>()?,
-            beyond_linear: self.beyond_linear(scenario, &model, outages[worst.place])?,
-            question: self.question(outages),
-            worst,
-            file: ModelFile::new(model),
+        let [accel, gyro] = Sensor::ALL.map(turn_on);
+        let biases = match [accel, gyro] {
+            [0.0, 0.0] => "without turn-on bias ([imu] of --scenario states one)".to_owned(),
+            biases => {
+                let [accel, gyro] = biases.map(readable);
+                format!("with turn-on biases of {accel} m/s² (accel) and {gyro} rad/s (gyro)")
+            }
         };
+        let beyond_linear = self.beyond_linear(scenario, &model, outages[worst.place])?;
+        let question = self.in_words(&outages);
+        let lines = [
+            format!("needed for {question}"),
+            format!("an IMU {biases}"),
+            format!("hardest: {}", in_words(&worst, &outages)),
+        ];
+        let mut document = Document::new("The IMU that a limit needs", Tone::Good, lines);
+        if let Some(Outage { start_s, end_s }) = beyond_linear {
+            note_beyond(
+                &format!("in outage {}", window(start_s, end_s)),
+                &mut document,
+            );
+        }
+        let mut file = ModelFile::new(model);
         let mut provenance = known(json!({
             "program": PROGRAM,
             "made_by": "require",
             "label": "what a limit needs: not a calibration",
-            "question": needed.question.in_words(),
-            "turn_on_bias": needed.turn_on_in_words(),
+            "question": question,
+            "turn_on_bias": biases,
         }));
-        provenance.extend(
-            needed
-                .figures
-                .iter()
-                .map(|f| (f.figure.to_owned(), f.allocated.into())),
-        );
-        needed.file.provenance = Some(provenance);
-        needed.file.turn_on = self.stated_turn_on();
-        Ok(needed)
+        let mut figures = Vec::new();
+        for (i, name) in ImuParameters::NAMES.into_iter().enumerate() {
+            let allocated = ImuParameters::in_datasheets(i, imu.values[i]);
+            provenance.insert(name.to_owned(), allocated.into());
+            figures.push(json!({
+                "figure": name,
+                "allocated": allocated,
+                "alone": bound(i, &need.quite_alone(&imu, i)?),
+                "others_10_times_better": bound(i, &need.alone(&imu, i, 0.1)?),
+            }));
+        }
+        file.provenance = Some(provenance);
+        file.turn_on = self.stated_turn_on();
+        let json = merged([
+            json!({
+                "schema_version": 1,
+                "question": self.question(&outages),
+                "t_corr_s": imu.t_corr_s,
+                "turn_on_bias": { "accel_m_s2": accel, "gyro_rad_s": gyro },
+                "figures": figures,
+                "beyond_linear": beyond_linear,
+            }),
+            json!(worst),
+        ]);
+        document.section("Figures, at most");
+        document.text("If alone: without any other error of the IMU. Others 10 × better: every other figure ten times smaller.");
+        let columns = [
+            ("figure", "figure"),
+            ("at most, equal shares", "allocated"),
+            ("if alone", "alone"),
+            ("others 10 × better", "others_10_times_better"),
+        ];
+        document.table(Table::of(&json, "/figures/*", &columns));
+        Ok(PlainAnswer::new(json, document).with([("", model_file::to_toml(&file))]))
     }
 
     /// The scenario with a filter that expects the turn-on biases that `[imu]` states, as it expects those of a model file.
@@ -720,25 +652,26 @@ impl Requirements {
     ///
     /// # Errors
     /// When the model has no filter.
-    fn aidings(&self, scenario: &Scenario, model: &Model) -> Result<Vec<Aided>, RequireError> {
+    fn aidings(&self, scenario: &Scenario, model: &Model) -> Result<Value, RequireError> {
         let all = [
             ("none", AidingSettings::default()),
             ("nhc", AidingSettings::car()),
             ("nhc, odometer", AidingSettings::car_with_odometer()),
         ];
-        let aided = |(name, aiding): (&'static str, AidingSettings)| {
+        let aided = |(name, aiding): (&str, AidingSettings)| {
             let scenario = Scenario {
                 aiding,
                 ..scenario.clone()
             };
             let (_, outage, worst) = self.bridged(&scenario, model)?;
-            Ok(Aided {
-                aiding: name,
-                worst,
-                outage,
-            })
+            // the hardest limit: none where no place has an outage of that length
+            Ok(merged([
+                json!({ "aiding": name, "outage": outage }),
+                json!(worst),
+            ]))
         };
-        all.into_par_iter().map(aided).collect()
+        let aided: Result<Vec<Value>, RequireError> = all.into_par_iter().map(aided).collect();
+        Ok(aided?.into())
     }
 
     /// Whether `run` would say that the errors in an outage are beyond linear theory: by the covariance analysis that it
@@ -766,50 +699,82 @@ impl Requirements {
     ///
     /// # Errors
     /// When a model has no filter, with its name, or the longest outage is asked for.
-    fn ranked(&self, units: &[CatalogueUnit]) -> Result<Ranking, Failure> {
+    fn ranked(&self, units: &[CatalogueUnit]) -> Result<PlainAnswer> {
         let ranked = |unit: &CatalogueUnit| {
-            let CatalogueUnit {
-                name,
-                model,
-                scenario,
-                not_stated,
-            } = unit;
-            let mut judgement = self.judged(scenario, model).refuse_within(name)?;
-            let is_complete = not_stated.is_empty();
-            let margins = judgement.margins.as_mut();
-            let is_met = margins.is_some_and(|margins| {
-                let is_met = margins.met;
-                margins.met &= is_complete;
-                is_met
+            let judged = self.judged(&unit.scenario, &unit.model);
+            let mut judgement = judged.refuse_within(&unit.name)?;
+            let is_complete = unit.not_stated.is_empty();
+            let mut kept = "not met";
+            if let Some(margins) = judgement.margins.as_mut().filter(|margins| margins.met) {
+                (kept, margins.met) = (if is_complete { "met" } else { "open" }, is_complete);
+            }
+            let own = json!({
+                "unit": unit.name,
+                "kept": kept,
+                "not_stated": unit.not_stated,
+                "missing": missing(&unit.not_stated),
             });
-            Ok(RankedUnit {
-                unit: name.clone(),
-                kept: match (is_met, is_complete) {
-                    (true, true) => "met",
-                    (true, false) => "open",
-                    (false, _) => "not met",
-                },
-                missing: missing(not_stated),
-                not_stated: not_stated.clone(),
-                judgement,
-            })
+            let margins = judgement.margins.as_ref();
+            let margin = margins.map_or(0.0, |margins| margins.worst.margin());
+            Ok((margin, merged([own, json!(judgement)])))
         };
-        let ranked: Vec<Result<RankedUnit, Failure>> = units.par_iter().map(ranked).collect();
-        let mut units = ranked.into_iter().collect::<Result<Vec<_>, _>>()?;
-        let margin = |unit: &RankedUnit| {
-            let margins = unit.judgement.margins.as_ref();
-            margins.map_or(0.0, |margins| margins.worst.margin())
-        };
-        units.sort_by(|a, b| match [a, b].map(|unit| unit.not_stated.is_empty()) {
-            [true, true] => margin(b).total_cmp(&margin(a)),
-            [false, false] => a.unit.cmp(&b.unit),
-            [a, b] => b.cmp(&a),
+        let ranked: Vec<Result<_>> = units.par_iter().map(ranked).collect();
+        let ranked = ranked.into_iter().collect::<Result<Vec<_>>>()?;
+        let mut units: Vec<_> = units.iter().zip(ranked).collect();
+        units.sort_by(|(a, (margin, _)), (b, (other, _))| {
+            match [a, b].map(|unit| unit.not_stated.is_empty()) {
+                [true, true] => other.total_cmp(margin),
+                [false, false] => a.name.cmp(&b.name),
+                [a, b] => b.cmp(&a),
+            }
         });
-        Ok(Ranking {
-            schema_version: 1,
-            question: self.question(self.outages()),
-            units,
-        })
+        let open = units
+            .iter()
+            .filter(|(unit, _)| !unit.not_stated.is_empty())
+            .count();
+        let rows: Vec<Value> = units.into_iter().map(|(_, (_, row))| row).collect();
+        let named = |is: &dyn Fn(&Value) -> bool| -> Vec<&str> {
+            let rows = rows.iter().filter(|row| is(row));
+            rows.filter_map(|row| row["unit"].as_str()).collect()
+        };
+        let (met, outages) = (named(&|row| row["kept"] == "met"), self.outages());
+        let answer = met.first().map_or(NONE.to_owned(), |best| {
+            let count = met.len();
+            format!("{best} is the best of {count} units that keep the limit")
+        });
+        let mut lines = vec![answer, format!("asked: {}", self.in_words(&outages))];
+        if open > 0 {
+            lines.push(format!(
+                "{open} units are not ranked: their data sheets leave figures out (--verbose lists them)"
+            ));
+        }
+        let tone = Tone::from(!met.is_empty());
+        let mut document = Document::new("IMUs against a limit", tone, lines);
+        let beyond = named(&|row| !row["beyond_linear"].is_null());
+        if !beyond.is_empty() {
+            note_beyond(&beyond.join(", "), &mut document);
+        }
+        let unmet = met.is_empty().then(|| Failure::bound(NONE));
+        let quantity = quantity_in_words(self.limits[0].quantity);
+        let columns = format!(
+            "1 s … 300 s: {quantity} after such an outage; bridges: longest outage within the limits"
+        );
+        document.note(Importance::Remark, columns);
+        let question = self.question(&outages);
+        let json = json!({ "schema_version": 1, "question": question, "units": rows });
+        document.section("Ranking");
+        let columns = [
+            ("unit", "unit"),
+            ("limit", "kept"),
+            ("bridges", "outage/text"),
+            ("{outage_s} s", "curves/0/points/*/value"),
+        ];
+        document.table(Table::of(&json, "/units/*", &columns));
+        document.section("Figures that are missing");
+        let columns = [("unit", "unit"), ("not stated", "missing")];
+        document.table(Table::of(&json, "/units/*", &columns));
+        document.text(RULE);
+        Ok(PlainAnswer::new(json, document).judged(unmet))
     }
 
     /// The longest outage of which all places are within the limits, in whole seconds. The first place holds the longest.
@@ -905,11 +870,8 @@ impl Requirements {
         Course::new(&self.scenario, &self.trajectory, outages)
     }
 
-    fn question(&self, outages: Vec<Outage>) -> Question {
-        Question {
-            limits: self.limits.clone(),
-            outages,
-        }
+    fn question(&self, outages: &[Outage]) -> Value {
+        json!({ "limits": self.limits, "outages": outages })
     }
 }
 
@@ -959,18 +921,6 @@ impl Longest {
     }
 }
 
-/// A model against its limits.
-#[derive(Debug, Serialize)]
-pub struct GivenImu {
-    schema_version: u32,
-    question: Question,
-    #[serde(flatten)]
-    judgement: Judgement,
-    /// With and without what the vehicle knows of its own motion; empty where that is not asked.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    aidings: Vec<Aided>,
-}
-
 /// Curves of errors, the longest outage within the limits, and the hardest limit.
 type Bridged = (Vec<Vec<Drift>>, Longest, Option<Worst>);
 
@@ -987,171 +937,10 @@ struct Judgement {
     margins: Option<Margins>,
 }
 
-/// Limits where the vehicle measures something of its own motion.
-#[derive(Debug, Serialize)]
-struct Aided {
-    aiding: &'static str,
-    /// The hardest limit; none where no place has an outage of that length.
-    #[serde(flatten)]
-    worst: Option<Worst>,
-    outage: Longest,
-}
-
-impl GivenImu {
-    fn verdict(&self) -> Vec<String> {
-        let (question, longest) = (&self.question, &self.judgement.outage.text);
-        let Some(judged) = &self.judgement.margins else {
-            let (limits, starts) = (question.limits_in_words(), question.starts());
-            return vec![format!(
-                "longest outage within {limits}: {longest} ({starts})"
-            )];
-        };
-        let word = if judged.met { "met" } else { "NOT met" };
-        let times = readable(judged.worst.value / judged.worst.limit.most);
-        let without = &judged.without_imu_errors;
-        let (name, left) = (without.limit.quantity, readable(without.value));
-        vec![
-            format!(
-                "{word}: {}, {times} times the limit",
-                question.worst(&judged.worst)
-            ),
-            format!("asked: {}", question.in_words()),
-            format!("longest outage within the limits, from the same starts: {longest}"),
-            if without.margin() >= 0.0 {
-                format!("an IMU without errors would leave {name} {left}")
-            } else {
-                format!("no IMU keeps the limit: GNSS and start alone leave {name} {left}")
-            },
-        ]
-    }
-
-    /// Verdict, tables and charts.
-    fn document(&self) -> Document {
-        let is_good = match &self.judgement.margins {
-            Some(judged) => judged.met,
-            None => self.judgement.outage.length_s() > 0.0,
-        };
-        let mut document = Document::new(
-            "An IMU against its limits",
-            Tone::from(is_good),
-            self.verdict(),
-        );
-        note_beyond(self.judgement.beyond_linear, &mut document);
-        if !self.aidings.is_empty() {
-            document.section("What the car knows of its own motion");
-            let columns = [
-                ("aiding", "aiding"),
-                ("error after the outage", "value"),
-                ("quantity", "quantity"),
-                ("limit", "limit"),
-                ("longest outage within the limits", "outage/text"),
-            ];
-            document.table(Table::of(self, "/aidings/*", &columns));
-        }
-        document.section("Error against the length of an outage");
-        document.table(Table::of(
-            self,
-            "/curves/*",
-            &[("limit on", "quantity"), AFTER],
-        ));
-        document
-    }
-}
-
 // Units of a catalogue against a limit.
-
-/// A column for each length of a curve.
-const AFTER: (&str, &str) = ("{outage_s} s", "points/*/value");
 
 /// What a ranking takes for granted.
 const RULE: &str = "A figure that is missing counts as none: open means that the limit would be kept then. Turn-on bias is the repeatability from one switching-on to the next; an initial tolerance of the zero offset counts as removed before use. Figures named without a sensor are missing for both.";
-
-/// A unit of a catalogue.
-#[derive(Debug, Serialize)]
-struct RankedUnit {
-    unit: String,
-    /// `met`, `not met`, or `open` where figures are missing.
-    kept: &'static str,
-    /// Figures that its datasheet does not state: they count as zero.
-    not_stated: Vec<String>,
-    /// The same in words.
-    missing: String,
-    /// True of `met` if the limits are kept by figures that are all stated.
-    #[serde(flatten)]
-    judgement: Judgement,
-}
-
-/// Units against limits: those whose figures are all stated, the best first, then the others by name.
-#[derive(Debug, Serialize)]
-pub struct Ranking {
-    schema_version: u32,
-    question: Question,
-    units: Vec<RankedUnit>,
-}
-
-impl Ranking {
-    /// The best of the units that keep the limits by figures that are all stated.
-    fn best(&self) -> Option<&RankedUnit> {
-        self.units.iter().find(|unit| unit.kept == "met")
-    }
-
-    /// Verdict and tables.
-    fn document(&self) -> Document {
-        let count = |is: fn(&RankedUnit) -> bool| self.units.iter().filter(|u| is(u)).count();
-        let answer = self.best().map_or(NONE.to_owned(), |best| {
-            let met = count(|unit| unit.kept == "met");
-            format!(
-                "{} is the best of {met} units that keep the limit",
-                best.unit
-            )
-        });
-        let mut lines = vec![answer, format!("asked: {}", self.question.in_words())];
-        let open = count(|unit| !unit.not_stated.is_empty());
-        if open > 0 {
-            lines.push(format!(
-                "{open} units are not ranked: their data sheets leave figures out (--verbose lists them)"
-            ));
-        }
-        let mut document = Document::new(
-            "IMUs against a limit",
-            Tone::from(self.best().is_some()),
-            lines,
-        );
-        let names: Vec<&str> = self
-            .units
-            .iter()
-            .filter(|u| u.judgement.beyond_linear.is_some())
-            .map(|u| u.unit.as_str())
-            .collect();
-        if !names.is_empty() {
-            document.note(
-                Importance::Warning,
-                format!("beyond linear theory: {}: {CONFIRM}", names.join(", ")),
-            );
-        }
-        let quantity = quantity_in_words(self.question.limits[0].quantity);
-        let columns = format!(
-            "1 s … 300 s: {quantity} after such an outage; bridges: longest outage within the limits"
-        );
-        document.note(Importance::Remark, columns);
-        document.section("Ranking");
-        let columns = [
-            ("unit", "unit"),
-            ("limit", "kept"),
-            ("bridges", "outage/text"),
-            ("{outage_s} s", "curves/0/points/*/value"),
-        ];
-        document.table(Table::of(self, "/units/*", &columns));
-        document.section("Figures that are missing");
-        document.table(Table::of(
-            self,
-            "/units/*",
-            &[("unit", "unit"), ("not stated", "missing")],
-        ));
-        document.text(RULE);
-        document
-    }
-}
 
 /// `bias, accel turn-on`: figures that both sensors lack are named once.
 fn missing(not_stated: &[String]) -> String {

@@ -67,7 +67,7 @@ fn outages_last_in_the_mean_as_long_as_the_drive_lets_them() {
 fn a_question_says_how_many_starts_were_tried() {
     let question = |lasts_s| {
         let asked = at_rest(lasts_s, Ask::Length(60.0), None).unwrap();
-        asked.question(asked.outages()).in_words()
+        asked.in_words(&asked.outages())
     };
     let words = "p95_m ≤ 5.00 after an outage of 60 s";
     assert_eq!(

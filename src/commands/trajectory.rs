@@ -1,8 +1,8 @@
 //! `nav-sim trajectory`: reference trajectories.
 
-use crate::app::{Answer, Asked, Command, Context, Failure, Out, OutputFile, Result, inputs};
-use crate::io::scenario_file;
-use crate::io::trajectory_file::{self, Instants, Options, parse_origin};
+use crate::app::inputs::ScenarioArgs;
+use crate::app::{Asked, Command, Context, Failure, Out, PlainAnswer, Result, inputs};
+use crate::io::trajectory_file::{self, parse_origin};
 use crate::parse;
 use crate::report::{gnss_csv, imu_csv, initial_toml};
 use nav_sim_document::{Document, Table, Tone};
@@ -15,8 +15,7 @@ use nav_sim_navigation::simulation::{Plan, record};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::plausibility::{LIMITS, examine};
 use nav_sim_signal::noise::continuous;
-use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::PathBuf;
 
 /// Make, check and convert reference trajectories
@@ -65,47 +64,21 @@ struct Source {
     path: PathBuf,
     /// Origin of local coordinates, if the file does not state it: latitude, longitude, height
     #[arg(long, value_name = "LAT_DEG,LON_DEG,H_M", value_parser = origin, allow_hyphen_values = true)]
-    origin: Option<Origin>,
+    origin: Option<[f64; 3]>,
 }
 
 /// Latitude, longitude (rad), height (m).
-#[derive(Debug, Clone, Copy)]
-struct Origin([f64; 3]);
-
-fn origin(text: &str) -> Result<Origin, String> {
+fn origin(text: &str) -> Result<[f64; 3], String> {
     parse_origin(text)
-        .map(Origin)
         .ok_or_else(|| "not LAT_DEG,LON_DEG,H_M with a latitude within ±89.9".to_owned())
 }
 
 impl Source {
     /// Reads it, and warns of what is doubtful about it.
     fn read(&self, context: &Context<'_>) -> Result<(Trajectory, Vec<String>)> {
-        let origin = self.origin.map(|o| o.0);
-        let read = trajectory_file::load(&self.path, &Options { origin })?;
+        let read = trajectory_file::load(&self.path, self.origin)?;
         context.warn_each(&read.1);
         Ok(read)
-    }
-}
-
-/// A trajectory as a table of nav-sim.
-#[derive(Debug, Serialize)]
-pub struct TrajectoryTable {
-    schema_version: u32,
-    start_s: f64,
-    end_s: f64,
-    rows: usize,
-    #[serde(skip)]
-    text: String,
-}
-
-impl Answer for TrajectoryTable {
-    fn document(&self) -> Document {
-        Document::new("Trajectory", Tone::Good, [format!("{} rows", self.rows)])
-    }
-
-    fn files(&self) -> Vec<OutputFile<'_>> {
-        vec![OutputFile::whole("", self.text.clone())]
     }
 }
 
@@ -120,7 +93,7 @@ pub struct Convert {
 }
 
 impl Command for Convert {
-    type Answer = TrajectoryTable;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "trajectory convert";
     const OUT: Out = Out::File {
         name: "trajectory.csv",
@@ -129,16 +102,18 @@ impl Command for Convert {
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
 
-    fn run(&self, context: &Context<'_>) -> Result<TrajectoryTable> {
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let (trajectory, _) = self.source.read(context)?;
-        let rows = self.rate_hz.map_or(Instants::Knots, Instants::Rate);
-        Ok(TrajectoryTable {
-            schema_version: 1,
-            start_s: trajectory.start_s(),
-            end_s: trajectory.end_s(),
-            rows: rows.times(&trajectory).len(),
-            text: trajectory_file::csv(&trajectory, rows),
-        })
+        let count = trajectory_file::instants(&trajectory, self.rate_hz).len();
+        let json = json!({
+            "schema_version": 1,
+            "start_s": trajectory.start_s(),
+            "end_s": trajectory.end_s(),
+            "rows": count,
+        });
+        let document = Document::new("Trajectory", Tone::Good, [format!("{count} rows")]);
+        let text = trajectory_file::csv(&trajectory, self.rate_hz);
+        Ok(PlainAnswer::new(json, document).with([("", text)]))
     }
 }
 
@@ -171,11 +146,11 @@ pub struct CheckTrajectory {
 const SAID: usize = 10;
 
 impl Command for CheckTrajectory {
-    type Answer = TrajectoryCheck;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "trajectory check";
     const PLOT: bool = false;
 
-    fn run(&self, context: &Context<'_>) -> Result<TrajectoryCheck> {
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let (trajectory, warnings) = self.source.read(context)?;
         let mut limits = LIMITS;
         limits[0] = self.limit_speed;
@@ -190,6 +165,9 @@ impl Command for CheckTrajectory {
         }
         let closure = Closure::new(&trajectory, self.rate_hz, GravityModel::default())
             .map_err(|e| Failure::input(format!("{name}: {e}")).hint("give another --rate-hz"))?;
+        let is_within = closure.within(&bounds);
+        let places = trajectory.knots().iter();
+        let places: Vec<_> = places.map(|t| trajectory.kinematics(*t).r_e).collect();
         let motion = |[speed_m_s, acceleration_m_s2, jerk_m_s3, rate_deg_s]: [f64; 4]| {
             json!({
                 "speed_m_s": speed_m_s,
@@ -198,45 +176,22 @@ impl Command for CheckTrajectory {
                 "rate_deg_s": rate_deg_s,
             })
         };
-        let places = trajectory.knots().iter();
-        let places: Vec<_> = places.map(|t| trajectory.kinematics(*t).r_e).collect();
-        Ok(TrajectoryCheck {
-            file: name,
-            start_s: trajectory.start_s(),
-            end_s: trajectory.end_s(),
-            points: places.len(),
-            path_m: places.windows(2).map(|w| w[0].distance(w[1])).sum(),
-            largest: motion(largest),
-            limits: motion(limits),
-            beyond_limits: beyond.iter().map(ToString::to_string).collect(),
-            warnings,
-            within_bounds: closure.within(&bounds),
-            closure,
-            bounds,
-        })
-    }
-}
-
-/// Results of the check.
-#[derive(Serialize)]
-pub struct TrajectoryCheck {
-    file: String,
-    start_s: f64,
-    end_s: f64,
-    points: usize,
-    /// Length of the path: chords between the points.
-    path_m: f64,
-    largest: Value,
-    limits: Value,
-    beyond_limits: Vec<String>,
-    warnings: Vec<String>,
-    closure: Closure,
-    within_bounds: bool,
-    bounds: Bounds,
-}
-
-impl Answer for TrajectoryCheck {
-    fn document(&self) -> Document {
+        let beyond: Vec<String> = beyond.iter().map(ToString::to_string).collect();
+        let json = json!({
+            "file": name,
+            "start_s": trajectory.start_s(),
+            "end_s": trajectory.end_s(),
+            "points": places.len(),
+            // chords between the points
+            "path_m": places.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>(),
+            "largest": motion(largest),
+            "limits": motion(limits),
+            "beyond_limits": beyond,
+            "warnings": warnings,
+            "closure": closure,
+            "within_bounds": is_within,
+            "bounds": bounds,
+        });
         let rows = [
             ("path (m)", "path_m -"),
             ("speed (m/s)", "largest/speed_m_s limits/speed_m_s"),
@@ -260,29 +215,22 @@ impl Answer for TrajectoryCheck {
             ("velocity (m/s)", "closure/velocity_m_s bounds/velocity_m_s"),
             ("attitude (rad)", "closure/attitude_rad bounds/attitude_rad"),
         ];
-        let c = &self.closure;
+        let (start_s, points) = (trajectory.start_s(), places.len());
         let text = format!(
-            "{}: {} s from {} s, {} points\nclosure at {} Hz over {} s: {}\n{}",
-            self.file,
-            self.end_s - self.start_s,
-            self.start_s,
-            self.points,
-            c.rate_hz,
-            c.duration_s,
-            if self.within_bounds {
+            "{name}: {} s from {start_s} s, {points} points\nclosure at {} Hz over {} s: {}\n{}",
+            trajectory.end_s() - start_s,
+            closure.rate_hz,
+            closure.duration_s,
+            if is_within {
                 "within bounds"
             } else {
                 "BEYOND A BOUND"
             },
-            Table::of_keys(self, &["", "largest", "limit"], &rows).columns(usize::MAX)
+            Table::of_keys(&json, &["", "largest", "limit"], &rows).columns(usize::MAX)
         );
-        Document::new("Trajectory", Tone::Good, [text])
-    }
-
-    fn unmet(&self) -> Option<Failure> {
         let (mut missed, mut hints) = (Vec::new(), Vec::new());
-        if !self.within_bounds {
-            let (c, b) = (&self.closure, &self.bounds);
+        if !is_within {
+            let (c, b) = (&closure, &bounds);
             missed.push(format!(
                 "closure at {} Hz is {:.3e} m, {:.3e} m/s, {:.3e} rad, beyond {:e} m, {:e} m/s or {:e} rad",
                 c.rate_hz,
@@ -295,17 +243,18 @@ impl Answer for TrajectoryCheck {
             ));
             hints.push("a higher --rate-hz closes better; rough motion may deserve a wider bound");
         }
-        let stretches = match self.beyond_limits.len() {
-            0 => None,
-            1 => Some("1 stretch".to_owned()),
-            n => Some(format!("{n} stretches")),
-        };
-        if let Some(stretches) = stretches {
+        if !beyond.is_empty() {
+            let stretches = match beyond.len() {
+                1 => "1 stretch".to_owned(),
+                n => format!("{n} stretches"),
+            };
             missed.push(format!("the motion is beyond a limit in {stretches}"));
             hints.push("a vehicle that does move so deserves a larger --limit-speed");
         }
-        let message = format!("{}: {}", self.file, missed.join("; "));
-        (!missed.is_empty()).then(|| Failure::bound(message).hint(hints.join("; ")))
+        let message = format!("{name}: {}", missed.join("; "));
+        let unmet = (!missed.is_empty()).then(|| Failure::bound(message).hint(hints.join("; ")));
+        let document = Document::new("Trajectory", Tone::Good, [text]);
+        Ok(PlainAnswer::new(json, document).judged(unmet))
     }
 }
 
@@ -327,24 +276,15 @@ pub struct Record {
     /// Noise model of the IMU
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// Scenario file whose [imu], [gnss] and [initial] sections are used
-    #[arg(long, value_name = "FILE")]
-    scenario: Option<PathBuf>,
-}
-
-/// Recorded drive: its files by name.
-#[derive(Debug, Serialize)]
-pub struct RecordedDrive {
-    schema_version: u32,
-    files: [&'static str; 4],
-    #[serde(skip)]
-    texts: [String; 4],
+    /// Settings, of which [imu], [gnss] and [initial] are used.
+    #[command(flatten)]
+    settings: ScenarioArgs,
 }
 
 const RECORDED: [&str; 4] = ["imu.csv", "gnss.csv", "reference.csv", "initial.toml"];
 
 impl Command for Record {
-    type Answer = RecordedDrive;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "trajectory record";
     const OUT: Out = Out::Directory {
         path: "out/recording",
@@ -353,13 +293,8 @@ impl Command for Record {
     const PLOT: bool = false;
     const PAGE: bool = false;
 
-    fn run(&self, context: &Context<'_>) -> Result<RecordedDrive> {
-        let mut scenario = self
-            .scenario
-            .as_deref()
-            .map(scenario_file::read)
-            .transpose()?
-            .unwrap_or_default();
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
+        let mut scenario = self.settings.read()?;
         let (trajectory, _) = self.source.read(context)?;
         let file = inputs::model(&self.model, context)?;
         let model = continuous::at_rate(&file.model, scenario.imu.rate_hz)
@@ -375,29 +310,14 @@ impl Command for Record {
         let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &[], &[], seed);
         let plan = Plan::new(&experiment).map_err(Failure::input)?;
         let recording = record(&plan, 0);
-        Ok(RecordedDrive {
-            schema_version: 1,
-            files: RECORDED,
-            texts: [
-                imu_csv(&recording.imu),
-                gnss_csv(&recording.gnss),
-                trajectory_file::csv(&trajectory, Instants::Rate(10.0)),
-                initial_toml(trajectory.start_s(), &recording.start, &scenario.initial),
-            ],
-        })
-    }
-}
-
-impl Answer for RecordedDrive {
-    fn document(&self) -> Document {
-        Document::new("Recorded drive", Tone::Good, [self.files.join(", ")])
-    }
-
-    fn files(&self) -> Vec<OutputFile<'_>> {
-        self.files
-            .into_iter()
-            .zip(self.texts.clone())
-            .map(|(name, text)| OutputFile::whole(name, text))
-            .collect()
+        let texts = [
+            imu_csv(&recording.imu),
+            gnss_csv(&recording.gnss),
+            trajectory_file::csv(&trajectory, Some(10.0)),
+            initial_toml(trajectory.start_s(), &recording.start, &scenario.initial),
+        ];
+        let json = json!({ "schema_version": 1, "files": RECORDED });
+        let document = Document::new("Recorded drive", Tone::Good, [RECORDED.join(", ")]);
+        Ok(PlainAnswer::new(json, document).with(RECORDED.into_iter().zip(texts)))
     }
 }

@@ -1,14 +1,10 @@
 //! `nav-sim tune`: the smallest factors on the variances of a noise model that make its filter consistent with other truths.
 
 use crate::app::inputs::{self, SettingsArgs};
-use crate::app::{
-    Answer, Command, Context, Failure, Input, Inputs, Out, OutputFile, Result, refused,
-};
-use crate::io::draws_file::{self, Draws};
+use crate::app::{Command, Context, Failure, Input, Inputs, Out, PlainAnswer, Result, refused};
 use crate::io::model_file::{self, ModelFile, PROGRAM, known};
 use crate::parse;
 use crate::report::in_order;
-use nav_sim_calibration::derived_interval;
 use nav_sim_document::{Document, Table, Tone, readable, seconds, short_names};
 use nav_sim_navigation::ekf::{BeliefError, FilterStates};
 use nav_sim_navigation::metrics::{PerState, VerdictKind};
@@ -16,14 +12,13 @@ use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
-    Aim, Factor, FilterConsistency, Task, Track, TrueErrors, UpperEnd, aiding_factor, drive, scaled,
+    Aim, Factor, FilterConsistency, Task, Track, TrueErrors, aiding_factor, drive, scaled,
 };
 use nav_sim_navigation::simulation::{NEES_DOF, REPORTED_NAMES, TOLERANCE};
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Model;
-use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Find the smallest factors on MODEL that make its filter consistent for another truth
 ///
@@ -45,10 +40,6 @@ pub struct Tune {
     /// Noise models that may make the errors, such as those of single recordings [default: MODEL, with the errors in SCENARIO]
     #[arg(id = "truth", long = "truth", value_name = "MODEL2", num_args = 1..)]
     truths: Vec<PathBuf>,
-    /// Truths are MODEL itself and the draws of its calibration (MODEL.draws.json, which `calibrate` writes), each with the
-    /// parameters of a recording of its own where MODEL states a spread: errors count up to the upper end of their 95 % interval
-    #[arg(long, conflicts_with = "truth")]
-    intervals: bool,
     /// Trajectory: motion profile (.toml) or table (.csv) [default: a built-in drive with outages of that length]
     #[arg(long, value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
@@ -72,48 +63,47 @@ const RARE_FIXES: &str =
 const DAY_S: f64 = 86_400.0;
 
 impl Command for Tune {
-    type Answer = TuneAnswer;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "tune";
     const OUT: Out = Out::File {
         name: "tuned.toml",
         help: "Model file to write",
     };
 
-    fn inputs(&self, mut given: Inputs) -> Result<Inputs> {
-        self.refuse_recordings()?;
-        let draws = draws_file::beside(&self.model);
-        let is_read = self.intervals && draws.exists();
-        given.extend(is_read.then(|| ("draws".to_owned(), draws)));
-        Ok(given)
+    fn inputs(&self, given: Inputs) -> Result<Inputs> {
+        self.refuse_recordings().map(|()| given)
     }
 
-    fn run(&self, context: &Context<'_>) -> Result<TuneAnswer> {
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let mut scenario = self.settings.checked()?;
-        if self.truths.is_empty() && !self.intervals && scenario.has_no_errors() {
+        if self.truths.is_empty() && scenario.has_no_errors() {
             return refused(
-                "no truth to be consistent with: neither --truth nor --intervals is given",
-                "give models (--truth OTHER.toml, one a recording), --intervals for a MODEL of `nav-sim calibrate`, or a scenario with errors",
+                "no truth to be consistent with: --truth is not given, and the scenario has no errors",
+                "give models (--truth OTHER.toml, one a recording), or a scenario with errors",
             );
         }
         let file = inputs::model(&self.model, context)?;
         let model = inputs::at_rate(&self.model, &file.model, scenario.imu.rate_hz, context)?;
         inputs::expect_turn_on(&mut scenario.initial, file.turn_on, &self.model, context);
-        let truths = self.truths((&file, &model), &scenario, context)?;
+        let truths = self.true_errors(&scenario, context)?;
         let (track, outages) = self.track(&scenario, &model, context)?;
-        let found = self.tune(&scenario, &model, truths, &track, &outages);
+        let found = self.tune(&scenario, &model, &truths, &track, &outages);
         let settings = self.settings.file.scenario.as_deref();
-        let mut answer =
-            found.map_err(|e| inputs::no_filter(&e, &self.model, settings, RARE_FIXES))?;
-        answer.model = self.model.display().to_string();
-        let of = if self.intervals {
-            "intervals"
-        } else {
-            "truths"
-        };
-        let goal = format!("{} of {of}", self.aim);
-        let is_met = answer.fault().is_none();
-        answer.tuned = is_met.then(|| tuned(&file, &answer.factors, &goal, context.inputs()));
-        Ok(answer)
+        let found = found.map_err(|e| inputs::no_filter(&e, &self.model, settings, RARE_FIXES))?;
+        let goal = format!("{} of truths", self.aim);
+        let fault = found.fault();
+        let tuned = fault.is_none().then(|| {
+            let tuned = tuned(&file, &found.factors, &goal, context.inputs());
+            ("", model_file::to_toml(&tuned))
+        });
+        let unmet = fault.map(|fault| {
+            let model = self.model.display();
+            let message = format!("{model}: {fault}; no tuned model is written");
+            Failure::bound(message).hint(found.remedy())
+        });
+        Ok(PlainAnswer::new(found.json(), found.document())
+            .with(tuned)
+            .judged(unmet))
     }
 }
 
@@ -136,66 +126,21 @@ impl Tune {
 
     /// What may be true, at the rate of the IMU: noise, turn-on bias, and what the scenario states of the true IMU and
     /// receiver.
-    fn truths(
-        &self,
-        (file, model): (&ModelFile, &Model),
-        scenario: &Scenario,
-        context: &Context<'_>,
-    ) -> Result<Truths> {
-        let true_errors = |path: &Path, model: Model, turned_on: &ModelFile| {
+    fn true_errors(&self, scenario: &Scenario, context: &Context<'_>) -> Result<Vec<TrueErrors>> {
+        let truth = |path: &PathBuf| {
+            let file = inputs::model(path, context)?;
+            let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
             let (mut imu, gnss) = (scenario.imu.clone(), scenario.gnss.clone());
-            inputs::make_turn_on(&mut imu, turned_on.turn_on, path, context);
-            TrueErrors {
+            inputs::make_turn_on(&mut imu, file.turn_on, path, context);
+            let aiding = scenario.aiding.clone();
+            Ok::<_, Failure>(TrueErrors {
                 model,
                 imu,
                 gnss,
-                aiding: scenario.aiding.clone(),
-            }
+                aiding,
+            })
         };
-        let truths = if self.intervals {
-            let draws = draws(
-                &self.model,
-                file,
-                scenario.imu.rate_hz,
-                context.seed_or(None),
-            )?;
-            let estimate = true_errors(&self.model, model.clone(), file);
-            let names = vec![format!(
-                "{} and the {} draws beside it",
-                self.model.display(),
-                draws.models.len()
-            )];
-            let drawn = draws.models.into_iter().map(|model| TrueErrors {
-                model,
-                ..estimate.clone()
-            });
-            let errors = std::iter::once(estimate.clone()).chain(drawn).collect();
-            Truths {
-                names,
-                errors,
-                stretch: Some(draws.stretch),
-            }
-        } else {
-            let truth = |path: &PathBuf| {
-                let file = inputs::model(path, context)?;
-                let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
-                Ok::<_, Failure>((path.display().to_string(), true_errors(path, model, &file)))
-            };
-            // Without another, MODEL with what the scenario says is wrong beside it.
-            let own = std::slice::from_ref(&self.model);
-            let paths = if self.truths.is_empty() {
-                own
-            } else {
-                &self.truths
-            };
-            let named = paths.iter().map(truth).collect::<Result<Vec<_>>>()?;
-            let (names, errors) = named.into_iter().unzip();
-            Truths {
-                names,
-                errors,
-                stretch: None,
-            }
-        };
+        let truths = self.paths().iter().map(truth).collect::<Result<Vec<_>>>()?;
         let unexpected = |truth: &TrueErrors| {
             let imu = truth.imu.clone();
             let scenario = Scenario {
@@ -204,9 +149,18 @@ impl Tune {
             };
             scenario.unexpected()
         };
-        let doubts: Vec<String> = truths.errors.iter().flat_map(unexpected).collect();
+        let doubts: Vec<String> = truths.iter().flat_map(unexpected).collect();
         context.warn_each(in_order(doubts.iter().map(String::as_str)));
         Ok(truths)
+    }
+
+    /// The models that may be true; without --truth MODEL itself, beside what the scenario says is wrong.
+    fn paths(&self) -> &[PathBuf] {
+        if self.truths.is_empty() {
+            std::slice::from_ref(&self.model)
+        } else {
+            &self.truths
+        }
     }
 
     /// The way of the analysis with its outages.
@@ -244,50 +198,16 @@ impl Tune {
     }
 }
 
-/// The draws beside a model file; what the intervals in the file itself leave out is how its parameters hang together.
-fn draws(path: &Path, file: &ModelFile, rate_hz: f64, seed: u64) -> Result<Draws> {
-    let missing = || {
-        format!(
-            "{}: the draws of its calibration are missing",
-            draws_file::beside(path).display()
-        )
-    };
-    let found = draws_file::usable(path, file, rate_hz, Some(seed))
-        .and_then(|draws| draws.ok_or_else(missing));
-    found.map_err(|doubt| {
-        Failure::input(doubt)
-            .hint("calibrate again: the draws are written beside MODEL, unless with --bootstrap 0")
-    })
-}
-
-/// What may be true of an IMU: some models, or one and the draws of its calibration.
-struct Truths {
-    /// The names of the models; of draws one for all.
-    pub names: Vec<String>,
-    /// What they are; the model first, where the others are its draws.
-    pub errors: Vec<TrueErrors>,
-    /// Of draws, what distances from their median are multiplied by.
-    pub stretch: Option<f64>,
-}
-
 impl Tune {
     /// The factors, and the filter before and after them. `given` has the filter that `run` would have.
     fn tune(
         &self,
         given: &Scenario,
         model: &Model,
-        truths: Truths,
+        truths: &[TrueErrors],
         track: &Track,
         outages: &[Outage],
-    ) -> std::result::Result<TuneAnswer, BeliefError> {
-        // Draws are many: within 1.2e-3 the analysis is the same with one step from fix to fix, which `run` takes for them too.
-        let merged = truths.stretch.map(|_| track.merged());
-        let analysed = merged.as_ref().unwrap_or(track);
-        // The interval that `run` states for an error: the filter and its standard deviation are the same in all draws.
-        let upper_end = |stretch| {
-            move |estimate: f64, draws: Vec<f64>| derived_interval(estimate, draws, stretch)[1]
-        };
-        let upper_end = truths.stretch.map(upper_end);
+    ) -> std::result::Result<Tuning, BeliefError> {
         let mut scenario = given.clone();
         match self.filter {
             // what goes with the filter of 21 states beside the model stays
@@ -297,59 +217,41 @@ impl Tune {
         let filter_of_run = given.filter.states;
         // What is wrong with the vehicle's own measurements no noise of the IMU stands for: their sigmas come first.
         let aiding = &given.aiding;
-        let belief = scenario
-            .with_full_noise()
-            .belief(model, outages, analysed)?;
+        let belief = scenario.with_full_noise().belief(model, outages, track)?;
         let known = TrueErrors {
             aiding: aiding.clone(),
             ..TrueErrors::from(model.clone())
         };
-        let aiding_sigmas = (!aiding.is_none())
-            .then(|| aiding_factor(analysed, &belief, &known).unwrap_or(f64::NAN));
+        let aiding_sigmas =
+            (!aiding.is_none()).then(|| aiding_factor(track, &belief, &known).unwrap_or(f64::NAN));
         let widened = aiding_sigmas
             .filter(|factor| *factor > 1.0)
-            .map(|factor| analysed.with_aiding_sigmas(factor));
-        let believed = analysed;
-        let analysed = widened.as_ref().unwrap_or(analysed);
+            .map(|factor| track.with_aiding_sigmas(factor));
+        let analysed = widened.as_ref().unwrap_or(track);
         let full = scenario.with_full_noise();
         let full = |model: &Model| full.belief(model, outages, analysed);
         let tuned = |model: &Model| scenario.belief(model, outages, analysed);
         let of_run = |model: &Model| given.belief(model, outages, analysed);
         let task = Task {
             model,
-            truths: &truths.errors,
-            drawn: upper_end.as_ref().map(|end| end as &UpperEnd<'_>),
+            truths,
             track: analysed,
             full: &full,
             filter: &tuned,
             aim: self.aim,
         };
         let factors = task.factors()?;
-        let ones: Vec<Factor> = factors
-            .iter()
-            .map(|f| Factor {
-                on_variance: 1.0,
-                ..*f
-            })
-            .collect();
         let after = task.consistency(task.filter, &factors)?;
-        Ok(TuneAnswer {
-            model: String::new(),
-            tuned: None,
+        Ok(Tuning {
             filter: self.filter,
             filter_of_run,
-            before: Task {
-                track: believed,
-                ..task
-            }
-            .consistency(task.filter, &ones)?,
+            before: Task { track, ..task }.consistency(task.filter, &[])?,
             aiding_sigmas,
             after,
             of_run: (self.filter != filter_of_run)
                 .then(|| task.consistency(&of_run, &factors))
                 .transpose()?,
             informed: truths
-                .errors
                 .iter()
                 .all(|truth| truth.imu.without_states().next().is_none())
                 .then(|| {
@@ -359,8 +261,11 @@ impl Tune {
                 })
                 .transpose()?,
             factors,
-            is_drawn: truths.stretch.is_some(),
-            truths: truths.names,
+            truths: self
+                .paths()
+                .iter()
+                .map(|path| path.display().to_string())
+                .collect(),
             aim: self.aim,
             without_factor: task.without_factor(),
         })
@@ -416,9 +321,7 @@ const UNCHANGED: f64 = 0.01;
 
 /// Factors, and the filter before and after them.
 #[derive(Debug, Clone)]
-pub struct TuneAnswer {
-    model: String,
-    tuned: Option<ModelFile>,
+struct Tuning {
     /// The filter that was tuned.
     filter: FilterStates,
     /// The filter that `run` makes of the model unless told otherwise.
@@ -435,14 +338,12 @@ pub struct TuneAnswer {
     of_run: Option<FilterConsistency>,
     /// A filter that knows the truth, each truth its own; none where there are errors of which no filter has states.
     informed: Option<FilterConsistency>,
-    /// Names of the truths; of draws one for all.
+    /// Names of the truths.
     truths: Vec<String>,
     /// Condition under which the filter counts as consistent.
     aim: Aim,
     /// Sensors without noise that a factor could multiply, where a truth has some.
     without_factor: Vec<Sensor>,
-    /// Whether the truths are the draws of a calibration, and what counts is the upper end of an interval.
-    is_drawn: bool,
 }
 
 /// Verdict of `run` on a filter, by its covariance analysis.
@@ -454,7 +355,7 @@ fn kind(found: &FilterConsistency) -> VerdictKind {
     }
 }
 
-impl TuneAnswer {
+impl Tuning {
     /// The factors and their cost, then the filters that they make.
     fn verdict(&self) -> Vec<String> {
         let name = filter_name(self.filter);
@@ -509,8 +410,6 @@ impl TuneAnswer {
     /// Why the factors are of no use, if they are not.
     fn fault(&self) -> Option<String> {
         let is_overconfident = match self.aim {
-            // of draws the first counts: what `run` judges
-            Aim::Worst if self.is_drawn => kind(&self.after) == VerdictKind::Overconfident,
             Aim::Worst => self.after.largest.ratio > 1.0 + TOLERANCE,
             Aim::Mean => self.after.nees / NEES_DOF as f64 > (1.0 + TOLERANCE).powi(2),
         };
@@ -567,16 +466,12 @@ impl TuneAnswer {
 
     /// The truth in which an error is largest.
     fn worst_truth(&self, found: &FilterConsistency) -> &str {
-        &self.truths[if self.is_drawn {
-            0
-        } else {
-            found.largest.truth
-        }]
+        &self.truths[found.largest.truth]
     }
 }
 
-impl Serialize for TuneAnswer {
-    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+impl Tuning {
+    fn json(&self) -> Value {
         let end = |(after_s, rmse): (&f64, &[f64; REPORTED_NAMES.len()])| {
             json!({
                 "after_s": after_s,
@@ -607,7 +502,7 @@ impl Serialize for TuneAnswer {
         if let Some(factor) = self.aiding_sigmas {
             file["aiding_sigma_factor"] = json!(factor);
         }
-        file.serialize(serializer)
+        file
     }
 }
 
@@ -651,7 +546,7 @@ fn factors_in_words(changed: &[&Factor]) -> String {
     changed.iter().map(word).collect::<Vec<_>>().join(", ")
 }
 
-impl Answer for TuneAnswer {
+impl Tuning {
     fn document(&self) -> Document {
         let found = kind(&self.after);
         let tone = match self.fault() {
@@ -661,6 +556,7 @@ impl Answer for TuneAnswer {
             }
             None => Tone::Doubtful,
         };
+        let json = self.json();
         let mut document = Document::new("Factors on a noise model", tone, self.verdict());
         let truths: Vec<&str> = self.truths.iter().map(String::as_str).collect();
         document.text(&format!("truths: {}", short_names(&truths).join(", ")));
@@ -674,7 +570,7 @@ impl Answer for TuneAnswer {
             ("in", "place"),
             ("RMSE {after_s} s (m)", "outage_end/*/horizontal_rmse_m"),
         ];
-        document.table(Table::of(self, "/filters/*", &columns));
+        document.table(Table::of(&json, "/filters/*", &columns));
         document.text("RMSE/sigma: largest error over what the filter states. RMSE: horizontal, at the end of an outage.");
         document.section("Factors");
         let columns = [
@@ -682,29 +578,12 @@ impl Answer for TuneAnswer {
             ("factor on the variance", "on_variance"),
             ("on the standard deviation", "on_sigma"),
         ];
-        document.table(Table::of(self, "/factors/*", &columns));
+        document.table(Table::of(&json, "/factors/*", &columns));
         document
-    }
-
-    fn files(&self) -> Vec<OutputFile<'_>> {
-        let tuned = self.tuned.as_ref().map(model_file::to_toml);
-        tuned
-            .map(|text| OutputFile::whole("", text))
-            .into_iter()
-            .collect()
-    }
-
-    fn unmet(&self) -> Option<Failure> {
-        let message = format!(
-            "{}: {}; no tuned model is written",
-            self.model,
-            self.fault()?
-        );
-        Some(Failure::bound(message).hint(self.remedy()))
     }
 }
 
-impl TuneAnswer {
+impl Tuning {
     /// State, time and truth of the largest error.
     fn place(&self, found: &FilterConsistency) -> String {
         let mut place = REPORTED_NAMES[found.largest.state].to_owned();
@@ -744,10 +623,8 @@ mod tests {
         }
     }
 
-    fn result(filter: FilterStates, of_run: FilterConsistency) -> TuneAnswer {
-        TuneAnswer {
-            model: String::new(),
-            tuned: None,
+    fn result(filter: FilterStates, of_run: FilterConsistency) -> Tuning {
+        Tuning {
             aiding_sigmas: None,
             filter,
             filter_of_run: FilterStates::Reduced15,
@@ -760,7 +637,6 @@ mod tests {
             of_run: (filter != FilterStates::Reduced15).then_some(of_run),
             informed: Some(consistency(1.0, 9.0)),
             truths: vec!["truth.toml".to_owned()],
-            is_drawn: false,
             aim: Aim::Worst,
             without_factor: Vec::new(),
         }

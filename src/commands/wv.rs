@@ -2,7 +2,7 @@
 
 use crate::app::reading::{RecordingRequest, VarianceRequest};
 use crate::app::{Answer, Command, Context, Out, OutputFile, Result};
-use crate::commands::calibrate::{visit, without_warm_up};
+use crate::commands::calibrate::visit;
 use crate::io::recordings::ReadOptions;
 use crate::parse;
 use crate::report::curves::{
@@ -22,7 +22,7 @@ use std::path::PathBuf;
 Examples:
   nav-sim wv calib_data/formats/own.csv
   nav-sim wv calib_data/formats/euroc.csv --axes gyro --intervals large-sample
-  nav-sim wv calib_data/formats/compressed.csv.gz --format json -o static.wv.json")]
+  nav-sim wv calib_data/formats/compressed.csv.gz --format json -o curves.json")]
 pub struct Wv {
     /// Recordings, or directories of recordings
     #[arg(id = "recording", required = true, value_name = "FILE")]
@@ -49,18 +49,12 @@ impl Command for Wv {
 
     fn run(&self, context: &Context<'_>) -> Result<SignalsFile> {
         let (scales, tuning) = (self.tuning.levels(), self.tuning.tuning()?);
-        let skips_warm_up = self.recordings.reading.skips_warm_up();
         // Four samples have a scale.
         let reading = ReadOptions {
             min_samples: scales.map_or(4, |j| 1 << j),
             ..self.recordings.options()
         };
         let look = |recording: Recording| -> Result<Vec<SignalCurves>> {
-            let recording = if skips_warm_up {
-                without_warm_up(recording, true).0
-            } else {
-                recording
-            };
             let measured = replicates(&recording, scales, &tuning)?;
             let curves = |(channel, replicate): &(Channel, Replicate)| {
                 let edof = self.degrees_of_freedom(&recording, *channel, replicate)?;
@@ -80,7 +74,7 @@ impl Command for Wv {
             schema_version: 1,
             rate_hz: report.files[0].rate_hz,
             efficiency: tuning.efficiency(),
-            edof_method: self.intervals.name().to_owned(),
+            edof_method: self.intervals.name(),
             confidence: CONFIDENCE,
             signals: signals.concat(),
         })
@@ -295,11 +289,11 @@ mod tests {
         let tau_s: Vec<f64> = (1..=14).map(|j| f64::from(j).exp2() / 100.0).collect();
         let wv: Vec<f64> = tau_s.iter().map(|tau| 1.0 / tau).collect();
         let edof: Vec<f64> = (1..=14).map(|j| 1e5 / f64::from(j).exp2()).collect();
-        let band = |factor: f64, status: &str| Band {
+        let band = |factor: f64, status: &'static str| Band {
             wv: wv.iter().map(|x| x * factor).collect(),
             ci_low: wv.clone(),
             ci_high: wv.clone(),
-            status: vec![status.to_owned(); 14],
+            status: vec![status; 14],
         };
         let signal = |k: usize| SignalCurves {
             file: format!("rec/run{k}.csv"),
@@ -315,7 +309,7 @@ mod tests {
             schema_version: 1,
             rate_hz: 100.0,
             efficiency: 0.6,
-            edof_method: "eta3".to_owned(),
+            edof_method: "eta3",
             confidence: CONFIDENCE,
             signals: (0..count).map(signal).collect(),
         }

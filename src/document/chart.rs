@@ -1,23 +1,12 @@
 //! What a chart shows, before it is drawn.
 
-/// How an axis runs.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Scale {
-    /// Evenly.
-    Linear,
-    /// By powers of ten; what is not positive is not shown.
-    Log,
-    /// One place for each of these names: the k-th stands at k.
-    Names(Vec<String>),
-}
-
 /// An axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// Quantity and unit, such as `time (s)`.
     pub label: String,
-    /// How it runs.
-    pub scale: Scale,
+    /// Whether it runs by powers of ten; what is not positive is not shown then.
+    pub is_log: bool,
     /// What it shows at least.
     pub include: Option<(f64, f64)>,
 }
@@ -27,7 +16,7 @@ impl Axis {
     pub fn linear(label: &str) -> Self {
         Self {
             label: label.to_owned(),
-            scale: Scale::Linear,
+            is_log: false,
             include: None,
         }
     }
@@ -35,16 +24,8 @@ impl Axis {
     /// A logarithmic axis.
     pub fn log(label: &str) -> Self {
         Self {
-            scale: Scale::Log,
+            is_log: true,
             ..Self::linear(label)
-        }
-    }
-
-    /// An axis of names.
-    pub fn names(names: Vec<String>) -> Self {
-        Self {
-            scale: Scale::Names(names),
-            ..Self::linear("")
         }
     }
 
@@ -54,12 +35,6 @@ impl Axis {
             include: Some((low, high)),
             ..self
         }
-    }
-
-    /// The same with zero inside, as an axis of errors must be.
-    #[must_use]
-    pub fn with_zero(self) -> Self {
-        self.including(0.0, 0.0)
     }
 }
 
@@ -175,11 +150,6 @@ impl Series {
         Self::new(name, colour, Mark::Line(points, Stroke::Plain))
     }
 
-    /// A thin line.
-    pub fn thin(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
-        Self::new(name, colour, Mark::Line(points, Stroke::Thin))
-    }
-
     /// Points (x, y, half of the interval; NaN: none).
     pub fn points(
         name: &str,
@@ -224,6 +194,11 @@ impl Panel {
             series,
             height: 1.0,
         }
+    }
+
+    /// The same of another height, as a share of the usual one.
+    pub fn of_height(self, height: f64) -> Self {
+        Self { height, ..self }
     }
 }
 
@@ -280,16 +255,9 @@ impl Chart {
 
     /// Panels over time with outages (start, end) marked, in the group of charts that are zoomed together.
     pub fn over_time(title: &str, panels: Vec<Panel>, outages: &[(f64, f64)]) -> Self {
-        Self::new(title, Axis::linear("time (s)"), panels)
-            .with_outages(outages)
-            .in_group("time")
-    }
-
-    /// The same with outages (start, end) marked.
-    pub fn with_outages(self, outages: &[(f64, f64)]) -> Self {
         Self {
             stripes: ("outage".to_owned(), outages.to_vec()),
-            ..self
+            ..Self::new(title, Axis::linear("time (s)"), panels).in_group("time")
         }
     }
 

@@ -1,6 +1,6 @@
 //! Charts as SVG: layout, axes, stripes; for a screen and for a phone, so that text is never scaled.
 
-use crate::chart::{Axis, Chart, Interval, Mark, Panel, Scale, Series, Stroke};
+use crate::chart::{Axis, Chart, Interval, Mark, Panel, Series, Stroke};
 use crate::number::readable;
 use std::fmt::Write as _;
 
@@ -16,7 +16,7 @@ pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
         .filter_map(|(i, panel)| Some((i, panel, y_range(panel)?)))
         .collect();
     let last = shown.last()?.0;
-    let is_log = chart.x.scale == Scale::Log;
+    let is_log = chart.x.is_log;
     let air = if is_log || chart.is_map { 0.03 } else { 0.0 };
     let series = chart.panels.iter().flat_map(|p| &p.series);
     let x_range = range(&chart.x, series.flat_map(|s| values(&s.mark).0), air)?;
@@ -37,7 +37,7 @@ pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
         };
         let mut y = Ruler {
             range,
-            is_log: panel.y.scale == Scale::Log,
+            is_log: panel.y.is_log,
             pixels: (0.0, 0.0),
         };
         let mut height = canvas.panel * panel.height;
@@ -49,13 +49,9 @@ pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
         let y_ticks = y_ticks(panel, y.range, height);
         let most = canvas.width as usize;
         let frame = Frame { x, y, most };
-        let sketch = Sketch {
-            chart,
-            panel,
-            canvas,
-            frame,
-        };
-        let below = sketch.draw(&y_ticks, i == last, &legend, &mut svg);
+        let below = frame.grid(&chart.x, canvas, &y_ticks, i == last, &mut svg);
+        frame.inside(chart, panel, &legend, &mut svg);
+        frame.places(panel, canvas, &mut svg);
         top = plot_top + height + if i == last { below } else { GAP };
     }
     Some((svg, top.ceil()))
@@ -74,24 +70,17 @@ fn equalise(x: &mut Ruler, y: &mut Ruler, canvas: &Canvas) -> f64 {
     height
 }
 
-/// One panel on its place.
-struct Sketch<'a> {
-    chart: &'a Chart,
-    panel: &'a Panel,
-    canvas: &'a Canvas,
-    frame: Frame,
-}
-
-impl Sketch<'_> {
-    /// Returns the height of what stands below the plot.
-    fn draw(
+impl Frame {
+    /// Ticks and grid; returns the height of what stands below the plot.
+    fn grid(
         &self,
+        x_axis: &Axis,
+        canvas: &Canvas,
         y_ticks: &[(f64, String)],
         is_last: bool,
-        legend: &Legend<'_>,
         svg: &mut String,
     ) -> f64 {
-        let Frame { x, y, .. } = &self.frame;
+        let (Frame { x, y, .. }, font) = (self, canvas.font);
         let ((left, right), (bottom, top)) = (x.pixels, y.pixels);
         *svg += "<g class=\"ticks\">\n";
         for (value, label) in y_ticks {
@@ -100,53 +89,15 @@ impl Sketch<'_> {
                 svg,
                 "<path class=\"grid\" d=\"M{left:.1} {height:.1}H{right:.1}\"/>"
             );
-            let place = (left - 6.0, height + 0.35 * self.canvas.font);
-            text(svg, "tick", place, "end", label);
+            text(
+                svg,
+                "tick",
+                (left - 6.0, height + 0.35 * font),
+                "end",
+                label,
+            );
         }
-        let below = self.x_axis(is_last, svg);
-        *svg += "</g>\n";
-        self.inside(legend, svg);
-        let _ = writeln!(
-            svg,
-            "<path class=\"axis\" d=\"M{left:.1} {top:.1}V{bottom:.1}H{right:.1}\"/>"
-        );
-        self.places(svg);
-        below
-    }
-
-    /// All that moves when the panel is zoomed; the script reads the axes from it.
-    fn inside(&self, legend: &Legend<'_>, svg: &mut String) {
-        let Frame { x, y, .. } = &self.frame;
-        let ((left, right), (bottom, top)) = (x.pixels, y.pixels);
-        let (width, height) = (right - left, bottom - top);
-        let _ = writeln!(
-            svg,
-            "<svg class=\"plot\" x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" \
-             viewBox=\"{left:.1} {top:.1} {width:.1} {height:.1}\" preserveAspectRatio=\"none\" data-x=\"{}\" data-y=\"{}\">",
-            x.data(),
-            y.data()
-        );
-        let stripes = self.chart.stripes.1.iter().filter(|_| !self.chart.is_map);
-        for (from, to) in stripes.map(|(from, to)| (x.within(*from), x.within(*to))) {
-            if to > from {
-                let width = to - from;
-                let _ = writeln!(
-                    svg,
-                    "<rect class=\"outage\" x=\"{from:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"/>"
-                );
-            }
-        }
-        for series in &self.panel.series {
-            self.frame.series(series, legend.key(&series.name), svg);
-        }
-        *svg += "</svg>\n";
-    }
-
-    /// Returns its height.
-    fn x_axis(&self, is_last: bool, svg: &mut String) -> f64 {
-        let (Frame { x, y, .. }, axis, font) = (&self.frame, &self.chart.x, self.canvas.font);
-        let (bottom, top) = y.pixels;
-        for (value, label) in ticks(axis, x.range, self.canvas.labels) {
+        for (value, label) in ticks(x_axis, x.range, canvas.labels) {
             let place = x.at(value);
             let _ = writeln!(
                 svg,
@@ -158,23 +109,54 @@ impl Sketch<'_> {
         }
         let below = 2.0 * font + 9.0;
         if is_last {
-            let place = (x.pixels.1, bottom + below);
-            text(svg, "name", place, "end", &axis.label);
+            text(svg, "name", (right, bottom + below), "end", &x_axis.label);
         }
+        *svg += "</g>\n";
         below + 8.0
     }
 
+    /// All that moves when the panel is zoomed; the script reads the axes from it.
+    fn inside(&self, chart: &Chart, panel: &Panel, legend: &Legend<'_>, svg: &mut String) {
+        let Frame { x, y, .. } = self;
+        let ((left, right), (bottom, top)) = (x.pixels, y.pixels);
+        let (width, height) = (right - left, bottom - top);
+        let _ = writeln!(
+            svg,
+            "<svg class=\"plot\" x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" \
+             viewBox=\"{left:.1} {top:.1} {width:.1} {height:.1}\" preserveAspectRatio=\"none\" data-x=\"{}\" data-y=\"{}\">",
+            x.data(),
+            y.data()
+        );
+        let stripes = chart.stripes.1.iter().filter(|_| !chart.is_map);
+        for (from, to) in stripes.map(|(from, to)| (x.within(*from), x.within(*to))) {
+            if to > from {
+                let width = to - from;
+                let _ = writeln!(
+                    svg,
+                    "<rect class=\"outage\" x=\"{from:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"/>"
+                );
+            }
+        }
+        for series in &panel.series {
+            self.series(series, legend.key(&series.name), svg);
+        }
+        let _ = writeln!(
+            svg,
+            "</svg>\n<path class=\"axis\" d=\"M{left:.1} {top:.1}V{bottom:.1}H{right:.1}\"/>"
+        );
+    }
+
     /// Names of places beside them.
-    fn places(&self, svg: &mut String) {
-        let Frame { x, y, .. } = &self.frame;
-        for series in &self.panel.series {
+    fn places(&self, panel: &Panel, canvas: &Canvas, svg: &mut String) {
+        let Frame { x, y, .. } = self;
+        for series in &panel.series {
             let Mark::Place(px, py) = series.mark else {
                 continue;
             };
-            if !self.frame.shows(px, py) {
+            if !self.shows(px, py) {
                 continue;
             }
-            let width = text_width(&series.name, self.canvas.font);
+            let width = text_width(&series.name, canvas.font);
             let (px, py) = (x.at(px), y.at(py) - 6.0);
             let (anchor, px) = match px + 8.0 + width < x.pixels.1 {
                 true => ("start", px + 7.0),
@@ -212,7 +194,7 @@ const BEYOND: f64 = 30.0;
 /// What a panel shows: what is far beyond the main curves is cut, so that it does not flatten them. Bands and
 /// auxiliary lines may leave the panel.
 fn y_range(panel: &Panel) -> Option<(f64, f64)> {
-    let is_log = panel.y.scale == Scale::Log;
+    let is_log = panel.y.is_log;
     let main = panel.series.iter().flat_map(|s| match &s.mark {
         Mark::Points(points) if is_log => points.iter().map(|p| p.y).collect(),
         Mark::Line(_, Stroke::Plain) | Mark::Level(_) | Mark::Points(_) | Mark::Place(..) => {
@@ -268,28 +250,23 @@ fn is_shown(value: f64, is_log: bool) -> bool {
 
 /// What an axis shows: the values with some air, none without a value.
 fn range(axis: &Axis, values: impl Iterator<Item = f64>, air: f64) -> Option<(f64, f64)> {
-    if let Scale::Names(names) = &axis.scale {
-        return Some((-0.5, names.len() as f64 - 0.5));
-    }
     let extra = axis.include.into_iter().flat_map(|(low, high)| [low, high]);
-    let shown = values
-        .chain(extra)
-        .filter(|v| is_shown(*v, axis.scale == Scale::Log));
+    let shown = values.chain(extra).filter(|v| is_shown(*v, axis.is_log));
     let (low, high) = extremes(shown)?;
-    Some(match axis.scale {
-        Scale::Log => {
-            let air = if low == high {
-                2.0
-            } else {
-                (high / low).powf(air).max(1.0 + 2.0 * air)
-            };
-            (low / air, high * air)
-        }
-        _ if low == high => (
+    Some(if axis.is_log {
+        let air = if low == high {
+            2.0
+        } else {
+            (high / low).powf(air).max(1.0 + 2.0 * air)
+        };
+        (low / air, high * air)
+    } else if low == high {
+        (
             low - 0.1 * low.abs().max(1.0),
             high + 0.1 * high.abs().max(1.0),
-        ),
-        _ => (low - air * (high - low), high + air * (high - low)),
+        )
+    } else {
+        (low - air * (high - low), high + air * (high - low))
     })
 }
 
@@ -303,14 +280,10 @@ fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 
 /// Places of an axis that have a label, and the labels; `most`: about how many.
 fn ticks(axis: &Axis, range: (f64, f64), most: usize) -> Vec<(f64, String)> {
-    match &axis.scale {
-        Scale::Names(names) => names
-            .iter()
-            .enumerate()
-            .map(|(k, name)| (k as f64, name.clone()))
-            .collect(),
-        Scale::Log if range.1 / range.0 >= 6.0 => decades(range, most),
-        _ => steps(range, most),
+    if axis.is_log && range.1 / range.0 >= 6.0 {
+        decades(range, most)
+    } else {
+        steps(range, most)
     }
 }
 
@@ -419,10 +392,6 @@ mod marks_tests {
                 .first()
                 .map(String::as_str),
             Some("0.9")
-        );
-        assert_eq!(
-            labels(&Axis::names(vec!["a".into(), "b".into()]), (-0.5, 1.5)),
-            ["a", "b"]
         );
     }
 

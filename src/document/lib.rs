@@ -28,9 +28,9 @@ mod table;
 // L5: documents
 mod document;
 
-pub use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Scale, Series, Size, Stroke};
+pub use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Series, Size, Stroke};
 pub use document::{Block, Document, Importance, NOTES, Note, Tone};
 pub use draw::{escape, turns};
-pub use number::{percent, readable, seconds, short_names, shortest, six_digits, window};
+pub use number::{readable, seconds, short_names, shortest, six_digits, window};
 pub use picture::{FORMS, encode, svg};
 pub use table::{Cell, Table};

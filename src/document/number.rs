@@ -26,11 +26,6 @@ pub fn window(start_s: f64, end_s: f64) -> String {
     format!("{}–{} s", seconds(start_s), seconds(end_s))
 }
 
-/// A share, to one per cent.
-pub fn percent(share: f64) -> String {
-    format!("{:.0} %", 100.0 * share)
-}
-
 /// A number for people: three significant digits, or four figures before the point.
 #[must_use]
 pub fn readable(x: f64) -> String {

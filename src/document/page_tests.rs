@@ -23,7 +23,10 @@ fn chart() -> Chart {
         Panel::new(Axis::log("error (m)"), upper),
         Panel::new(Axis::linear("ratio"), lower),
     ];
-    Chart::new("a<b", Axis::linear("time (s)"), panels).with_outages(&[(10.0, 20.0), (80.0, 90.0)])
+    Chart {
+        group: String::new(),
+        ..Chart::over_time("a<b", panels, &[(10.0, 20.0), (80.0, 90.0)])
+    }
 }
 
 fn page(chart: &Chart) -> String {

@@ -239,7 +239,7 @@ impl AtomicFile {
 /// it leaves nothing.
 ///
 /// If the destination exists (it may be a mount point, or hold files of the user), files of the same names are
-/// replaced and others left alone. The file declared last (a manifest, say) vanishes first and appears last:
+/// replaced and others left alone. The file written last (a manifest, say) vanishes first and appears last:
 /// where it is, the rest is whole.
 #[derive(Debug)]
 pub(crate) struct AtomicDir {
@@ -274,57 +274,31 @@ impl AtomicDir {
         })
     }
 
-    /// Declares a file and returns the path to write it at for now.
-    pub(crate) fn path(&mut self, name: &str) -> PathBuf {
-        if !self.names.iter().any(|n| n == name) {
-            self.names.push(name.to_owned());
-        }
-        self.staging.path.join(name)
-    }
-
-    /// Writes a whole small file.
+    /// Writes a file part by part, to the disk.
     ///
     /// # Errors
     /// When the system refuses.
-    pub(crate) fn write(&mut self, name: &str, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
-        self.write_parts(name, [contents])
-    }
-
-    /// Writes a file part by part.
-    ///
-    /// # Errors
-    /// When the system refuses.
-    pub(crate) fn write_parts(
+    pub(crate) fn write(
         &mut self,
         name: &str,
         parts: impl IntoIterator<Item = impl AsRef<[u8]>>,
     ) -> Result<(), Failure> {
-        let path = self.path(name);
         let write = || {
-            let mut file = BufWriter::new(File::create(&path)?);
-            parts
-                .into_iter()
-                .try_for_each(|part| file.write_all(part.as_ref()))?;
-            file.flush()
+            let mut file = BufWriter::new(File::create(self.staging.path.join(name))?);
+            let mut parts = parts.into_iter();
+            parts.try_for_each(|part| file.write_all(part.as_ref()))?;
+            file.into_inner()?.sync_all()
         };
-        write().map_err(|e| Failure::io(&self.destination.join(name), e))
+        write().map_err(|e| Failure::io(&self.destination.join(name), e))?;
+        self.names.push(name.to_owned());
+        Ok(())
     }
 
-    /// Flushes the declared files to the disk and gives them their names.
+    /// Gives the files their names.
     ///
     /// # Errors
-    /// When a declared file was not written, the disk is full, or a rename is refused.
+    /// When a rename is refused.
     pub(crate) fn commit(mut self) -> Result<(), Failure> {
-        for name in &self.names {
-            // Windows flushes through a handle for writing only
-            let mut options = File::options();
-            let file = options
-                .read(true)
-                .write(cfg!(windows))
-                .open(self.staging.path.join(name));
-            file.and_then(|file| file.sync_all())
-                .map_err(|e| Failure::io(&self.destination.join(name), e))?;
-        }
         let moved = match self.destination.is_dir() {
             true => self.replace(),
             false => self.staging.rename(&self.destination),

@@ -56,29 +56,17 @@ pub(crate) fn beside(model: &Path) -> PathBuf {
     model.with_extension("draws.json")
 }
 
-/// The draws beside a model file, at the rate of an IMU, if there are any; with a seed those of single recordings: what is drawn
-/// about a model with a spread differs by that too.
+/// The draws beside a model file, at the rate of an IMU, if there are any.
 ///
 /// # Errors
 /// Why those that are there cannot be used, in words.
-pub(crate) fn usable(
-    path: &Path,
-    file: &ModelFile,
-    rate_hz: f64,
-    seed: Option<u64>,
-) -> Result<Option<Draws>, String> {
+pub(crate) fn usable(path: &Path, file: &ModelFile, rate_hz: f64) -> Result<Option<Draws>, String> {
     let Some(read) = read(path).map_err(|e| e.to_string())? else {
         return Ok(None);
     };
-    let at_rate = |(run, centre): (u64, Model)| {
-        let model = match (&file.spread, seed) {
-            (Some(spread), Some(seed)) => spread.draw_about(&centre, &file.model, seed, run),
-            _ => centre,
-        };
-        continuous::at_rate(&model, rate_hz).ok()
-    };
     let draws = read.draws(&file.model).and_then(|draws| {
-        let models = (0..).zip(draws.models).map(at_rate);
+        let models = draws.models.iter();
+        let models = models.map(|model| continuous::at_rate(model, rate_hz).ok());
         let models = models.collect::<Option<_>>()?;
         Some(Draws { models, ..draws })
     });

@@ -4,7 +4,7 @@
 use super::draws_file::{self, DrawsFile, SignalDraws};
 use super::model_file::{self, ModelFile, TurnOn};
 use super::recordings::{ReadOptions, csv, read};
-use super::trajectory_file::{self, Instants, Options};
+use super::trajectory_file;
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::{Composite, Model, Process};
 use proptest::prelude::*;
@@ -172,8 +172,8 @@ proptest! {
     fn a_trajectory_comes_back(drive in drive()) {
         let case = Case::new();
         let again = |name: &str, text: &str| {
-            let (trajectory, _) = trajectory_file::load(&case.file(name, text), &Options::default()).unwrap();
-            trajectory_file::csv(&trajectory, Instants::Knots)
+            let (trajectory, _) = trajectory_file::load(&case.file(name, text), None).unwrap();
+            trajectory_file::csv(&trajectory, None)
         };
         let numbers = |text: &str| -> Vec<f64> {
             text.lines().skip(1).flat_map(|line| line.split(',').map(|cell| cell.parse().unwrap())).collect()

@@ -7,16 +7,15 @@ use nav_sim_navigation::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, Run
 /// What to do about a damaged table: it was written by the program.
 pub(crate) const REPEAT: &str = "repeat the run, or put back its files";
 
-/// Line, single columns, columns of each state.
-type Row<const N: usize, const M: usize> = (u64, [f64; N], [[f64; REPORTED]; M]);
+/// Gives the cell of a column in a row; an empty one is NaN.
+type Cell<'a> = &'a dyn Fn(&str) -> Result<f64, Failure>;
 
-/// The columns of these names, and of each state with these prefixes, row by row with its line; an empty cell is NaN.
-fn rows<const N: usize, const M: usize>(
+/// Rows of a table, each made from its line and its cells.
+fn rows<T>(
     path: &str,
     text: &str,
-    names: [&str; N],
-    prefixes: [&str; M],
-) -> Result<Vec<Row<N, M>>, Failure> {
+    make: impl Fn(u64, Cell<'_>) -> Result<T, Failure>,
+) -> Result<Vec<T>, Failure> {
     let refused = |e: csv::Error| {
         let line = e.position().map_or(1, csv::Position::line);
         match e.kind() {
@@ -32,7 +31,7 @@ fn rows<const N: usize, const M: usize>(
     let read = |record: csv::Result<csv::StringRecord>| {
         let record = record.map_err(refused)?;
         let line = record.position().map_or(1, csv::Position::line);
-        let value = |name: &str| {
+        make(line, &|name| {
             let Some(column) = header.iter().position(|own| own == name) else {
                 let message = format!("column \"{name}\" is missing");
                 return Err(Failure::contents(path, 1_u64, message).hint(REPEAT));
@@ -44,19 +43,18 @@ fn rows<const N: usize, const M: usize>(
                     Failure::cell(path, line, name, value, "is not a number").hint(REPEAT)
                 }),
             }
-        };
-        let (mut single, mut of_states) = ([0.0; N], [[0.0; REPORTED]; M]);
-        for (into, name) in single.iter_mut().zip(names) {
-            *into = value(name)?;
-        }
-        for (into, prefix) in of_states.iter_mut().zip(prefixes) {
-            for (into, name) in into.iter_mut().zip(REPORTED_NAMES) {
-                *into = value(&format!("{prefix}{name}"))?;
-            }
-        }
-        Ok((line, single, of_states))
+        })
     };
     reader.records().map(read).collect()
+}
+
+/// The cells of the states.
+fn of_states(cell: Cell<'_>, prefix: &str) -> Result<[f64; REPORTED], Failure> {
+    let mut values = [0.0; REPORTED];
+    for (value, name) in values.iter_mut().zip(REPORTED_NAMES) {
+        *value = cell(&format!("{prefix}{name}"))?;
+    }
+    Ok(values)
 }
 
 /// Reads `epochs.csv` back, as far as comparisons need it.
@@ -64,24 +62,25 @@ fn rows<const N: usize, const M: usize>(
 /// # Errors
 /// A missing column, or a value that is not a finite number (unless no run is left at the epoch).
 pub(crate) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, Failure> {
-    let names = ["t_s", "nees", "coverage"];
-    let rows = rows(path, text, names, ["asee_"])?.into_iter();
-    rows.map(|(line, [t_s, nees, coverage], [asee])| {
+    rows(path, text, |line, cell| {
+        let row = EpochRow {
+            t_s: cell("t_s")?,
+            asee: of_states(cell, "asee_")?,
+            nees: cell("nees")?,
+            coverage: cell("coverage")?,
+        };
         let names = REPORTED_NAMES.map(|name| format!("asee_{name}"));
-        let values = names.iter().map(String::as_str).zip(asee);
-        let mut values = values.chain([("nees", nees), ("coverage", coverage)]);
-        let lost = values.clone().find(|(_, value)| !value.is_finite());
-        if let Some((name, value)) = lost.filter(|_| values.any(|(_, value)| value.is_finite())) {
-            return Err(Failure::cell(path, line, name, value, "is not finite").hint(REPEAT));
+        let names = names.iter().map(String::as_str).chain(["nees", "coverage"]);
+        let values = row.asee.into_iter().chain([row.nees, row.coverage]);
+        let mut cells = names.zip(values);
+        let lost = cells.clone().find(|(_, value)| !value.is_finite());
+        match lost.filter(|_| cells.any(|(_, value)| value.is_finite())) {
+            Some((name, value)) => {
+                Err(Failure::cell(path, line, name, value, "is not finite").hint(REPEAT))
+            }
+            None => Ok(row),
         }
-        Ok(EpochRow {
-            t_s,
-            asee,
-            nees,
-            coverage,
-        })
     })
-    .collect()
 }
 
 /// Reads `runs.csv` back, as far as comparisons need it: a row for each outage of a run, or one that ends where outages begin.
@@ -89,25 +88,27 @@ pub(crate) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, Fail
 /// # Errors
 /// A missing column or a value that is not a number.
 pub(crate) fn parse_runs(path: &str, text: &str) -> Result<Vec<RunRecord>, Failure> {
-    let names = ["run", "diverged", "outage"];
     let mut runs: Vec<RunRecord> = Vec::new();
-    for (_, [run, diverged, outage], [see_mean, error_end]) in
-        rows(path, text, names, ["see_mean_", "error_end_"])?
-    {
-        if runs.last().is_none_or(|r| r.run != run as u64) {
-            runs.push(RunRecord {
-                run: run as u64,
-                diverged: diverged > 0.0,
-                ..RunRecord::default()
-            });
+    let read = rows(path, text, |_, cell| {
+        let run = RunRecord {
+            run: cell("run")? as u64,
+            diverged: cell("diverged")? > 0.0,
+            ..RunRecord::default()
+        };
+        let outage = OutageRecord {
+            see_mean: of_states(cell, "see_mean_")?,
+            error_end: of_states(cell, "error_end_")?,
+            ..OutageRecord::default()
+        };
+        Ok((run, (!cell("outage")?.is_nan()).then_some(outage)))
+    })?;
+    for (run, outage) in read {
+        if runs.last().is_none_or(|last| last.run != run.run) {
+            runs.push(run);
         }
-        if let Some(last) = runs.last_mut().filter(|_| !outage.is_nan()) {
-            last.outages.push(OutageRecord {
-                see_mean,
-                error_end,
-                ..OutageRecord::default()
-            });
-        }
+        runs.last_mut()
+            .into_iter()
+            .for_each(|run| run.outages.extend(outage.clone()));
     }
     Ok(runs)
 }

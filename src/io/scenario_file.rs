@@ -72,7 +72,7 @@ mod tests {
         );
         let (message, _) = refused("[filter]\nstates = 16\n");
         assert!(
-            message.ends_with("\"16\" is not one of 15, 21, full"),
+            message.ends_with("= 16 is not one of \"15\", \"21\", \"full\""),
             "{message}"
         );
         let (message, _) = refused("[run]\nmethod = \"lincav\"\n");

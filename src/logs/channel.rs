@@ -1,6 +1,7 @@
 //! Channels of a log.
 
 use crate::input::{Error, Fault};
+use std::collections::BTreeMap;
 
 /// Channel of a log.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -58,8 +59,16 @@ impl Channel {
     }
 }
 
-/// Receives samples, each with its byte in the file.
-pub(crate) type Each<'a> = &'a mut dyn FnMut(u64, Sample) -> Result<(), Error>;
+/// Contents of a file.
+#[derive(Default)]
+pub(crate) struct Scan<'a> {
+    /// Channels, by the numbers that the format knows them by.
+    pub(crate) channels: BTreeMap<u32, Channel>,
+    /// The channel whose samples are read, and their stamps; none while the channels are counted.
+    pub(crate) wanted: Option<(&'a Channel, Stamp)>,
+    /// Its samples, each with its byte.
+    pub(crate) samples: Vec<(u64, Sample)>,
+}
 
 /// The channel of such content: the one named, or the only one there.
 pub(crate) fn choose<'a>(

@@ -1,8 +1,8 @@
 //! Containers of messages in chunks, as MCAP and the bags of ROS 1 are.
 
-use crate::channel::{Channel, Content, Each, Fix, ImuSample, NS, Sample, Stamp, stated};
+use crate::channel::{Content, Fix, ImuSample, NS, Sample, Scan, Stamp, stated};
 use crate::input::{Bytes, Error, Fault, Input, text};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::HashMap;
 use std::io;
 use std::io::Read;
 
@@ -14,8 +14,6 @@ pub(crate) enum Record {
     Message(Head),
     /// A channel: its number, topic, type and encoding.
     Channel(u32, [String; 3]),
-    /// Messages of a channel in the last chunk, by their times (ns).
-    Index(u32, Vec<i64>),
     /// One that was passed over.
     Other,
 }
@@ -27,11 +25,10 @@ pub(crate) struct Head {
     pub(crate) size: u64,
 }
 
-/// Shows all records of a container to `each`, those within chunks too where these are opened. Who is shown a message reads
-/// its bytes or skips them.
+/// Shows all records of a container to `each`, those within chunks too. Who is shown a message reads its bytes or skips
+/// them.
 fn walk(
     input: &mut Input,
-    opens: bool,
     each: &mut dyn FnMut(Record, &mut Input) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let mut records = Records::default();
@@ -49,7 +46,7 @@ fn walk(
     };
     while let Some(record) = next(&mut records, input)? {
         match record {
-            Record::Chunk(chunk) if opens => {
+            Record::Chunk(chunk) => {
                 let mut inside = chunk.open(input)?;
                 while let Some(record) = next(&mut records, &mut inside)? {
                     if matches!(record, Record::Chunk(_)) {
@@ -57,10 +54,6 @@ fn walk(
                     }
                     each(record, &mut inside)?;
                 }
-            }
-            Record::Chunk(chunk) => {
-                input.skip(chunk.packed)?;
-                each(Record::Chunk(chunk), input)?;
             }
             record => each(record, input)?,
         }
@@ -72,59 +65,57 @@ fn walk(
     Ok(())
 }
 
-/// Finds the channels of a container. Chunks stay packed where an index counts their messages and all channels are defined
-/// outside of them.
-pub(crate) fn survey(
-    input: &mut Input,
-    channels: &mut BTreeMap<u32, Channel>,
-) -> Result<(), Error> {
-    let mut look = |opens, input: &mut Input| {
-        let (mut chunks, mut indexed) = (0, BTreeSet::new());
-        channels.clear();
-        let outcome = walk(input, opens, &mut |record, input| {
-            match record {
-                Record::Chunk(_) => chunks += 1,
-                Record::Index(id, times) if !opens => {
-                    indexed.insert(chunks);
-                    let channel = channels.entry(id).or_default();
-                    times.iter().for_each(|ns| channel.count(*ns));
-                }
-                Record::Message(head) => {
-                    input.skip(head.size)?;
-                    channels.entry(head.channel).or_default().count(head.log_ns);
-                }
-                Record::Channel(id, [topic, type_name, encoding]) => {
-                    let channel = channels.entry(id).or_default();
-                    if channel.topic.is_empty() {
-                        channel.content = match type_name.as_str() {
-                            "sensor_msgs/msg/Imu" | "sensor_msgs/Imu" => Content::Imu,
-                            "sensor_msgs/msg/NavSatFix" | "sensor_msgs/NavSatFix" => Content::Fix,
-                            _ => Content::Other,
-                        };
-                        (channel.topic, channel.type_name) = (topic, type_name);
-                        channel.encoding = encoding;
-                    }
-                }
-                Record::Index(..) | Record::Other => {}
+/// Largest message that is read (bytes): an IMU's has 400.
+const LARGEST_MESSAGE: u64 = 1 << 20;
+
+/// Finds and counts the channels of a container, or reads the messages of one, which may stand out of order in the file.
+pub(crate) fn scan(input: &mut Input, scan: &mut Scan<'_>) -> Result<(), Error> {
+    let mut found = Vec::new();
+    let channels = &mut scan.channels;
+    let outcome = walk(input, &mut |record, input| {
+        match (record, scan.wanted) {
+            (Record::Message(head), Some((channel, stamp))) if head.channel == channel.id => {
+                let message = Message {
+                    log_ns: (stamp == Stamp::Log).then_some(head.log_ns),
+                    offset: input.offset(),
+                    data: input.bytes(head.size, LARGEST_MESSAGE)?,
+                };
+                let sample = match channel.content {
+                    Content::Imu => imu(&channel.encoding, &message).map(Some)?,
+                    _ => fix(&channel.encoding, &message)?,
+                };
+                found.extend(sample.map(|sample| (head.log_ns, message.offset, sample)));
             }
-            Ok(())
-        });
-        let is_blind = channels.values().any(|c| c.topic.is_empty()) || indexed.len() < chunks;
-        channels.retain(|id, channel| {
-            channel.id = *id;
-            !channel.topic.is_empty()
-        });
-        (outcome, is_blind)
-    };
-    let (outcome, is_blind) = look(false, input);
-    match outcome {
-        Err(error) if error.cut().is_none() => Err(error),
-        _ if is_blind => {
-            input.seek(0)?;
-            look(true, input).0
+            (Record::Message(head), _) => {
+                input.skip(head.size)?;
+                channels.entry(head.channel).or_default().count(head.log_ns);
+            }
+            (Record::Channel(id, [topic, type_name, encoding]), _) => {
+                let channel = channels.entry(id).or_default();
+                if channel.topic.is_empty() {
+                    channel.content = match type_name.as_str() {
+                        "sensor_msgs/msg/Imu" | "sensor_msgs/Imu" => Content::Imu,
+                        "sensor_msgs/msg/NavSatFix" | "sensor_msgs/NavSatFix" => Content::Fix,
+                        _ => Content::Other,
+                    };
+                    (channel.topic, channel.type_name) = (topic, type_name);
+                    channel.encoding = encoding;
+                }
+            }
+            _ => {}
         }
-        outcome => outcome,
-    }
+        Ok(())
+    });
+    channels.retain(|id, channel| {
+        channel.id = *id;
+        !channel.topic.is_empty()
+    });
+    found.sort_by_key(|(log_ns, ..)| *log_ns);
+    let found = found
+        .into_iter()
+        .map(|(_, offset, sample)| (offset, sample));
+    scan.samples.extend(found);
+    outcome
 }
 
 // Chunks and their compressions.
@@ -191,43 +182,6 @@ impl Chunk {
 }
 
 // Logs of ROS: topics of a container.
-
-/// Largest message that is read (bytes): an IMU's has 400.
-const LARGEST_MESSAGE: u64 = 1 << 20;
-
-/// Reads the messages of a topic, which may stand out of order in the file.
-pub(crate) fn read(
-    input: &mut Input,
-    channel: &Channel,
-    stamp: Stamp,
-    each: Each<'_>,
-) -> Result<(), Error> {
-    let mut found = Vec::new();
-    let outcome = walk(input, true, &mut |record, input| {
-        let Record::Message(head) = record else {
-            return Ok(());
-        };
-        if head.channel != channel.id {
-            return input.skip(head.size);
-        }
-        let message = Message {
-            log_ns: (stamp == Stamp::Log).then_some(head.log_ns),
-            offset: input.offset(),
-            data: input.bytes(head.size, LARGEST_MESSAGE)?,
-        };
-        let sample = match channel.content {
-            Content::Imu => imu(&channel.encoding, &message).map(Some)?,
-            _ => fix(&channel.encoding, &message)?,
-        };
-        found.extend(sample.map(|sample| (head.log_ns, message.offset, sample)));
-        Ok(())
-    });
-    found.sort_by_key(|(log_ns, ..)| *log_ns);
-    for (_, offset, sample) in found {
-        each(offset, sample)?;
-    }
-    outcome
-}
 
 /// Message of a channel.
 struct Message {
@@ -371,8 +325,6 @@ impl Records {
                 self.end = index.ok_or_else(fault)?;
                 Some(Record::Other)
             }
-            // the index of the chunk before
-            [0x04] => index(fields, &input.bytes(size, LARGEST_RECORD)?),
             [0x05] => {
                 let compression = fields.bytes(b"compression").ok_or_else(fault)?.to_vec();
                 let unpacked = fields.u32(b"size").ok_or_else(fault)?.into();
@@ -432,13 +384,6 @@ fn bag_message(fields: Fields<'_>, size: u64) -> Option<Record> {
     }))
 }
 
-/// Times and places of a connection's messages in the chunk before.
-fn index(fields: Fields<'_>, entries: &[u8]) -> Option<Record> {
-    let entries = entries.chunks_exact(12);
-    let times = entries.filter_map(|entry| time_ns(&mut Bytes::little(entry)));
-    Some(Record::Index(fields.u32(b"conn")?, times.collect()))
-}
-
 fn connection(fields: Fields<'_>, data: &[u8]) -> Option<Record> {
     let (topic, type_name) = (fields.bytes(b"topic")?, Fields(data).bytes(b"type")?);
     let named = [text(topic), text(type_name), "ros1".to_owned()];
@@ -480,7 +425,7 @@ impl Records {
                 self.end = input.position();
                 return Ok(None);
             }
-            SCHEMA | CHANNEL | 0x07 => {
+            SCHEMA | CHANNEL => {
                 let body = input.bytes(length, LARGEST_RECORD)?;
                 self.body(code, &body).ok_or_else(fault)?
             }
@@ -503,17 +448,10 @@ impl Records {
                 self.types.insert(id, text(bytes.string()?));
                 Some(Record::Other)
             }
-            CHANNEL => {
+            _ => {
                 let type_name = self.types.get(&bytes.u16()?).cloned().unwrap_or_default();
                 let (topic, encoding) = (text(bytes.string()?), text(bytes.string()?));
                 Some(Record::Channel(id.into(), [topic, type_name, encoding]))
-            }
-            _ => {
-                // times and places of a channel's messages in the chunk before
-                let entries = bytes.string()?.chunks_exact(16);
-                let times = entries.filter_map(|entry| Bytes::little(entry).u64());
-                let times = times.map(u64::cast_signed).collect();
-                Some(Record::Index(id.into(), times))
             }
         }
     }

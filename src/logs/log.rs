@@ -1,10 +1,9 @@
 //! A log of any format.
 
-use crate::channel::{Channel, Content, Each, Fix, ImuSample, Sample, Stamp, choose, in_seconds};
+use crate::channel::{Channel, Content, Fix, ImuSample, Sample, Scan, Stamp, choose, in_seconds};
 #[cfg(any(feature = "mcap", feature = "bag"))]
 use crate::container;
 use crate::input::{Error, Fault, HEAD, Input, Kind, recognise};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Log whose channels are known.
@@ -45,11 +44,8 @@ pub struct Damage {
     pub file_bytes: u64,
 }
 
-/// Finds the channels of a file, by the numbers that the format knows them by.
-type Survey = fn(&mut Input, &mut BTreeMap<u32, Channel>) -> Result<(), Error>;
-
-/// Shows the samples or fixes of a channel in order of time.
-type Read = fn(&mut Input, &Channel, Stamp, Each<'_>) -> Result<(), Error>;
+/// Counts the channels of a file, or reads one, in order of time.
+type Read = fn(&mut Input, &mut Scan<'_>) -> Result<(), Error>;
 
 impl Log {
     /// Opens a file and finds its channels.
@@ -62,23 +58,23 @@ impl Log {
         let head = file_bytes.min(HEAD as u64);
         let kind = recognise(&input.bytes(head, head)?)
             .ok_or_else(|| Error::at(0, Fault::Encoding, "not a known log"))?;
-        let (survey, read): (Survey, Read) = match kind {
+        let read: Read = match kind {
             #[cfg(feature = "mcap")]
-            Kind::Mcap => (container::survey, container::read),
+            Kind::Mcap => container::scan,
             #[cfg(feature = "bag")]
-            Kind::Bag => (container::survey, container::read),
+            Kind::Bag => container::scan,
             #[cfg(feature = "ulog")]
-            Kind::Ulog => (crate::ulog::survey, crate::ulog::read),
+            Kind::Ulog => crate::ulog::scan,
             #[cfg(feature = "ubx")]
-            Kind::Ubx => (crate::ubx::survey, crate::ubx::read),
+            Kind::Ubx => crate::ubx::scan,
             _ => {
                 let message = format!("{}, which is not read", kind.name());
                 return Err(Error::new(Fault::NotRead(kind), message));
             }
         };
         input.seek(0)?;
-        let mut channels = BTreeMap::new();
-        let damage = match survey(&mut input, &mut channels) {
+        let mut scan = Scan::default();
+        let damage = match read(&mut input, &mut scan) {
             Ok(()) => None,
             Err(error) => match error.cut() {
                 None => return Err(error),
@@ -89,7 +85,7 @@ impl Log {
                 }),
             },
         };
-        let mut channels: Vec<Channel> = channels.into_values().collect();
+        let mut channels: Vec<Channel> = scan.channels.into_values().collect();
         channels.sort_by(|a, b| a.topic.cmp(&b.topic));
         Ok(Self {
             path: path.to_owned(),
@@ -154,22 +150,29 @@ impl Log {
         stamp: Stamp,
         of: fn(Sample) -> Option<T>,
     ) -> Result<Vec<T>, Error> {
-        let (mut samples, mut from_ns) = (Vec::new(), i64::MIN);
-        let mut input = Input::open(&self.path)?;
-        let outcome = (self.read)(&mut input, channel, stamp, &mut |offset, sample| {
-            let to_ns = sample.stamp_ns();
-            if to_ns < from_ns {
-                let [from, to] = [from_ns, to_ns].map(in_seconds);
+        let mut scan = Scan {
+            wanted: Some((channel, stamp)),
+            ..Scan::default()
+        };
+        let outcome = (self.read)(&mut Input::open(&self.path)?, &mut scan);
+        let stamps = scan.samples.iter().map(|(_, sample)| sample.stamp_ns());
+        let mut steps = stamps.zip(scan.samples.iter().skip(1));
+        let back = steps.find(|(from_ns, (_, sample))| sample.stamp_ns() < *from_ns);
+        let outcome = match back {
+            Some((from_ns, (offset, sample))) => {
+                let [from, to] = [from_ns, sample.stamp_ns()].map(in_seconds);
                 let message = format!("time goes back from {from} s to {to} s");
-                return Err(Error::at(offset, Fault::TimeBack, message));
+                Err(Error::at(*offset, Fault::TimeBack, message))
             }
-            from_ns = to_ns;
-            samples.extend(of(sample));
-            Ok(())
-        });
+            None => outcome,
+        };
         match outcome {
             Err(error) if error.cut().is_none() => Err(error.of_topic(&channel.topic)),
-            _ => Ok(samples),
+            _ => Ok(scan
+                .samples
+                .into_iter()
+                .filter_map(|(_, sample)| of(sample))
+                .collect()),
         }
     }
 }

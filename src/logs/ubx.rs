@@ -3,10 +3,9 @@
 //! A receiver's log is a stream of bytes with other protocols between: what is no message with its checksum is passed
 //! over, also one that is cut off at the end.
 
-use crate::channel::{Channel, Clock, Content, Each, Fix, ImuSample, NS, Sample, Stamp, stated};
+use crate::channel::{Channel, Clock, Content, Fix, ImuSample, NS, Sample, Scan, stated};
 use crate::input::{Bytes, Error, Input, UBX_SYNC, ubx_checksum};
 use chrono::NaiveDate;
-use std::collections::BTreeMap;
 
 /// Class and number of messages, as one number.
 const NAV_PVT: u32 = 0x0107;
@@ -15,13 +14,20 @@ const ESF_MEAS: u32 = 0x1002;
 const REJECTED: u32 = u32::MAX;
 const MS: i64 = NS / 1000;
 
-/// Finds the kinds of messages.
-pub(crate) fn survey(
-    input: &mut Input,
-    channels: &mut BTreeMap<u32, Channel>,
-) -> Result<(), Error> {
-    messages(input, |id, _, payload| {
-        let channel = channels.entry(id).or_insert_with(|| new_channel(id));
+/// Counts the messages of each kind, or reads the samples or fixes of one.
+pub(crate) fn scan(input: &mut Input, scan: &mut Scan<'_>) -> Result<(), Error> {
+    let mut measured = Measured::default();
+    messages(input, |id, offset, payload| {
+        if let Some((channel, _)) = scan.wanted {
+            let sample = match id {
+                _ if id != channel.id => None,
+                ESF_MEAS => measured.add(payload).map(Sample::Imu),
+                _ => pvt(payload).map(|fix| Sample::Fix(Box::new(fix))),
+            };
+            scan.samples.extend(sample.map(|sample| (offset, sample)));
+            return;
+        }
+        let channel = scan.channels.entry(id).or_insert_with(|| new_channel(id));
         let stamp_ns = match id {
             NAV_PVT => pvt(payload).map(|fix| fix.stamp_ns),
             ESF_MEAS => time_tag_ns(payload),
@@ -31,7 +37,6 @@ pub(crate) fn survey(
             Some(ns) => channel.count(ns),
             None => channel.messages += u64::from(channel.content == Content::Other),
         }
-        Ok(())
     })
 }
 
@@ -60,10 +65,7 @@ fn new_channel(id: u32) -> Channel {
 }
 
 /// Shows the messages of a file, each with its number and its byte.
-fn messages(
-    input: &mut Input,
-    mut each: impl FnMut(u32, u64, &[u8]) -> Result<(), Error>,
-) -> Result<(), Error> {
+fn messages(input: &mut Input, mut each: impl FnMut(u32, u64, &[u8])) -> Result<(), Error> {
     while input.left() >= 8 {
         let offset = input.position();
         let (sync, head): ([u8; 2], [u8; 4]) = (input.array()?, input.array()?);
@@ -74,35 +76,14 @@ fn messages(
         }
         let body = [&head[..], &input.bytes(length, length)?].concat();
         if input.array()? == ubx_checksum(&body) {
-            each(
-                u16::from_be_bytes([head[0], head[1]]).into(),
-                offset,
-                &body[4..],
-            )?;
+            let id = u16::from_be_bytes([head[0], head[1]]);
+            each(id.into(), offset, &body[4..]);
         } else {
-            each(REJECTED, offset, &[])?;
+            each(REJECTED, offset, &[]);
             input.seek(offset + 1)?;
         }
     }
     Ok(())
-}
-
-/// Reads samples or fixes.
-pub(crate) fn read(
-    input: &mut Input,
-    channel: &Channel,
-    _: Stamp,
-    each: Each<'_>,
-) -> Result<(), Error> {
-    let mut measured = Measured::default();
-    messages(input, |id, offset, payload| {
-        let sample = match id {
-            _ if id != channel.id => None,
-            ESF_MEAS => measured.add(payload).map(Sample::Imu),
-            _ => pvt(payload).map(|fix| Sample::Fix(Box::new(fix))),
-        };
-        sample.map_or(Ok(()), |sample| each(offset, sample))
-    })
 }
 
 /// A fix of NAV-PVT in three dimensions, flagged good, at a date and time that are valid. Its accuracies are taken as one

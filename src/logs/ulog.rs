@@ -1,15 +1,21 @@
 //! Logs of PX4 (<https://docs.px4.io/main/en/dev_log/ulog_file_format.html>).
 
-use crate::channel::{Channel, Clock, Content, Each, Fix, ImuSample, Sample, Stamp, stated};
+use crate::channel::{Channel, Clock, Content, Fix, ImuSample, Sample, Scan, Stamp, stated};
 use crate::input::{Bytes, Error, Input, Number, text};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
-/// Counts the messages of each topic.
-pub(crate) fn survey(
-    input: &mut Input,
-    channels: &mut BTreeMap<u32, Channel>,
-) -> Result<(), Error> {
-    messages(input, |topic, _, message| {
+/// Counts the messages of each topic, or reads the samples or fixes of one.
+pub(crate) fn scan(input: &mut Input, scan: &mut Scan<'_>) -> Result<(), Error> {
+    messages(input, |topic, offset, message| {
+        if let Some((channel, stamp)) = scan.wanted {
+            if topic.id == channel.id {
+                let sample = sample(channel.content, &topic.layout, message, stamp);
+                let short = || Error::malformed(offset, "a message is shorter than its format");
+                let sample = sample.ok_or_else(short)?;
+                scan.samples.extend(sample.map(|sample| (offset, sample)));
+            }
+            return Ok(());
+        }
         let new = || {
             let (content, rank) = content(&topic.name);
             let sample = sample(content, &topic.layout, message, Stamp::Header);
@@ -28,31 +34,12 @@ pub(crate) fn survey(
                 ..Channel::default()
             }
         };
-        let channel = channels.entry(topic.id).or_insert_with(new);
+        let channel = scan.channels.entry(topic.id).or_insert_with(new);
         match topic.layout.time_ns("timestamp", message) {
             Some(ns) => channel.count(ns),
             None => channel.messages += 1,
         }
         Ok(())
-    })
-}
-
-/// Reads the samples or fixes of a topic.
-pub(crate) fn read(
-    input: &mut Input,
-    channel: &Channel,
-    stamp: Stamp,
-    each: Each<'_>,
-) -> Result<(), Error> {
-    messages(input, |topic, offset, message| {
-        if topic.id != channel.id {
-            return Ok(());
-        }
-        let sample = sample(channel.content, &topic.layout, message, stamp);
-        let short = || Error::malformed(offset, "a message is shorter than its format");
-        sample
-            .ok_or_else(short)?
-            .map_or(Ok(()), |sample| each(offset, sample))
     })
 }
 

@@ -15,7 +15,7 @@ pub(crate) fn by_value<T>(a: &(T, f64), b: &(T, f64)) -> Ordering {
 }
 
 /// Mean; NaN of nothing.
-pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let (count, sum) = values
         .into_iter()
         .fold((0.0, 0.0), |(count, sum), x| (count + 1.0, sum + x));

@@ -7,7 +7,7 @@ pub(crate) mod tables;
 pub(crate) mod trajectory;
 pub(crate) mod verdict;
 
-pub(crate) use curves::{CurvesFile, FittedCurve, SignalsFile};
+pub(crate) use curves::{CurvesFile, FittedCurve};
 pub use nav_sim_document::readable;
 pub(crate) use nav_sim_document::{seconds, six_digits};
 pub(crate) use tables::{gnss_csv, imu_csv, initial_toml};
@@ -25,6 +25,16 @@ pub(crate) const WIDTH: usize = 120;
 pub(crate) fn json(value: &impl serde::Serialize) -> String {
     serde_json::to_string_pretty(value).expect("plain structs with text keys are always JSON")
         + "\n"
+}
+
+/// The first of these names, and how many more there are.
+pub(crate) fn some(names: &[String]) -> String {
+    const NAMED: usize = 3;
+    let shown = names[..names.len().min(NAMED)].join(", ");
+    match names.len().saturating_sub(NAMED) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
 }
 
 /// Each name once, where it stood first.

@@ -1,6 +1,6 @@
 //! Verdicts in words.
 
-use nav_sim_document::{Tone, percent, readable, short_names, window};
+use nav_sim_document::{Tone, readable, short_names, window};
 use nav_sim_navigation::metrics::{
     ALL_STATES, Met, ReductionQuality, Summary, Verdict, VerdictKind,
 };
@@ -309,10 +309,10 @@ pub(crate) fn reduction_doubt(quality: &ReductionQuality) -> Option<String> {
         ""
     };
     Some(format!(
-        "reduced filter: sigma of {} at the end of outage {} is {} too {size}{full}",
+        "reduced filter: sigma of {} at the end of outage {} is {:.0} % too {size}{full}",
         REPORTED_NAMES[state],
         outage + 1,
-        percent((1.0 / ratio - 1.0).abs())
+        100.0 * (1.0 / ratio - 1.0).abs()
     ))
 }
 

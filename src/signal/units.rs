@@ -9,7 +9,8 @@
 //! ```
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::{Deserialize, Deserializer, Error as _};
+use serde::Deserialize;
+use std::borrow::Cow;
 
 /// One degree in radians.
 pub const DEG: f64 = std::f64::consts::PI / 180.0;
@@ -61,60 +62,45 @@ impl SettingError {
 #[error("{0}")]
 pub struct Refused(pub String);
 
-/// A number as schemas of files have it.
-macro_rules! number_in_schemas {
-    ($(#[$meta:meta])* $name:ident, $bounds:tt) => {
-        $(#[$meta])*
-        #[derive(Debug)]
-        pub struct $name;
+/// A number between two whole ones, or one of them unless it is open; `i64::MAX` is no end.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+pub struct Between<const LOW: i64, const HIGH: i64, const OPEN: bool>(pub f64);
 
-        impl JsonSchema for $name {
-            fn inline_schema() -> bool {
-                true
-            }
-            fn schema_name() -> std::borrow::Cow<'static, str> {
-                stringify!($name).into()
-            }
-            fn json_schema(_: &mut SchemaGenerator) -> Schema {
-                json_schema!($bounds)
-            }
+/// A part of a whole.
+pub type Share = Between<0, 1, false>;
+/// A number ≥ 0.
+pub type NonNegative = Between<0, { i64::MAX }, false>;
+/// A number > 0.
+pub type Positive = Between<0, { i64::MAX }, true>;
+/// A number between 0 and 1, neither of them.
+pub type Probability = Between<0, 1, true>;
+/// Coefficients of a stationary AR(1), as [`Process::ar1`](crate::noise::Process::ar1) takes them.
+pub type Stationary = Between<-1, 1, true>;
+
+impl<const LOW: i64, const HIGH: i64, const OPEN: bool> From<Between<LOW, HIGH, OPEN>> for f64 {
+    fn from(value: Between<LOW, HIGH, OPEN>) -> Self {
+        value.0
+    }
+}
+
+impl<const LOW: i64, const HIGH: i64, const OPEN: bool> JsonSchema for Between<LOW, HIGH, OPEN> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Between".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let [least, most] = match OPEN {
+            true => ["exclusiveMinimum", "exclusiveMaximum"],
+            false => ["minimum", "maximum"],
+        };
+        let mut schema = json_schema!({ "type": "number", least: LOW });
+        if HIGH < i64::MAX {
+            schema.insert(most.to_owned(), HIGH.into());
         }
-    };
-}
-
-number_in_schemas!(
-    /// In schemas, a number > 0.
-    Positive, { "type": "number", "exclusiveMinimum": 0 }
-);
-number_in_schemas!(
-    /// In schemas, a number ≥ 0.
-    NonNegative, { "type": "number", "minimum": 0 }
-);
-number_in_schemas!(
-    /// In schemas, a number between 0 and 1, neither of them.
-    Probability, { "type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1 }
-);
-
-/// Reads a list of exactly `N` values (`deserialize_with`): readers of TOML drop what comes after them.
-///
-/// # Errors
-/// Another length.
-pub fn exactly<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
-    deserializer: D,
-) -> Result<[T; N], D::Error> {
-    let list = Vec::<T>::deserialize(deserializer)?;
-    let length = list.len();
-    let expected = format!("a list of {N}");
-    list.try_into()
-        .map_err(|_| D::Error::invalid_length(length, &expected.as_str()))
-}
-
-/// The same where the list may be missing (with `default`).
-///
-/// # Errors
-/// Another length.
-pub fn exactly_if<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
-    deserializer: D,
-) -> Result<Option<[T; N]>, D::Error> {
-    exactly(deserializer).map(Some)
+        schema
+    }
 }

@@ -433,7 +433,7 @@ fn standing_still_needs_an_initial_state() {
     // or the heading alone: known no better than given, as nothing moves
     let ran = done(
         place.path(),
-        "fuse rec/imu.csv rec/gnss.csv imu.toml --heading 38:2 -o given --verbose",
+        "fuse rec/imu.csv rec/gnss.csv imu.toml --initial 38:2 -o given --verbose",
     );
     assert!(
         ran.stdout.contains("heading 38.0° ± 2.0° as given"),
@@ -450,7 +450,7 @@ fn standing_still_needs_an_initial_state() {
     );
     let ran = nav_sim(
         place.path(),
-        "fuse rec/imu.csv rec/gnss.csv imu.toml --heading 38:50 -o given",
+        "fuse rec/imu.csv rec/gnss.csv imu.toml --initial 38:50 -o given",
     );
     assert!(
         ran.code == 2 && ran.stderr.contains("standard deviation of up to 30°"),

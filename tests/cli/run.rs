@@ -621,7 +621,10 @@ fn check_knows_the_files_of_a_fusion_and_speaks_json() {
     .unwrap();
     for (file, message) in [
         ("ms.csv", "milliseconds (t_ms)?"),
-        ("deep.toml", "is not between −12000 and 1000000"),
+        (
+            "deep.toml",
+            "it must be a finite number ≥ -12000 and ≤ 1000000",
+        ),
     ] {
         let ran = nav_sim(place.path(), &format!("check {file} --format json"));
         let said: Value = serde_json::from_str(&ran.stdout).unwrap();

@@ -180,74 +180,12 @@ fn a_truth_that_is_none_is_refused() {
     };
     refused(
         &["model.toml"],
-        ["neither --truth nor --intervals", "hint: give models"],
+        ["--truth is not given", "hint: give models"],
     );
     refused(
         &["truth.toml", "--truth", "."],
         ["recordings, not a model", "--estimator gmwm"],
     );
-    // intervals alone do not say how parameters hang together
-    let missing = "model.draws.json: the draws of its calibration are missing";
-    refused(
-        &["model.toml", "--intervals"],
-        [missing, "hint: calibrate again"],
-    );
-}
-
-/// Draws whose correlation time and variance hang together, so that the noise below 0.1 Hz is the same in all: the ends of
-/// both intervals together have it 40 times as strong, and a filter that is consistent with the draws knows nothing of that.
-/// Where draws do differ, in the random walk of the accelerometers, the tuned filter states what `run` gives as the upper
-/// ends of the intervals of its errors.
-#[test]
-fn draws_are_covered_up_to_the_ends_of_the_intervals_that_run_states() {
-    let dir = tempfile::tempdir().unwrap();
-    let put = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
-    let model = r#"rate_hz = 100.0
-[accel]
-processes = [{ type = "WN", sigma2 = 1e-4 }, { type = "RW", gamma2 = 1e-8 }]
-[gyro]
-processes = [
-  { type = "WN", sigma2 = 1e-8 },
-  { type = "AR1", phi = 0.9, phi_ci95 = [0.8, 0.95], sigma2 = 1e-8, sigma2_ci95 = [3e-9, 1e-7] },
-]
-"#;
-    put("imu.toml", model);
-    put("drive.toml", crate::common::drive::DRIVE);
-    let spread = |k: i32| (f64::from(k) / 20.0 - 1.0).exp();
-    let accel: Vec<[f64; 2]> = (0..=40)
-        .map(|k| [1e-4, 1e-8 * spread(7 * k % 41)])
-        .collect();
-    let gyro = |kappa: f64| [1e-8, 1.0 - kappa, 1e-8 * (kappa / 0.1).powi(2)];
-    let gyro: Vec<[f64; 3]> = (0..=40).map(|k| gyro(0.1 * spread(k).sqrt())).collect();
-    let draws = serde_json::json!({ "schema_version": 1, "rate_hz": 100.0, "signals": [
-        { "signals": "accel", "stretch": 1.2, "parameters": ["WN sigma2", "RW gamma2"], "estimate": [1e-4, 1e-8],
-          "draws": accel },
-        { "signals": "gyro", "stretch": 1.2, "parameters": ["WN sigma2", "AR1 phi", "AR1 sigma2"],
-          "estimate": [1e-8, 0.9, 1e-8], "draws": gyro },
-    ] });
-    put("imu.draws.json", &draws.to_string());
-    let json = |arguments: &str| -> Value {
-        let all = format!("{arguments} --outage 20:40 --filter full --format json");
-        serde_json::from_slice(&tune_or_run(dir.path(), &all).stdout).unwrap()
-    };
-    let found = json("tune imu.toml --intervals --trajectory drive.toml -o tuned.toml");
-    let factor = |k: usize| found["factors"][k]["on_variance"].as_f64().unwrap();
-    assert!(
-        (1.5..6.0).contains(&factor(0)) && factor(1) < 1.3,
-        "{found}"
-    );
-    let ran = json("run drive.toml tuned.toml --truth imu.toml --method lincov -o out");
-    let outage = &ran["outages"][0];
-    let upper_end = |state: &str| {
-        outage["rmse_end_ci95"][state][1].as_f64().unwrap()
-            / outage["asee_end"][state].as_f64().unwrap()
-    };
-    let states = outage["asee_end"].as_object().unwrap();
-    let largest = states
-        .keys()
-        .map(|state| upper_end(state))
-        .fold(0.0, f64::max);
-    assert!((0.98..1.01).contains(&largest), "{largest} {outage}");
 }
 
 /// A filter is judged by the errors that `run` makes of the same files: what a truth's `[turn_on]` and a scenario state
@@ -317,54 +255,6 @@ fn tune_or_run(dir: &Path, arguments: &str) -> std::process::Output {
         .args(arguments.split_whitespace())
         .output()
         .unwrap()
-}
-
-/// A calibration known for certain whose recordings differ: sigma2 of both sensors by a log-sd of 0.3, on each axis for itself.
-/// Errors that one axis makes alone have an upper end of e^(1.96·0.3/2) of theirs, and a factor of e^(1.96·0.3) = 1.8 on the
-/// variance covers it; those that three axes share have less. The ends of 200 draws are known to 7 %.
-#[test]
-fn intervals_with_a_spread_cover_what_recordings_differ_by() {
-    let dir = tempfile::tempdir().unwrap();
-    let white = "processes = [{ type = \"WN\", sigma2 = 1e-6 }]\n";
-    let law = "process = \"WN\"\nparameter = \"sigma2\"\ndistribution = \"lognormal\"\nmedian = 1e-6\nsd = 0.3\n";
-    let plain = format!("rate_hz = 100.0\n[accel]\n{white}[gyro]\n{white}");
-    let spread = format!("{plain}[[spread.accel]]\n{law}[[spread.gyro]]\n{law}");
-    let signals = |name: &str| {
-        format!(
-            "{{\"signals\": \"{name}\", \"stretch\": 1.0, \"parameters\": [\"WN sigma2\"], \"estimate\": [1e-6], \"draws\": [{}]}}",
-            vec!["[1e-6]"; 200].join(",")
-        )
-    };
-    let draws = format!(
-        "{{\"schema_version\": 1, \"rate_hz\": 100.0, \"signals\": [{}, {}]}}",
-        signals("accel"),
-        signals("gyro")
-    );
-    let factors = |name: &str, text: &str| -> Vec<f64> {
-        std::fs::write(dir.path().join(format!("{name}.toml")), text).unwrap();
-        std::fs::write(dir.path().join(format!("{name}.draws.json")), &draws).unwrap();
-        let output = tune_or_run(
-            dir.path(),
-            &format!("tune {name}.toml --intervals --outage 60:90 --format json"),
-        );
-        let found: Value = serde_json::from_slice(&output.stdout).unwrap();
-        found["factors"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .map(|f| f["on_variance"].as_f64().unwrap())
-            .collect()
-    };
-    assert!(
-        factors("plain", &plain)
-            .iter()
-            .all(|f| (f - 1.0).abs() < 5e-3)
-    );
-    let covered = factors("spread", &spread);
-    assert!(
-        covered.iter().any(|f| *f > 1.2) && covered.iter().all(|f| *f < 1.8 * 1.14),
-        "{covered:?}"
-    );
 }
 
 /// Where the filter leaves out how the IMU is mounted, no noise of the IMU stands for it: the sigma of the constraint does,

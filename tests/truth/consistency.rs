@@ -1,7 +1,7 @@
 //! Filters whose models are right are as sure as they should be, on three shipped trajectories, with 15 states
 //! and with all states of the model; a model that is wrong by 4 in any parameter shows.
 
-use nav_sim::io::trajectory_file::{Options, load};
+use nav_sim::io::trajectory_file::load;
 use nav_sim::navigation::ekf::{Belief, FilterStates};
 use nav_sim::navigation::metrics::{EpochMetrics, Expected};
 use nav_sim::navigation::monte_carlo;
@@ -28,7 +28,7 @@ fn trajectory(name: &str) -> Trajectory {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("trajectories")
         .join(name);
-    load(&path, &Options::default()).unwrap().0
+    load(&path, None).unwrap().0
 }
 
 /// White noise and a Gauss-Markov process of standard deviation s and correlation time t_s, at 100 Hz.

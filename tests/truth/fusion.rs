@@ -32,9 +32,7 @@ pub(crate) fn shipped(name: &str) -> Trajectory {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("trajectories")
         .join(name);
-    trajectory_file::load(&path, &trajectory_file::Options::default())
-        .unwrap()
-        .0
+    trajectory_file::load(&path, None).unwrap().0
 }
 
 pub(crate) fn settings() -> Settings {

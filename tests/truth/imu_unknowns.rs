@@ -2,7 +2,7 @@
 //! be, one that does not is far too sure.
 
 use crate::common::drive::{DRIVE, MODEL, done, nav_sim, place_with};
-use nav_sim::io::trajectory_file::{Options, load};
+use nav_sim::io::trajectory_file::load;
 use nav_sim::navigation::ekf::Belief;
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;
@@ -25,7 +25,7 @@ const OUTAGES: [Outage; 1] = [Outage {
 
 fn trajectory() -> Trajectory {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories/land_vehicle.toml");
-    load(&path, &Options::default()).unwrap().0
+    load(&path, None).unwrap().0
 }
 
 /// White noise and Gauss-Markov processes of (standard deviation, correlation time in s), at 100 Hz.

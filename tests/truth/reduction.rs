@@ -2,7 +2,7 @@
 //! by covariance analysis, on the shipped IMUs and trajectories.
 
 use nav_sim::io::model_file;
-use nav_sim::io::trajectory_file::{Options, load};
+use nav_sim::io::trajectory_file::load;
 use nav_sim::navigation::scenario::{Reduction, Scenario};
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{Assessment, assess};
@@ -16,7 +16,7 @@ fn assessed(model: &str, trajectory: &str, outages: &[Outage], reduction: Reduct
         .unwrap()
         .model;
     let path = root.join(format!("trajectories/{trajectory}.toml"));
-    let (path, _) = load(&path, &Options::default()).unwrap();
+    let (path, _) = load(&path, None).unwrap();
     let mut scenario = Scenario::default();
     scenario.filter.reduction = reduction;
     let track = scenario.track(&path, &model, outages).unwrap();
@@ -86,11 +86,7 @@ fn a_model_of_fifteen_states_is_its_own_reduction() {
     };
     let model = Model::pooled(100.0, &axis(5.4e-5, 3.3e-11), &axis(1e-8, 1e-14));
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let (path, _) = load(
-        &root.join("trajectories/land_vehicle.toml"),
-        &Options::default(),
-    )
-    .unwrap();
+    let (path, _) = load(&root.join("trajectories/land_vehicle.toml"), None).unwrap();
     let (scenario, outages) = (Scenario::default(), outages(90.0));
     let track = scenario.track(&path, &model, &outages).unwrap();
     let end = |scenario: &Scenario| {

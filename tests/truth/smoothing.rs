@@ -52,12 +52,9 @@ fn at_rest_the_smoothed_position_is_the_closed_form_of_an_integrated_wiener_proc
          segment = [{ kind = \"straight\", duration_s = 60 }]",
         MODEL,
     );
-    let trajectory = trajectory_file::load(
-        &place.path().join("drive.toml"),
-        &trajectory_file::Options::default(),
-    )
-    .unwrap()
-    .0;
+    let trajectory = trajectory_file::load(&place.path().join("drive.toml"), None)
+        .unwrap()
+        .0;
     let free = Model {
         rate_hz: 100.0,
         axes: Default::default(),
@@ -436,12 +433,9 @@ fn smoothing_changes_nothing_that_it_should_not() {
 #[test]
 fn a_tape_that_is_too_long_is_refused() {
     let place = place_with(DRIVE, MODEL);
-    let trajectory = trajectory_file::load(
-        &place.path().join("drive.toml"),
-        &trajectory_file::Options::default(),
-    )
-    .unwrap()
-    .0;
+    let trajectory = trajectory_file::load(&place.path().join("drive.toml"), None)
+        .unwrap()
+        .0;
     recorded(
         &trajectory,
         &model(),

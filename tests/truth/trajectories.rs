@@ -2,7 +2,7 @@
 //! them. And ideal samples and strapdown agree with independent truth.
 
 use glam::DVec3;
-use nav_sim::io::trajectory_file::{Options, load};
+use nav_sim::io::trajectory_file::load;
 use nav_sim::navigation::earth::GravityModel;
 use nav_sim::navigation::frames::NavState;
 use nav_sim::navigation::sensors::ideal_imu::ideal_imu;
@@ -29,8 +29,7 @@ fn root(path: &str) -> PathBuf {
 }
 
 fn shipped(name: &str) -> Trajectory {
-    let (trajectory, warnings) =
-        load(&root("trajectories").join(name), &Options::default()).unwrap();
+    let (trajectory, warnings) = load(&root("trajectories").join(name), None).unwrap();
     assert!(warnings.is_empty(), "{name}: {warnings:?}");
     trajectory
 }
@@ -44,7 +43,7 @@ fn moved(name: &str, lat_deg: f64, lon_deg: f64) -> Trajectory {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("moved.toml");
     std::fs::write(&path, text[..start].to_owned() + &place + &text[rest..]).unwrap();
-    load(&path, &Options::default()).unwrap().0
+    load(&path, None).unwrap().0
 }
 
 fn closure(trajectory: &Trajectory, rate_hz: f64) -> Closure {
@@ -162,7 +161,7 @@ struct Truth {
 
 fn truth() -> Truth {
     let path = root("tests/data/nav_40s_100hz.csv.gz");
-    let (trajectory, warnings) = load(&path, &Options::default()).unwrap();
+    let (trajectory, warnings) = load(&path, None).unwrap();
     assert!(
         warnings.len() == 1 && warnings[0].contains(": columns not used: dtheta_x_rad"),
         "{warnings:?}"

@@ -110,7 +110,6 @@ impl Drive {
         let task = Task {
             model,
             truths,
-            drawn: None,
             track: &self.track,
             full: filter,
             filter,

@@ -42,15 +42,6 @@ pub struct Beginning {
     pub skip_s: Option<f64>,
 }
 
-/// Recordings of a calibration that do not begin as they go on.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Beginnings {
-    /// Each of them.
-    pub all: Vec<Beginning>,
-    /// Whether their beginnings were left out.
-    pub left_out: bool,
-}
-
 /// Looks at a signal, again after what would be left out, until what remains begins as it goes on; none where it does from
 /// the start, or is too short to tell.
 pub fn warm_up(samples: &[f64]) -> Option<WarmUp> {

@@ -252,15 +252,9 @@ pub(crate) fn inference(
     if let Some((simple, processes, p_value)) = simpler(group, outcome, settings) {
         // By recursion: the simpler model may itself have processes that are not told apart.
         let intervals = inference(group, &simple, settings, bootstrap, &|_| {}).intervals;
-        let Outcome {
-            spec,
-            fit: Fit { composite, .. },
-            ..
-        } = simple;
         let indistinct = Indistinct {
             processes,
-            spec,
-            composite,
+            spec: simple.spec,
             p_value,
             intervals,
         };

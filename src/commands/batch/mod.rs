@@ -15,14 +15,14 @@ use crate::app::{
 use crate::commands::run::{PreparedRun, Run, block_of, columns};
 use crate::io::toml_file::Source;
 use crate::io::{atomic, input, source};
-use crate::report::in_order;
+use crate::report::{in_order, some};
 use clap::Args;
 use indexmap::IndexMap;
 use nav_sim_document::{Importance, Note};
 use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::simulation::RunResult;
 use rayon::prelude::*;
-use results::{first_of, guard, withdraw};
+use results::{guard, withdraw};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Map;
@@ -197,7 +197,7 @@ impl BatchRequest {
             "{} of {} cells are missing: {}",
             missing.len(),
             cells.len(),
-            first_of(&missing)
+            some(&missing)
         ));
         Ok(Outcome::Partial(missing))
     }
@@ -1076,19 +1076,17 @@ fn parse_shard(text: &str) -> Result<(u64, u64), String> {
         .ok_or_else(|| "expected i/n with i from 0 to n − 1, such as 0/4".to_owned())
 }
 
-/// Variables that give an index, and those that give the first one, the step and how many there are.
-const SCHEDULERS: [(&str, Option<[&str; 3]>); 4] = [
-    ("HQ_TASK_ID", None),
-    (
+/// Variables of schedulers: the index, and the first one, the step and how many there are, where the array says them.
+const SCHEDULERS: [[&str; 4]; 4] = [
+    ["HQ_TASK_ID", "", "", ""],
+    [
         "SLURM_ARRAY_TASK_ID",
-        Some([
-            "SLURM_ARRAY_TASK_MIN",
-            "SLURM_ARRAY_TASK_STEP",
-            "SLURM_ARRAY_TASK_COUNT",
-        ]),
-    ),
-    ("PBS_ARRAY_INDEX", None),
-    ("JOB_COMPLETION_INDEX", None),
+        "SLURM_ARRAY_TASK_MIN",
+        "SLURM_ARRAY_TASK_STEP",
+        "SLURM_ARRAY_TASK_COUNT",
+    ],
+    ["PBS_ARRAY_INDEX", "", "", ""],
+    ["JOB_COMPLETION_INDEX", "", "", ""],
 ];
 
 /// The shard of this process; none without a flag and a scheduler. `shards` is how many there are,
@@ -1102,51 +1100,40 @@ fn find_shard(
         return Ok(flag);
     }
     let number = |name: &str| -> Result<Option<u64>> {
-        let text = variable(name);
-        text.map(|text| {
-            text.trim()
-                .parse()
-                .map_err(|_| Failure::input(format!("{name}={text} is not a number")))
-        })
-        .transpose()
+        let parsed = |text: String| {
+            let number = text.trim().parse();
+            number.map_err(|_| Failure::input(format!("{name}={text} is not a number")))
+        };
+        variable(name).map(parsed).transpose()
     };
-    let Some((name, more, id)) = SCHEDULERS
-        .into_iter()
-        .find_map(|(name, more)| {
-            let id = number(name).transpose()?;
-            Some(id.map(|id| (name, more, id)))
-        })
-        .transpose()?
-    else {
-        return match shards {
-            None | Some(1) => Ok(None),
-            Some(n) => refused(
-                format!("--shards {n}: no scheduler says which of them this is"),
-                "give --shard i/n",
+    for [name, first, step, count] in SCHEDULERS {
+        let Some(id) = number(name)? else { continue };
+        // With --shards, tasks count from 0 whatever part of an array was submitted; without, the array says.
+        let [first, step, count] = match shards {
+            Some(_) => [None, None, shards],
+            None => [number(first)?, number(step)?, number(count)?],
+        };
+        let Some(count) = count else {
+            return refused(
+                format!("{name}={id} says which shard this is, but not of how many"),
+                "add --shards n (indices from 0 to n − 1)",
+            );
+        };
+        let index = id.checked_sub(first.unwrap_or(0));
+        let index = index.map(|i| i / step.unwrap_or(1).max(1));
+        return match index.filter(|index| *index < count) {
+            Some(index) => Ok(Some((index, count))),
+            None => refused(
+                format!("{name}={id} is not one of {count} shards"),
+                format!("number the tasks from 0 to {}", count.saturating_sub(1)),
             ),
         };
-    };
-    // With --shards, tasks count from 0 whatever part of an array was submitted; without, the array says.
-    let [first, step, count] = match more.filter(|_| shards.is_none()) {
-        Some([min, step, count]) => [number(min)?, number(step)?, number(count)?],
-        None => [None; 3],
-    };
-    let index = id
-        .checked_sub(first.unwrap_or(0))
-        .map(|i| i / step.unwrap_or(1).max(1));
-    let Some(count) = shards.or(count) else {
-        return refused(
-            format!("{name}={id} says which shard this is, but not of how many"),
-            "add --shards n (indices from 0 to n − 1)",
-        );
-    };
-    match index.filter(|index| *index < count) {
-        Some(index) => Ok(Some((index, count))),
-        None => Err(
-            Failure::input(format!("{name}={id} is not one of {count} shards")).hint(format!(
-                "number the tasks from 0 to {}",
-                count.saturating_sub(1)
-            )),
+    }
+    match shards {
+        None | Some(1) => Ok(None),
+        Some(n) => refused(
+            format!("--shards {n}: no scheduler says which of them this is"),
+            "give --shard i/n",
         ),
     }
 }

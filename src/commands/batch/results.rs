@@ -6,8 +6,8 @@ use crate::commands::compare::{Comparison, between};
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::io::atomic::{AtomicDir, guard_others};
 use crate::report::csv::{csv, flat};
-use crate::report::json;
 use crate::report::verdict::{tone, verdict_counts};
+use crate::report::{json, some};
 use indexmap::IndexMap;
 use nav_sim_document::{Axis, Chart, Colour, Document, Importance, Panel, Series, Table, Tone};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
@@ -215,7 +215,7 @@ impl StudyAnswer {
     /// Cells that are missing (exit code 75), if there are any.
     pub(crate) fn incomplete(&self) -> Option<Failure> {
         let missing = &self.missing;
-        let message = || format!("{} cells are missing: {}", missing.len(), first_of(missing));
+        let message = || format!("{} cells are missing: {}", missing.len(), some(missing));
         (!self.complete).then(|| {
             Failure::stopped(message()).hint("the same command without --merge computes them")
         })
@@ -229,7 +229,7 @@ impl StudyAnswer {
                 .into_iter()
                 .zip([csv(&self.rows), json(self), self.document().html()])
         {
-            files.write(name, text)?;
+            files.write(name, [text])?;
         }
         files.commit()
     }
@@ -274,10 +274,7 @@ impl Answer for StudyAnswer {
         if !names.is_empty() {
             document.note(
                 Importance::Warning,
-                format!(
-                    "runs diverged in {}; they are in no number",
-                    first_of(&names)
-                ),
+                format!("runs diverged in {}; they are in no number", some(&names)),
             );
         }
         let columns = [
@@ -346,16 +343,4 @@ impl StudyAnswer {
         };
         self.axes.iter().filter_map(chart).collect()
     }
-}
-
-/// The first names of a list.
-pub(super) fn first_of(names: &[String]) -> String {
-    let more = if names.len() > 3 { ", …" } else { "" };
-    names
-        .iter()
-        .take(3)
-        .map(String::as_str)
-        .collect::<Vec<_>>()
-        .join(", ")
-        + more
 }

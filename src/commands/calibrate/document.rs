@@ -6,21 +6,19 @@ use crate::commands::export::Quantity;
 use crate::io::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn, known};
 use crate::report::csv::merged;
 use crate::report::curves::{FittedCurve, band, curve, recording_names, sensor_name};
-use crate::report::in_order;
+use crate::report::{in_order, some};
 use nav_sim_calibration::{
-    Beginning, Beginnings, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Miss,
-    Outcome, ParameterInterval, ParameterSpread, Practical, Ranking, Settings, TURN_ON_LEVEL,
-    TurnOnFinding, TurnOnSpread, Undetermined, Verdict, WIDEST, duration, model_of, percent, tau_s,
+    Beginning, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Miss, Outcome,
+    ParameterInterval, ParameterSpread, Ranking, Settings, TurnOnFinding, TurnOnSpread,
+    Undetermined, Verdict, WIDEST, duration, model_of, percent, tau_s,
 };
 use nav_sim_document::{
-    Axis as ChartAxis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone,
-    readable,
+    Axis as ChartAxis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke,
+    Table, Tone, readable,
 };
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::practical::Horizon;
-use nav_sim_signal::noise::{
-    Composite, Kind, Law, Parameter, ParameterRef, Process, Spread, Variation,
-};
+use nav_sim_signal::noise::{Kind, Law, Parameter, ParameterRef, Spread, Variation};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -167,8 +165,8 @@ impl Calibration {
             };
             note(importance, found.sensor.name(), turn_on_remark(found));
         }
-        if let Some((head, text)) = beginnings(&self.beginnings) {
-            note(Importance::Remark, head, text);
+        if let Some(text) = beginnings(&self.beginnings) {
+            note(Importance::Remark, "not stationary at the beginning", text);
         }
         for outcome in fits {
             let reasons = outcome.ranking.iter().flat_map(reasons);
@@ -236,19 +234,19 @@ fn group_name(fitted: &FittedCurve) -> String {
 fn chart(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_hz: f64) -> Chart {
     // a scale is two averages long, the wavelet variance half the Allan variance
     let averages_s: Vec<f64> = fitted.tau_s.iter().map(|tau_s| 0.5 * tau_s).collect();
-    let curve_of = |wv: &[f64], of: &dyn Fn(f64, usize) -> f64| -> Vec<f64> {
-        (0..wv.len()).map(|i| of(wv[i], i)).collect()
+    let allan = |wv: &[f64]| -> Vec<f64> { wv.iter().map(|nu| (2.0 * nu).sqrt()).collect() };
+    let over_model = |wv: &[f64]| -> Vec<f64> {
+        let both = wv.iter().zip(&fitted.implied);
+        both.map(|(nu, of_model)| nu / of_model).collect()
     };
-    let data = |of: &dyn Fn(f64, usize) -> f64| {
-        let [low, high] = [&fitted.ci_low, &fitted.ci_high].map(|wv| curve_of(wv, of));
-        let mid = curve(&averages_s, &curve_of(&fitted.wv, of));
+    let data = |of: &dyn Fn(&[f64]) -> Vec<f64>| {
+        let [low, high, mid] = [&fitted.ci_low, &fitted.ci_high, &fitted.wv].map(|wv| of(wv));
         [
             Series::new("data, 95 %", Colour::Ink, band(&averages_s, &low, &high)),
-            Series::line("data, 95 %", Colour::Ink, mid),
+            Series::line("data, 95 %", Colour::Ink, curve(&averages_s, &mid)),
         ]
     };
-    let allan = |nu: f64, _: usize| (2.0 * nu).sqrt();
-    let line = |wv: &[f64]| curve(&averages_s, &curve_of(wv, &allan));
+    let line = |wv: &[f64]| curve(&averages_s, &allan(wv));
     let mut upper = recordings(fitted, diagnoses, line);
     upper.extend(
         fitted
@@ -275,15 +273,12 @@ fn chart(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_
                 .map(|(name, x, y)| Series::new(name, Colour::RIGHT, Mark::Place(x, y))),
         );
     }
-    let mut lower = data(&|nu, i| nu / fitted.implied[i]).to_vec();
+    let mut lower = data(&over_model).to_vec();
     lower.push(Series::new("model", Colour::REAL, Mark::Level(1.0)));
     let deviation = ChartAxis::log(&format!("Allan deviation ({})", fitted.sensor.unit()));
     let ratio = ChartAxis::log("data / model").including(0.8, 1.25);
     let panels = [(1.4, deviation, upper), (0.5, ratio, lower)];
-    let panels = panels.map(|(height, axis, series)| Panel {
-        height,
-        ..Panel::new(axis, series)
-    });
+    let panels = panels.map(|(height, axis, series)| Panel::new(axis, series).of_height(height));
     let (group, estimator) = (group_name(fitted), fitted.estimator.to_uppercase());
     Chart::new(
         &format!("Allan deviation: {group}, {estimator}"),
@@ -322,7 +317,7 @@ fn recordings(
         .map(|(replicate, name)| {
             let points = line(&replicate.wv);
             match abnormal.iter().position(|file| *file == replicate.file) {
-                None => Series::thin("recordings", Colour::Soft, points),
+                None => Series::new("recordings", Colour::Soft, Mark::Line(points, Stroke::Thin)),
                 Some(k) => Series::line(
                     &format!("{name} (abnormal)"),
                     Colour::Hue(ABNORMAL + k % 2),
@@ -334,16 +329,6 @@ fn recordings(
 }
 
 // A calibration in words: the verdict on models and recordings, the notes.
-
-/// The first of these names, and how many more there are.
-fn some(names: &[String]) -> String {
-    const NAMED: usize = 4;
-    let shown = names[..names.len().min(NAMED)].join(", ");
-    match names.len().saturating_sub(NAMED) {
-        0 => shown,
-        more => format!("{shown} and {more} more"),
-    }
-}
 
 /// `accel: N1 does not fit: data/model 0.33 at 0.02 s; 6 of 16 scales off (p = 0.005)`
 fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
@@ -418,27 +403,21 @@ fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> Option<Stri
     ))
 }
 
-/// Beginnings that are left out, or that change a wavelet variance notably, and what of them.
-fn beginnings(found: &Beginnings) -> Option<(&'static str, String)> {
+/// The recordings whose beginnings change a wavelet variance notably, and what to leave out.
+fn beginnings(found: &[Beginning]) -> Option<String> {
     const NOTABLE: f64 = 0.05;
     let matters = |b: &&Beginning| {
         let mut changes = b.signals.iter().map(|w| w.change);
-        found.left_out || changes.any(|c| c.is_none_or(|ratio| ratio.ln().abs() > NOTABLE))
+        changes.any(|c| c.is_none_or(|ratio| ratio.ln().abs() > NOTABLE))
     };
-    let told: Vec<&Beginning> = found.all.iter().filter(matters).collect();
+    let told: Vec<&Beginning> = found.iter().filter(matters).collect();
     let names = recording_names(told.iter().map(|b| b.recording.as_str()));
     let line = |(b, name): (&&Beginning, String)| match b.skip_s {
-        Some(s) if found.left_out => format!("{name} {s} s"),
         Some(s) => format!("{name} --skip-s {s}"),
         None => format!("{name} never settles"),
     };
     let lines: Vec<String> = told.iter().zip(names).map(line).collect();
-    let head = if found.left_out {
-        "left out at the beginning"
-    } else {
-        "not stationary at the beginning"
-    };
-    (!lines.is_empty()).then(|| (head, some(&lines)))
+    (!lines.is_empty()).then(|| some(&lines))
 }
 
 /// `accel.x`, with the estimator where there are several.
@@ -709,7 +688,7 @@ fn fit_record(outcome: &Outcome, settings: &Settings) -> Value {
 /// A fit: its record, models and figures. `axis` is `all` of pooled axes; `spread_p_value` is the probability that
 /// replicates of one noise differ as much at some scale; `parameter_spread` are laws of model files; `missed` are the
 /// scales at which curve and model differ by more than four standard deviations; `zero` are the processes whose amplitude
-/// is zero, `at_end` those whose correlation time lies at the end of its range.
+/// is zero.
 fn fit_json(outcome: &Outcome, all: &[Outcome], settings: &Settings) -> Value {
     let (fit, rate_hz) = (&outcome.fit, settings.rate_hz);
     let (inference, ranking) = (outcome.inference.as_ref(), outcome.ranking.as_ref());
@@ -720,15 +699,12 @@ fn fit_json(outcome: &Outcome, all: &[Outcome], settings: &Settings) -> Value {
     let miss = |m: &Miss| json!({ "tau_s": tau_s(m.level, rate_hz), "ratio": m.ratio, "deviations": m.deviations });
     let missed: Vec<Value> = outcome.departure().missed.iter().map(miss).collect();
     let law = |found: &ParameterSpread| {
-        json!({
+        let of = json!({
             "process": labels[found.of.process],
             "parameter": found.of.parameter.name(),
             "distribution": "lognormal",
-            "median": found.median,
-            "median_ci95": found.median_ci95,
-            "sd": found.sd,
-            "sd_ci95": found.sd_ci95,
-        })
+        });
+        merged([of, json!(found)])
     };
     let laws: Vec<Value> = inference.iter().flat_map(|i| &i.varying).map(law).collect();
     let indistinct = inference.and_then(|i| i.indistinct.as_ref()).map(|i| {
@@ -736,7 +712,6 @@ fn fit_json(outcome: &Outcome, all: &[Outcome], settings: &Settings) -> Value {
             "processes": labelled(&i.processes),
             "simpler": i.spec.to_string(),
             "p_value": i.p_value,
-            "simpler_processes": processes(&i.composite, &i.intervals),
         })
     });
     let fit_facts = json!({
@@ -746,7 +721,7 @@ fn fit_json(outcome: &Outcome, all: &[Outcome], settings: &Settings) -> Value {
         "estimator": outcome.estimator,
         "ranking": ranking.map_or(Vec::new(), candidates),
         "reasons": ranking.map_or(Vec::new(), reasons),
-        "processes": processes(&fit.composite, intervals(outcome)),
+        "processes": processes(outcome),
         "goodness": outcome.goodness(),
         "spread": inference.map_or(&[][..], |i| &i.spread),
         "spread_p_value": inference.and_then(|i| i.alike),
@@ -755,7 +730,6 @@ fn fit_json(outcome: &Outcome, all: &[Outcome], settings: &Settings) -> Value {
         "figures": figures(outcome, rate_hz),
         "missed": missed,
         "zero": labelled(&fit.zero),
-        "at_end": labelled(&fit.at_end),
     });
     merged([fit_record(outcome, settings), fit_facts])
 }
@@ -764,7 +738,6 @@ fn candidates(ranking: &Ranking) -> Vec<Value> {
     let entry = |(i, c): (usize, &Candidate)| {
         json!({
             "model": c.spec.to_string(),
-            "parameters": c.spec.parameters(),
             "objective": c.objective,
             "optimism": c.optimism,
             "wvic": c.wvic(),
@@ -777,13 +750,10 @@ fn candidates(ranking: &Ranking) -> Vec<Value> {
 }
 
 /// Processes with the keys of model files; beside each parameter `_ci95` and `_se`, null where they are not determined.
-fn processes(model: &Composite, intervals: &[ParameterInterval]) -> Vec<Value> {
-    let mut all: Vec<Value> = model
-        .processes
-        .iter()
-        .map(|process| json!(process))
-        .collect();
-    for i in intervals {
+fn processes(outcome: &Outcome) -> Vec<Value> {
+    let model = &outcome.fit.composite;
+    let mut all: Vec<Value> = model.processes.iter().map(|p| json!(p)).collect();
+    for i in intervals(outcome) {
         let (entry, name) = (&mut all[i.of.process], i.of.parameter.name());
         entry[format!("{name}_ci95")] = json!(i.absent.is_none().then_some([i.low, i.high]));
     }
@@ -794,165 +764,125 @@ fn intervals(outcome: &Outcome) -> &[ParameterInterval] {
     outcome.inference.as_ref().map_or(&[], |i| &i.intervals)
 }
 
-/// The means of one sensor, by the model of one estimator; where a bias is seen both probabilities are below `level`.
+/// The means of one sensor, by the model of one estimator.
 fn turn_on_json(found: &TurnOnSpread) -> Value {
-    json!({
-        "sensor": found.sensor,
-        "estimator": found.estimator,
-        "finding": found.finding,
+    let derived = json!({
         "sigmas": found.sigmas(),
         "spread": found.spread(),
         "noise": found.noise(),
-        "relative_error": found.relative_error(),
-        "p_noise": found.p_noise,
-        "p_drift": found.p_drift,
-        "level": TURN_ON_LEVEL,
-        "axes": found.axes,
         "remark": turn_on_remark(found),
-    })
+    });
+    merged([json!(found), derived])
 }
 
-/// A figure of a model in the unit of data sheets, where the data show it; `ci95`: its interval, where it is determined;
-/// `averages`: averaging times at which it counts.
-fn figure(
-    name: &str,
-    unit: &str,
-    value: Option<f64>,
-    ci95: Option<[f64; 2]>,
-    averages: &str,
-) -> Value {
-    json!({
-        "name": name,
-        "value": value,
-        "ci95": ci95.filter(|_| value.is_some()),
-        "unit": unit,
-        "averages": averages,
-    })
-}
-
-/// N, B and K of a fit, and what a pair of N and K does not carry.
+/// Figures of a fit in the units of data sheets: N, B and K, and what a pair of N and K does not carry. `value` is null where
+/// the data do not show it, `averages` are the averaging times at which it counts.
 fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
-    let mut figures = outcome
-        .practical(rate_hz)
-        .map_or_else(BTreeMap::new, |p| practical_figures(outcome, &p));
-    let model = &outcome.fit.composite;
-    for (index, (process, label)) in model.processes.iter().zip(model.labels()).enumerate() {
-        let found = further_figure(process, outcome.scope.sensor);
-        let is_zero = outcome.fit.zero.contains(&index);
-        let Some((letter, name, unit, parameter, convert)) = found.filter(|_| !is_zero) else {
-            continue;
-        };
-        let own = |of: ParameterRef| of.process == index && of.parameter == parameter;
-        let mut known = intervals(outcome).iter().filter(|i| i.absent.is_none());
-        let ends = known.find(|i| own(i.of)).map(|i| {
-            let mut ends = [i.low, i.high].map(|end| convert(end, rate_hz));
-            ends.sort_by(f64::total_cmp);
-            ends
-        });
-        let value = model.parameters().find(|(of, _)| own(*of));
-        let value = value.map(|(_, value)| convert(value, rate_hz));
-        let key = match letter {
-            "T" => format!("T_{label}"),
-            letter => letter.to_owned(),
-        };
-        figures.insert(
-            key,
-            figure(&format!("{label} {name}"), unit, value, ends, "–"),
-        );
-    }
-    figures
-}
-
-fn practical_figures(outcome: &Outcome, practical: &Practical) -> BTreeMap<String, Value> {
     let sensor = outcome.scope.sensor;
-    let (pair, ends) = (&practical.parameters.walk, &practical.intervals);
-    let [white, walk] = match sensor {
-        Sensor::Accel => ["velocity random walk N", "accel. random walk K"],
-        Sensor::Gyro => ["angle random walk N", "rate random walk K"],
-    };
-    let none = format!("none up to {}", duration(practical.range_s));
-    let crossover = pair.crossover_s().map(duration);
-    let to = crossover
-        .as_ref()
-        .map_or(String::new(), |t| format!("up to {t}"));
-    let until = practical
-        .walk_until_s
-        .map(|t| format!(" to {}", duration(t)));
-    let from = crossover.map(|t| format!("from {t}{}", until.unwrap_or_default()));
-    let minimum = practical.parameters.minimum;
-    let floor = minimum.map(|m| format!("floor at {}", duration(m.tau_s)));
-    let (n, b) = (pair.density, minimum.map(|m| m.bias_instability()));
-    let k = practical.walk_is_observed().then_some(pair.walk);
-    let rows = [
-        (
-            "N",
+    let mut figures = BTreeMap::new();
+    let mut put =
+        |key: String, name: &str, (unit, factor), value: Option<f64>, ends, averages: &str| {
+            let ends: Option<[f64; 2]> = ends;
+            let figure = json!({
+                "name": name,
+                "value": value.map(|x| x * factor),
+                "ci95": value.and(ends).map(|ends| ends.map(|end| end * factor)),
+                "unit": unit,
+                "averages": averages,
+            });
+            figures.insert(key, figure);
+        };
+    if let Some(practical) = outcome.practical(rate_hz) {
+        let (pair, ends) = (&practical.parameters.walk, &practical.intervals);
+        let [white, walk] = match sensor {
+            Sensor::Accel => ["velocity random walk N", "accel. random walk K"],
+            Sensor::Gyro => ["angle random walk N", "rate random walk K"],
+        };
+        let none = format!("none up to {}", duration(practical.range_s));
+        let crossover = pair.crossover_s().map(duration);
+        let to = crossover.as_ref().map(|t| format!("up to {t}"));
+        let until = practical.walk_until_s;
+        let until = until.map_or(String::new(), |t| format!(" to {}", duration(t)));
+        let from = crossover.map_or(none.clone(), |t| format!("from {t}{until}"));
+        let minimum = practical.parameters.minimum;
+        let floor = minimum.map_or(none, |m| format!("floor at {}", duration(m.tau_s)));
+        let b = minimum.map(|m| m.bias_instability());
+        let k = practical.walk_is_observed().then_some(pair.walk);
+        let unit = |quantity: Quantity| quantity.sheet(sensor);
+        let (n, to) = (Some(pair.density), to.unwrap_or_default());
+        put(
+            "N".to_owned(),
             white,
-            Quantity::Density,
-            Some(n),
+            unit(Quantity::Density),
+            n,
             ends.density,
-            Some(to),
-        ),
-        (
-            "B",
+            &to,
+        );
+        put(
+            "B".to_owned(),
             "bias instability B",
-            Quantity::Bias,
+            unit(Quantity::Bias),
             b,
             ends.instability,
-            floor,
-        ),
-        ("K", walk, Quantity::Walk, k, ends.walk, from),
-    ];
-    let row = |(key, name, quantity, value, ends, averages): (
-        _,
-        &str,
-        Quantity,
-        Option<f64>,
-        Option<[f64; 2]>,
-        Option<String>,
-    )| {
-        let (unit, factor) = quantity.sheet(sensor);
-        let ends = ends.map(|ends| ends.map(|end| end * factor));
-        let averages = averages.as_ref().unwrap_or(&none);
-        let figure = figure(name, unit, value.map(|x| x * factor), ends, averages);
-        (str::to_owned(key), figure)
-    };
-    rows.map(row).into()
-}
-
-/// Letter, name and unit of what a process is known by beside N and K, the parameter that it follows from, and how, at a
-/// rate (Hz).
-type FurtherFigure = (
-    &'static str,
-    &'static str,
-    &'static str,
-    Parameter,
-    fn(f64, f64) -> f64,
-);
-
-fn further_figure(process: &Process, sensor: Sensor) -> Option<FurtherFigure> {
+            &floor,
+        );
+        put(
+            "K".to_owned(),
+            walk,
+            unit(Quantity::Walk),
+            k,
+            ends.walk,
+            &from,
+        );
+    }
+    let model = &outcome.fit.composite;
     let [increment, ramp] = match sensor {
         Sensor::Accel => ["m/s", "m/s² per s"],
         Sensor::Gyro => ["rad", "rad/s per s"],
     };
-    const TIME: &str = "correlation time T";
-    Some(match process.kind() {
-        Kind::Ar1 if process.shape() > 0.0 => ("T", TIME, "s", Parameter::Phi, |phi, rate_hz| {
-            -1.0 / (phi.ln() * rate_hz)
-        }),
-        Kind::GaussMarkov => ("T", TIME, "s", Parameter::Beta, |beta, _| 1.0 / beta),
-        // Of the increments over a sample, as IEEE 952 has it.
-        Kind::Quantization => (
-            "Q",
-            "quantization Q",
-            increment,
-            Parameter::Q2,
-            |q2, rate_hz| q2.sqrt() / rate_hz,
-        ),
-        Kind::Drift => ("R", "ramp", ramp, Parameter::Slope, |slope, rate_hz| {
-            slope * rate_hz
-        }),
-        _ => return None,
-    })
+    for (index, (process, label)) in model.processes.iter().zip(model.labels()).enumerate() {
+        let time = || (format!("T_{label}"), "correlation time T", "s");
+        let ((key, name, unit), parameter, convert): (_, _, fn(f64, f64) -> f64) =
+            match process.kind() {
+                _ if outcome.fit.zero.contains(&index) => continue,
+                Kind::Ar1 if process.shape() > 0.0 => (time(), Parameter::Phi, |phi, rate_hz| {
+                    -1.0 / (phi.ln() * rate_hz)
+                }),
+                Kind::GaussMarkov => (time(), Parameter::Beta, |beta, _| 1.0 / beta),
+                // Of the increments over a sample, as IEEE 952 has it.
+                Kind::Quantization => (
+                    ("Q".to_owned(), "quantization Q", increment),
+                    Parameter::Q2,
+                    |q2, rate_hz| q2.sqrt() / rate_hz,
+                ),
+                Kind::Drift => (
+                    ("R".to_owned(), "ramp", ramp),
+                    Parameter::Slope,
+                    |slope, rate_hz| slope * rate_hz,
+                ),
+                _ => continue,
+            };
+        let of = ParameterRef {
+            process: index,
+            parameter,
+        };
+        let mut known = intervals(outcome).iter().filter(|i| i.absent.is_none());
+        let ends = known.find(|i| i.of == of).map(|i| {
+            let mut ends = [i.low, i.high].map(|end| convert(end, rate_hz));
+            ends.sort_by(f64::total_cmp);
+            ends
+        });
+        let value = Some(convert(model.value(of), rate_hz));
+        put(
+            key,
+            &format!("{label} {name}"),
+            (unit, 1.0),
+            value,
+            ends,
+            "–",
+        );
+    }
+    figures
 }
 
 // The model file of a calibration.
@@ -988,13 +918,36 @@ impl Calibration {
         let (outcomes, rate_hz) = (&self.outcomes, self.settings.rate_hz);
         let mut file = ModelFile::new(model_of(outcomes, rate_hz));
         file.missing = Channel::ALL.to_vec();
+        let mut spread = Spread::default();
         for outcome in outcomes {
+            let (composite, labels) = (&outcome.fit.composite, outcome.fit.composite.labels());
+            let varying = outcome.inference.iter().flat_map(|i| &i.varying);
+            let laws: Vec<Variation> = varying
+                .filter_map(|found| {
+                    let law = Law::Lognormal {
+                        median: found.median,
+                        median_ci95: Some(found.median_ci95),
+                        sd: found.sd,
+                        sd_ci95: Some(found.sd_ci95),
+                    };
+                    let of = found.of;
+                    Variation::new(composite, &labels[of.process], of.parameter.name(), law).ok()
+                })
+                .collect();
             for channel in outcome.scope.channels() {
                 file.missing.retain(|c| *c != channel);
-                file.intervals.extend(intervals_of_axis(outcome, channel));
+                let known = intervals(outcome).iter().filter(|i| i.low.is_finite());
+                file.intervals.extend(known.map(|i| Interval {
+                    channel,
+                    process: labels[i.of.process].clone(),
+                    parameter: i.of.parameter.name().to_owned(),
+                    low: i.low,
+                    high: i.high,
+                }));
+                spread.axes[channel.index()].clone_from(&laws);
             }
         }
-        file.spread = spread(outcomes);
+        file.spread = (spread != Spread::default()).then_some(spread);
         let mut provenance = self.provenance(curves);
         let mut remarks = toml::Table::new();
         let mut turn_on = TurnOn::default();
@@ -1045,48 +998,4 @@ impl Calibration {
         table.extend(note.reading.clone());
         table
     }
-}
-
-/// The laws by which the parameters of recordings differ; none where none is known to.
-fn spread(outcomes: &[Outcome]) -> Option<Spread> {
-    let mut spread = Spread::default();
-    for outcome in outcomes {
-        let (composite, labels) = (&outcome.fit.composite, outcome.fit.composite.labels());
-        let variation = |found: &ParameterSpread| {
-            let law = Law::Lognormal {
-                median: found.median,
-                median_ci95: Some(found.median_ci95),
-                sd: found.sd,
-                sd_ci95: Some(found.sd_ci95),
-            };
-            let (process, parameter) = (&labels[found.of.process], found.of.parameter.name());
-            Variation::new(composite, process, parameter, law).ok()
-        };
-        let laws: Vec<Variation> = outcome
-            .inference
-            .iter()
-            .flat_map(|i| &i.varying)
-            .filter_map(variation)
-            .collect();
-        outcome
-            .scope
-            .channels()
-            .iter()
-            .for_each(|c| spread.axes[c.index()].clone_from(&laws));
-    }
-    (spread != Spread::default()).then_some(spread)
-}
-
-fn intervals_of_axis(outcome: &Outcome, channel: Channel) -> impl Iterator<Item = Interval> {
-    let labels = outcome.fit.composite.labels();
-    intervals(outcome)
-        .iter()
-        .filter(|i| i.low.is_finite())
-        .map(move |i| Interval {
-            channel,
-            process: labels[i.of.process].clone(),
-            parameter: i.of.parameter.name().to_owned(),
-            low: i.low,
-            high: i.high,
-        })
 }

@@ -7,9 +7,9 @@ use crate::io::recordings::{FileReport, ReadOptions, Report};
 use crate::io::{curve_file, input, recordings};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
-    self, Advance, Beginning, Beginnings, Bootstrap, CalibrationError, Diagnosis, Estimator, Group,
-    Outcome, Pool, Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve, grouped,
-    infer_telling, replicates, turn_on, warm_up,
+    self, Advance, Beginning, Bootstrap, CalibrationError, Diagnosis, Estimator, Group, Outcome,
+    Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve, infer_telling,
+    replicates, turn_on, warm_up,
 };
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::names::UnknownName;
@@ -74,44 +74,11 @@ impl EstimatorChoice {
     }
 }
 
-/// How to calibrate recordings.
-#[derive(Debug, Clone)]
-pub struct CalibrationOptions {
-    /// How recordings are read.
-    pub reading: ReadOptions,
-    /// Whether the warm-up found in each recording is left out.
-    pub skip_warm_up: bool,
-    /// Number of scales; `None`: of each recording one less than its length allows.
-    pub scales: Option<u32>,
-    /// Which estimators.
-    pub estimators: EstimatorChoice,
-    /// Which signals are replicates of one another; `None`: as the estimators need it ([`Settings::pool`]).
-    pub pool: Option<Pool>,
-    /// How models are fitted; the estimators and the rate in it follow from the recordings.
-    pub settings: Settings,
-    /// The bootstrap behind intervals and goodness of fit; `None`: neither is computed.
-    pub bootstrap: Option<Bootstrap>,
-}
-
-impl Default for CalibrationOptions {
-    fn default() -> Self {
-        Self {
-            reading: ReadOptions::default(),
-            skip_warm_up: false,
-            scales: None,
-            estimators: EstimatorChoice::One(Estimator::default()),
-            pool: None,
-            settings: Settings::default(),
-            bootstrap: Some(Bootstrap::default()),
-        }
-    }
-}
-
 /// Recordings that were measured, none a copy of another.
 pub(crate) struct Measured {
     pub report: Report,
     pub replicates: Vec<(Channel, Replicate)>,
-    pub beginnings: Beginnings,
+    pub beginnings: Vec<Beginning>,
     pub settings: Settings,
 }
 
@@ -126,7 +93,7 @@ pub struct Calibration {
     /// How they were fitted.
     pub settings: Settings,
     /// The recordings that do not begin as they go on.
-    pub beginnings: Beginnings,
+    pub beginnings: Vec<Beginning>,
     /// Turn-on bias from the recordings' means, for each estimator and sensor.
     pub turn_on: Vec<TurnOnSpread>,
     /// Each recording against the others.
@@ -135,75 +102,30 @@ pub struct Calibration {
     pub(crate) note: CalibrationNote,
 }
 
-/// Calibrates recordings, or directories of them.
-///
-/// # Errors
-/// When a recording cannot be read, is too short, or is no replicate of its own; when the estimator takes one recording
-/// only, a trim leaves no replicate, or a curve is too short for the model.
-pub fn calibrate(
-    paths: &[PathBuf],
-    options: &CalibrationOptions,
-    context: &Context<'_>,
-) -> Result<Calibration, Failure> {
-    let Measured {
-        replicates,
-        beginnings,
-        settings,
-        ..
-    } = measure(paths, options, context)?;
-    let groups = grouped(replicates, options.pool.unwrap_or(settings.pool()));
-    let bootstrap = options.bootstrap;
-    let steps = settings.model.steps() + bootstrap.map_or(0, |bootstrap| bootstrap.draws as u64);
-    let fits = (groups.len() * settings.estimators.len()) as u64;
-    context.begin("steps of the fits", fits * steps);
-    let advance = |steps| context.advance(steps);
-    let outcomes = nav_sim_calibration::calibrate_telling(&groups, &settings, &advance)?;
-    let made = Calibration::new(groups, outcomes, settings, bootstrap, &advance);
-    context.end();
-    Ok(Calibration { beginnings, ..made })
-}
-
 /// Reads and measures recordings: errors in them are known before the long half begins.
 pub(crate) fn measure(
     paths: &[PathBuf],
-    options: &CalibrationOptions,
+    mut reading: ReadOptions,
+    scales: Option<u32>,
+    estimators: EstimatorChoice,
+    settings: &Settings,
     context: &Context<'_>,
 ) -> Result<Measured, Failure> {
-    let CalibrationOptions {
-        skip_warm_up,
-        scales,
-        estimators,
-        pool,
-        settings,
-        ..
-    } = options;
     // As many scales as parameters, and one that the default leaves out.
-    let needed = scales.map_or(2 << settings.model.parameters(), |j| 1 << j);
-    let reading = ReadOptions {
-        min_samples: needed,
-        ..options.reading.clone()
-    };
-    let look = |recording: Recording| {
-        MeasuredRecording::new(recording, *skip_warm_up, *scales, &settings.tuning)
-    };
+    reading.min_samples = scales.map_or(2 << settings.model.parameters(), |j| 1 << j);
+    let look = |recording: Recording| MeasuredRecording::new(recording, scales, &settings.tuning);
     let (looks, report) = visit(paths, &reading, &look, context)?;
     let looks = looks.into_iter().collect::<Result<Vec<_>, _>>()?;
     distinct(&looks)?;
     let rate_hz = report.files[0].rate_hz;
-    let beginnings = beginnings(&looks, (reading.skip_s, *skip_warm_up), rate_hz);
-    shortest(&report, *scales, context);
+    let beginnings = beginnings(&looks, reading.skip_s, rate_hz);
+    shortest(&report, scales, context);
     let estimators = estimators.estimators(report.files.iter().map(|f| f.samples.len()).sum())?;
     let settings = Settings {
         estimators,
         rate_hz,
         ..settings.clone()
     };
-    if *pool == Some(Pool::Sensor) && settings.pool() == Pool::Axes {
-        return refused(
-            "--pool sensor: gmwm, rgmwm and avlr take one signal at a time",
-            "--pool axes",
-        );
-    }
     let mut measured: Vec<_> = looks.into_iter().flat_map(|look| look.replicates).collect();
     one_switching_on(&report, &mut measured);
     Ok(Measured {
@@ -233,7 +155,7 @@ impl Calibration {
         Self {
             turn_on: settings.estimators.iter().flat_map(of_estimator).collect(),
             diagnoses: diagnose(&groups, &outcomes, &settings),
-            beginnings: Beginnings::default(),
+            beginnings: Vec::new(),
             note: CalibrationNote::default(),
             groups,
             outcomes,
@@ -291,7 +213,6 @@ struct MeasuredRecording {
 impl MeasuredRecording {
     fn new(
         recording: Recording,
-        skip_warm_up: bool,
         levels: Option<u32>,
         tuning: &Tuning,
     ) -> Result<Self, CalibrationError> {
@@ -300,13 +221,15 @@ impl MeasuredRecording {
             .par_iter()
             .map(|s| (s.channel, input::hash_of_samples(&s.samples)))
             .collect();
-        let (recording, warm_ups) = without_warm_up(recording, skip_warm_up);
-        let replicates = replicates(&recording, levels, tuning)?;
         Ok(Self {
-            recording: recording.name,
             signals,
-            warm_ups,
-            replicates,
+            warm_ups: recording
+                .signals
+                .par_iter()
+                .filter_map(|s| warm_up(&s.samples))
+                .collect(),
+            replicates: replicates(&recording, levels, tuning)?,
+            recording: recording.name,
         })
     }
 }
@@ -344,45 +267,20 @@ fn distinct(looks: &[MeasuredRecording]) -> Result<(), Failure> {
 }
 
 /// The recordings that do not begin as they go on after what was skipped.
-fn beginnings(
-    looks: &[MeasuredRecording],
-    (skipped_s, left_out): (f64, bool),
-    rate_hz: f64,
-) -> Beginnings {
+fn beginnings(looks: &[MeasuredRecording], skipped_s: f64, rate_hz: f64) -> Vec<Beginning> {
     let beginning = |look: &MeasuredRecording| Beginning {
         recording: look.recording.clone(),
         signals: look.warm_ups.clone(),
         skip_s: longest(&look.warm_ups).map(|n| (skipped_s + n as f64 / rate_hz).ceil()),
     };
     let found = looks.iter().filter(|look| !look.warm_ups.is_empty());
-    Beginnings {
-        all: found.map(beginning).collect(),
-        left_out,
-    }
+    found.map(beginning).collect()
 }
 
 /// Samples to leave out of a recording for all its signals; none where that does not help one of them.
 fn longest(signals: &[WarmUp]) -> Option<usize> {
     let helps = signals.iter().all(|w| w.change.is_some());
     signals.iter().map(|w| w.samples).max().filter(|_| helps)
-}
-
-/// How the signals of a recording begin; if it is to be left out, the recording without that.
-pub(crate) fn without_warm_up(
-    mut recording: Recording,
-    leave_out: bool,
-) -> (Recording, Vec<WarmUp>) {
-    let found: Vec<_> = recording
-        .signals
-        .par_iter()
-        .filter_map(|s| warm_up(&s.samples))
-        .collect();
-    if let Some(samples) = longest(&found).filter(|_| leave_out) {
-        for signal in &mut recording.signals {
-            signal.samples.drain(..samples);
-        }
-    }
-    (recording, found)
 }
 
 /// Remarks which recording is so much shorter than the others that it lacks scales, or costs all of them scales.
@@ -419,7 +317,7 @@ pub(crate) type Curves = Vec<(Scope, Estimator, Curve)>;
 /// and a sensor are for those that do not say theirs.
 ///
 /// # Errors
-/// When the file cannot be read, says nothing of rate or sensor where nothing is given, or has two curves for one model.
+/// When the file cannot be read, or says nothing of its rate where none is given.
 pub(crate) fn read_curves(
     path: &Path,
     rate_hz: Option<f64>,
@@ -459,19 +357,6 @@ pub(crate) fn read_curves(
             sensor,
             axis: named.axis,
         };
-        if curves
-            .iter()
-            .any(|(s, e, _)| (*s, *e) == (scope, estimator))
-        {
-            return refused(
-                format!(
-                    "{}: there are two curves of {} for {estimator}",
-                    path(),
-                    scope.name()
-                ),
-                "calibrate the recordings themselves: it averages them",
-            );
-        }
         curves.push((scope, estimator, named.curve));
     }
     let estimators = Estimator::ALL

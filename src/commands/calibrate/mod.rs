@@ -1,6 +1,6 @@
 //! Calibration: from recordings, or directories of them, to noise models, their files and their document.
 //!
-//! [`calibrate()`] goes from a directory of recordings to models. From signals in memory:
+//! [`Calibrate`] goes from a directory of recordings to models. From signals in memory:
 //! ```
 //! use nav_sim::calibration::{ModelChoice, Pool, Settings, calibrate, grouped, replicates};
 //! use nav_sim::signal::imu::Channel;
@@ -25,8 +25,8 @@ mod document;
 mod measure;
 
 pub(crate) use document::CalibrationNote;
-pub use measure::{Calibration, CalibrationOptions, EstimatorChoice, calibrate};
-pub(crate) use measure::{Measured, measure, visit, without_warm_up};
+pub use measure::{Calibration, EstimatorChoice};
+pub(crate) use measure::{Measured, measure, visit};
 
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
 use crate::app::{Answer, Command, Context, Out, OutputFile, Result, refused};
@@ -38,6 +38,7 @@ use crate::report;
 use measure::{Curves, calibrate_curves, read_curves};
 use nav_sim_calibration::{
     Bootstrap, Estimator, ModelChoice, ModelSpec, Pool, Settings, Trim, Weighting,
+    calibrate_telling, grouped,
 };
 use nav_sim_document::Document;
 use nav_sim_signal::noise::Model;
@@ -69,7 +70,7 @@ pub struct Calibrate {
         conflicts_with = "curve"
     )]
     inputs: Vec<PathBuf>,
-    /// Fit a curve instead of recordings: CSV tau_samples,wv,edof, or a .wv.json of calibrate or wv
+    /// Fit a curve instead of recordings: CSV tau_samples,wv,edof, or a .wv.json of calibrate
     #[arg(long, value_name = "FILE", conflicts_with_all = OF_RECORDINGS)]
     curve: Option<PathBuf>,
     /// Which curve is fitted: an average over the replicates (awv; sr-awv, robust to outliers; dr-awv, robust to
@@ -124,7 +125,11 @@ impl Command for Calibrate {
     }
 
     fn endings(&self) -> Vec<Cow<'static, str>> {
-        endings(&self.estimator.possible())
+        let estimators = self.estimator.possible();
+        let names = estimators
+            .iter()
+            .flat_map(|e| names(&stem_of(*e, &estimators)));
+        names.map(Cow::Owned).collect()
     }
 
     /// A model has a sensor; what is only printed needs one for its units alone.
@@ -160,16 +165,37 @@ impl Command for Calibrate {
                 calibrate_curves(curves, settings, self.draws(context))?
             }
             None => {
-                let options = CalibrationOptions {
-                    reading: self.recordings.options(),
-                    skip_warm_up: self.recordings.reading.skips_warm_up(),
-                    scales: self.tuning.levels(),
-                    estimators: self.estimator,
-                    pool: self.pool,
+                let (reading, scales) = (self.recordings.options(), self.tuning.levels());
+                let estimators = self.estimator;
+                let Measured {
+                    replicates,
+                    beginnings,
                     settings,
-                    bootstrap: self.draws(context),
-                };
-                calibrate(&self.inputs, &options, context)?
+                    ..
+                } = measure(
+                    &self.inputs,
+                    reading,
+                    scales,
+                    estimators,
+                    &settings,
+                    context,
+                )?;
+                if self.pool == Some(Pool::Sensor) && settings.pool() == Pool::Axes {
+                    return refused(
+                        "--pool sensor: gmwm, rgmwm and avlr take one signal at a time",
+                        "--pool axes",
+                    );
+                }
+                let groups = grouped(replicates, self.pool.unwrap_or(settings.pool()));
+                let bootstrap = self.draws(context);
+                let steps = settings.model.steps() + u64::from(self.bootstrap);
+                let fits = (groups.len() * settings.estimators.len()) as u64;
+                context.begin("steps of the fits", fits * steps);
+                let advance = |steps| context.advance(steps);
+                let outcomes = calibrate_telling(&groups, &settings, &advance)?;
+                let made = Calibration::new(groups, outcomes, settings, bootstrap, &advance);
+                context.end();
+                Calibration { beginnings, ..made }
             }
         };
         calibration.note = CalibrationNote {
@@ -194,11 +220,11 @@ impl Answer for Calibration {
 
     fn files(&self) -> Vec<OutputFile<'_>> {
         let estimators = &self.settings.estimators;
-        let of_estimator = |estimator: &Estimator| {
-            let stem = stem_of(*estimator, estimators);
-            self.files_of(*estimator, (model_ending(&stem), stem), None)
-        };
-        estimators.iter().flat_map(of_estimator).collect()
+        let of_estimator = |e: &Estimator| self.files_of(*e, &stem_of(*e, estimators), None);
+        let files = estimators.iter().flat_map(of_estimator);
+        files
+            .map(|(name, text)| OutputFile::whole(name, text))
+            .collect()
     }
 }
 
@@ -272,38 +298,20 @@ fn stem_of(estimator: Estimator, estimators: &[Estimator]) -> String {
     }
 }
 
-/// The ending of a model file.
-fn model_ending(stem: &str) -> String {
-    match stem {
-        "" => String::new(),
-        stem => format!("{stem}.toml"),
-    }
-}
-
-/// Endings of all files of these estimators.
-fn endings(estimators: &[Estimator]) -> Vec<Cow<'static, str>> {
-    let of_estimator = |estimator: &Estimator| {
-        let stem = stem_of(*estimator, estimators);
-        [
-            model_ending(&stem).into(),
-            format!("{stem}.wv.json").into(),
-            format!("{stem}.draws.json").into(),
-            format!("{stem}.html").into(),
-            format!("{stem}.svg").into(),
-        ]
-    };
-    estimators.iter().flat_map(of_estimator).collect()
+/// Names of draws, curves, model, page and figures, or their endings: that of a model alone is none.
+fn names(stem: &str) -> [String; 5] {
+    let model = if stem.is_empty() { "" } else { ".toml" };
+    [".draws.json", ".wv.json", model, ".html", ".svg"].map(|ending| format!("{stem}{ending}"))
 }
 
 impl Calibration {
-    /// Draws, curves, model, page and figures of an estimator; names of the model and of what comes before the other
-    /// endings. A model that is inflated (and how) has no intervals and draws, which are of its own.
+    /// Draws, curves, model, page and figures of an estimator. A model that is inflated (and how) has no intervals and draws, which are of its own.
     pub(crate) fn files_of(
         &self,
         estimator: Estimator,
-        (model_name, stem): (String, String),
+        stem: &str,
         inflated: Option<(&Model, &str)>,
-    ) -> Vec<OutputFile<'static>> {
+    ) -> Vec<(String, String)> {
         let shown = self.of(estimator);
         let curves = report::json(&shown.curves());
         let mut model = shown.model_file(&input::hash_of(curves.as_bytes()));
@@ -319,17 +327,20 @@ impl Calibration {
             };
         }
         let page = shown.page();
-        let named = |ending: &str, text| OutputFile::whole(format!("{stem}{ending}"), text);
         let draws = draws.map(|draws| {
-            let text = serde_json::to_string(&draws).expect("plain structs are always JSON");
-            named(".draws.json", text + "\n")
+            serde_json::to_string(&draws).expect("plain structs are always JSON") + "\n"
         });
-        let others = [
-            named(".wv.json", curves),
-            OutputFile::whole(model_name, crate::io::model_file::to_toml(&model)),
-            named(".html", page.html()),
-            named(".svg", page.svg()),
+        let model = crate::io::model_file::to_toml(&model);
+        let texts = [
+            draws,
+            Some(curves),
+            Some(model),
+            Some(page.html()),
+            Some(page.svg()),
         ];
-        draws.into_iter().chain(others).collect()
+        let files = names(stem).into_iter().zip(texts);
+        files
+            .filter_map(|(name, text)| Some((name, text?)))
+            .collect()
     }
 }

@@ -2,12 +2,12 @@
 
 use super::FEWEST;
 use super::ranking::Score;
-use crate::app::Failure;
+use crate::app::{Failure, Refuse};
 use nav_sim_calibration::{
     CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, Replicate, Settings,
     Verdict, calibrate, diagnose, grouped, model_of,
 };
-use nav_sim_navigation::ekf::{Belief, BeliefError, FilterStates};
+use nav_sim_navigation::ekf::{Belief, FilterStates};
 use nav_sim_navigation::monte_carlo;
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::imu::Truth;
@@ -129,11 +129,6 @@ impl Candidate {
         }
     }
 
-    /// Whether another one has the same model, before any inflation.
-    fn is_calibrated_as(&self, other: &Self) -> bool {
-        self.estimator == other.estimator && self.model == other.model
-    }
-
     /// Whether it may be chosen. What is made of a single recording, while there are several, is shown for comparison.
     pub const fn is_eligible(&self) -> bool {
         !self.estimator.is_single()
@@ -202,14 +197,8 @@ mod candidate_tests {
 
 // The recordings of a laboratory, measured, and the models that are made of all but one of them.
 
-/// One recording: what is kept of it. The stretches of a file that has gaps are one.
-#[derive(Debug, Clone)]
-pub struct Unit {
-    /// What it is called.
-    pub name: String,
-    /// The wavelet variances of its signals.
-    pub replicates: Vec<(Channel, Replicate)>,
-}
+/// The wavelet variances of one recording; the stretches of a file that has gaps are one.
+pub type Unit = Vec<(Channel, Replicate)>;
 
 /// All recordings and how models are made of them. Estimators and model of the settings count nothing: those of the
 /// candidates do.
@@ -260,12 +249,7 @@ impl Laboratory {
         let mut diagnoses = diagnose(&groups, &outcomes, &settings);
         diagnoses.retain(|diagnosis| diagnosis.verdict != Verdict::Normal);
         let is_abnormal = |name: &String| diagnoses.iter().any(|d| d.name == *name);
-        let is_normal = |k: &usize| {
-            !self.units[*k]
-                .replicates
-                .iter()
-                .any(|(_, r)| is_abnormal(&r.name))
-        };
+        let is_normal = |k: &usize| !self.units[*k].iter().any(|(_, r)| is_abnormal(&r.name));
         let normal: Vec<usize> = self.others(None).filter(is_normal).collect();
         Ok(if normal.len() < FEWEST {
             self.others(None).collect()
@@ -287,10 +271,7 @@ impl Laboratory {
         };
         let pool = settings.pool();
         let groups = grouped(
-            units
-                .iter()
-                .flat_map(|unit| unit.replicates.clone())
-                .collect(),
+            units.iter().flat_map(|unit| unit.iter().cloned()).collect(),
             pool,
         );
         let outcomes = calibrate(&groups, &settings)?;
@@ -357,12 +338,6 @@ impl Drive {
         })
     }
 
-    /// How many windows as long as the trajectory lie side by side in so many samples.
-    pub(crate) fn independent_windows(&self, samples: usize) -> f64 {
-        let lasts_s = self.trajectory.end_s() - self.trajectory.start_s();
-        samples as f64 / (lasts_s * self.scenario.imu.rate_hz)
-    }
-
     /// Leaves out recording `k`, whose samples are `recordings` (several stretches of a file that has gaps), and
     /// takes every candidate along the trajectory `runs` times. `progress` is told how many runs are done.
     ///
@@ -378,9 +353,10 @@ impl Drive {
         runs: u64,
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<Vec<Score>, Failure> {
-        let beliefs = self.beliefs(candidates, &self.models(laboratory, Some(k), candidates)?)?;
+        let beliefs = self.beliefs(laboratory, k, candidates)?;
+        let lasts_s = self.trajectory.end_s() - self.trajectory.start_s();
         if recordings.len() > 1 {
-            recordings.retain(|r| self.independent_windows(r.len()) >= 1.0);
+            recordings.retain(|r| r.len() as f64 >= lasts_s * self.scenario.imu.rate_hz);
         }
         let truth = Truth::Static(&recordings);
         let (trajectory, outages) = (&self.trajectory, &self.outages);
@@ -392,50 +368,37 @@ impl Drive {
         Ok(results.iter().map(score).collect())
     }
 
-    /// The model of every candidate, of all recordings but one, inflated as it says.
-    ///
-    /// # Errors
-    /// When a model cannot be made or tuned.
-    pub fn models(
+    /// What each candidate's filter believes by all recordings but one.
+    fn beliefs(
         &self,
         laboratory: &Laboratory,
-        without: Option<usize>,
+        without: usize,
         candidates: &[Candidate],
-    ) -> Result<Vec<Model>, Failure> {
+    ) -> Result<Vec<Belief>, Failure> {
         let mut made: Vec<(&Candidate, Model)> = Vec::new();
-        let mut models = Vec::new();
         for candidate in candidates {
-            let model = match made
-                .iter()
-                .find(|(other, _)| other.is_calibrated_as(candidate))
-            {
+            let mut others = made.iter();
+            let is_same = |other: &Candidate| {
+                other.estimator == candidate.estimator && other.model == candidate.model
+            };
+            let model = match others.find(|(other, _)| is_same(other)) {
                 Some((_, model)) => model.clone(),
                 None => {
                     let (_, outcomes, settings) = laboratory
-                        .calibrate(candidate, without)
+                        .calibrate(candidate, Some(without))
                         .map_err(|e| Failure::from(e).within(&candidate.to_string()))?;
                     model_of(&outcomes, settings.rate_hz)
                 }
             };
-            models.push(candidate.inflated(&model));
             made.push((candidate, model));
         }
-        Ok(models)
-    }
-
-    /// What each candidate's filter believes.
-    fn beliefs(&self, candidates: &[Candidate], models: &[Model]) -> Result<Vec<Belief>, Failure> {
-        let belief = |(candidate, model): (&Candidate, &Model)| {
+        let belief = |(candidate, model): &(&Candidate, Model)| {
             let mut scenario = self.scenario.clone();
             scenario.filter.states = candidate.filter;
             scenario
-                .belief(model, &self.outages, &self.track)
-                .map_err(|source| unfit(candidate, source))
+                .belief(&candidate.inflated(model), &self.outages, &self.track)
+                .refuse_within(candidate)
         };
-        candidates.par_iter().zip(models).map(belief).collect()
+        made.par_iter().map(belief).collect()
     }
-}
-
-fn unfit(candidate: &Candidate, e: BeliefError) -> Failure {
-    Failure::input(e).within(&candidate.to_string())
 }

@@ -9,26 +9,20 @@
 
 use crate::app::inputs::{self, SettingsArgs};
 use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
-use crate::app::{Answer, Command, Context, Inputs, Out, OutputFile, Result, refused};
+use crate::app::{Command, Context, Inputs, Out, PlainAnswer, Result, refused};
 use crate::commands::calibrate::{
-    Calibration, CalibrationNote, CalibrationOptions, ESTIMATORS, EstimatorChoice, Measured,
-    measure, without_warm_up,
+    Calibration, CalibrationNote, ESTIMATORS, EstimatorChoice, Measured, measure,
 };
 use crate::io::recordings::{self, FileReport, Gaps, ReadOptions};
 use crate::parse;
-use crate::report::{json, six_digits};
+use crate::report::csv::merged;
+use crate::report::{self, six_digits, some};
 use candidates::{Candidate, Drive, Fold, Inflation, Laboratory, Unit};
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, model_of};
-use nav_sim_document::{
-    Axis, Chart, Colour, Document, Importance, Panel, Series, Table, Tone, readable, window,
-};
+use nav_sim_document::{Document, Importance, Table, Tone, readable, window};
 use nav_sim_navigation::ekf::FilterStates;
-use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_signal::imu::Recording;
-use nav_sim_signal::noise::Model;
-use ranking::{Mean, Placed, Ranking};
-use serde::Serialize;
-use serde_json::json;
+use ranking::Ranking;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 pub mod candidates;
@@ -92,49 +86,8 @@ pub struct Choose {
 /// The estimators that are one.
 const EACH: &[&str] = ESTIMATORS.split_at(6).0;
 
-/// The ranking (`ranking.json`), and the winner's calibration of all recordings.
-#[derive(Serialize)]
-pub struct ChoiceMade {
-    schema_version: u32,
-    verdict: Vec<String>,
-    trajectory: String,
-    outages: Vec<Outage>,
-    seed: u64,
-    #[serde(flatten)]
-    ranking: Ranking,
-    /// Recordings that are calibrated on but judge no candidate.
-    #[serde(skip)]
-    abnormal: Vec<String>,
-    #[serde(skip)]
-    calibration: Calibration,
-    #[serde(skip)]
-    estimator: Estimator,
-    /// The winner's model, if it is inflated, and how.
-    #[serde(skip)]
-    inflated: Option<(Model, Inflation)>,
-}
-
-impl Answer for ChoiceMade {
-    fn document(&self) -> Document {
-        self.ranked()
-    }
-
-    /// The winner's model with its curves and draws, and the ranking.
-    fn files(&self) -> Vec<OutputFile<'_>> {
-        let mut files = self.calibration.files_of(
-            self.estimator,
-            ("model.toml".to_owned(), "model".to_owned()),
-            self.inflated
-                .as_ref()
-                .map(|(model, how)| (model, how.name())),
-        );
-        files.push(OutputFile::whole("ranking.json", json(self)));
-        files
-    }
-}
-
 impl Command for Choose {
-    type Answer = ChoiceMade;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "choose";
     const OUT: Out = Out::Directory {
         path: "out/choice",
@@ -147,13 +100,14 @@ impl Command for Choose {
             "ranking.json",
         ],
     };
+    const PLOT: bool = false;
 
     fn inputs(&self, given: Inputs) -> Result<Inputs> {
         self.candidates().map(|_| given)
     }
 
     /// Files are read twice, so that no more than a few are in memory.
-    fn run(&self, context: &Context<'_>) -> Result<ChoiceMade> {
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let candidates = self.candidates()?;
         let scenario = self.settings.checked()?;
         let trajectory = inputs::trajectory(&self.trajectory, context)?;
@@ -166,17 +120,22 @@ impl Command for Choose {
             );
         }
         // the candidates have estimators and models of their own
-        let options = CalibrationOptions {
-            reading: self.recordings.options(self.gaps),
-            skip_warm_up: self.recordings.skips_warm_up(),
-            settings: Settings {
-                trim: self.trim,
-                ..Settings::default()
-            },
-            estimators: EstimatorChoice::One(Estimator::Awv),
-            ..CalibrationOptions::default()
+        let settings = Settings {
+            trim: self.trim,
+            ..Settings::default()
         };
-        let mut measured = measure(&self.inputs, &options, context)?;
+        let (reading, estimator) = (
+            self.recordings.options(self.gaps),
+            EstimatorChoice::One(Estimator::Awv),
+        );
+        let mut measured = measure(
+            &self.inputs,
+            reading.clone(),
+            None,
+            estimator,
+            &settings,
+            context,
+        )?;
         let found_hz = measured.settings.rate_hz;
         let rate_hz = nominal_hz(found_hz, scenario.gnss.rate_hz);
         if rate_hz != found_hz {
@@ -189,7 +148,7 @@ impl Command for Choose {
         // The clocks of the files are not quite alike: one rate is that of all.
         let reading = ReadOptions {
             rate_hz: Some(rate_hz),
-            ..options.reading
+            ..reading
         };
         let files = &measured.report.files;
         if files.len() < FEWEST {
@@ -214,11 +173,6 @@ impl Command for Choose {
         for k in &judges {
             let file = &files[*k];
             let (read, _) = recordings::read(std::slice::from_ref(&file.path), &reading)?;
-            // a warm-up that was left out of the curves is no stretch to navigate on either
-            let read: Vec<Recording> = read
-                .into_iter()
-                .map(|recording| without_warm_up(recording, options.skip_warm_up).0)
-                .collect();
             let advance = |n| context.advance(n);
             let (recording, windows) = (file.file.clone(), self.runs);
             let scores = drive
@@ -256,18 +210,47 @@ impl Command for Choose {
             .iter()
             .enumerate()
             .filter(|(k, _)| !judges.contains(k));
-        Ok(ChoiceMade {
-            schema_version: 1,
-            verdict: ranking.verdict(),
-            trajectory: self.trajectory.display().to_string(),
-            outages,
-            seed,
-            ranking,
-            abnormal: others.map(|(_, file)| file.file.clone()).collect(),
-            calibration,
-            estimator: winner.estimator,
-            inflated: (winner.inflation != Inflation::None).then_some((model, winner.inflation)),
-        })
+        let abnormal: Vec<&str> = others.map(|(_, file)| file.file.as_str()).collect();
+        let verdict = ranking.verdict();
+        let trajectory = self.trajectory.display().to_string();
+        let json = merged([
+            json!({
+                "schema_version": 1,
+                "verdict": verdict,
+                "trajectory": trajectory,
+                "outages": outages,
+                "seed": seed,
+            }),
+            json!(ranking),
+        ]);
+        let tone = match ranking.tells {
+            true => Tone::Good,
+            false => Tone::Undecided,
+        };
+        let mut document = Document::new("Which noise model", tone, verdict);
+        let mut warn = |text, names: &[&str]| {
+            if !names.is_empty() {
+                document.note(Importance::Warning, format!("{text}: {}", names.join(", ")));
+            }
+        };
+        warn(
+            "abnormal, and no judge of candidates (nav-sim calibrate says how)",
+            &abnormal,
+        );
+        let undescribed: Vec<&str> = ranking.undescribed.iter().map(String::as_str).collect();
+        warn(
+            "described by no candidate (a warm-up? look at it with nav-sim calibrate)",
+            &undescribed,
+        );
+        let ends = outages.iter().map(|o| window(o.start_s, o.end_s));
+        let ends = ends.collect::<Vec<_>>().join(", ");
+        document.text(&format!("along {trajectory}, outages {ends}, seed {seed}"));
+        tables(&json, &mut document);
+        let how = winner.inflation.name();
+        let inflated = (winner.inflation != Inflation::None).then_some((&model, how));
+        let mut files = calibration.files_of(winner.estimator, "model", inflated);
+        files.push(("ranking.json".to_owned(), report::json(&json)));
+        Ok(PlainAnswer::new(json, document).with(files))
     }
 }
 
@@ -334,10 +317,7 @@ fn units(measured: &Measured) -> Vec<Unit> {
             .replicates
             .iter()
             .filter(|(_, r)| names.contains(&r.name));
-        Unit {
-            name: file.file.clone(),
-            replicates: own.cloned().collect(),
-        }
+        own.cloned().collect()
     };
     measured.report.files.iter().map(unit).collect()
 }
@@ -347,7 +327,6 @@ fn units(measured: &Measured) -> Vec<Unit> {
 impl Ranking {
     /// The winner, what cannot be told from it, and how good it is.
     fn verdict(&self) -> Vec<String> {
-        const NAMED: usize = 3;
         let (winner, recordings) = (&self.candidates[0], self.candidates[0].folds.len());
         let name = &winner.candidate;
         let eligible = self.candidates.iter().filter(|p| p.eligible).count();
@@ -361,15 +340,7 @@ impl Ranking {
             ),
         }];
         if self.tells && !self.tied.is_empty() {
-            let named: Vec<&str> = self.tied.iter().map(String::as_str).take(NAMED).collect();
-            let more = match self.tied.len() - named.len() {
-                0 => String::new(),
-                more => format!(" and {more} more"),
-            };
-            lines.push(format!(
-                "cannot be told from it: {}{more}",
-                named.join("; ")
-            ));
+            lines.push(format!("cannot be told from it: {}", some(&self.tied)));
         }
         lines.push(format!(
             "its horizontal error at the ends of outages: {} m, believed {} m, NEES {} (9 if right)",
@@ -381,120 +352,33 @@ impl Ranking {
     }
 }
 
-impl ChoiceMade {
-    fn ranked(&self) -> Document {
-        let (ranking, json) = (&self.ranking, json!(self));
-        let tone = if ranking.tells {
-            Tone::Good
-        } else {
-            Tone::Undecided
-        };
-        let mut document = Document::new("Which noise model", tone, self.verdict.iter());
-        self.notes(&mut document);
-        let ends: Vec<String> = self
-            .outages
-            .iter()
-            .map(|o| window(o.start_s, o.end_s))
-            .collect();
-        let (trajectory, ends, seed) = (&self.trajectory, ends.join(", "), self.seed);
-        document.text(&format!("along {trajectory}, outages {ends}, seed {seed}"));
-        let columns = [
-            ("candidate", "candidate"),
-            ("", "place"),
-            ("log score (nats)", "log_score/value"),
-            ("to the best", "difference/log_score/value"),
-            ("95 %", "difference/log_score/ci95"),
-            ("NEES (9)", "nees/value"),
-            ("95 %", "nees/ci95"),
-            ("RMSE (m)", "rmse_m"),
-        ];
-        document.table(Table::of(&json, "/candidates/*", &columns));
-        document.chart(&self.chart(), CAPTION);
-        let columns = [
-            ("candidate", "candidate"),
-            ("RMSE (m)", "rmse_m"),
-            ("believed (m)", "believed_m"),
-            ("coverage (0.95)", "coverage"),
-        ];
-        document.table(Table::of(&json, "/candidates/*", &columns));
-        let columns = [
-            ("recording left out", "recording"),
-            ("candidate", "../../candidate"),
-            ("windows", "windows"),
-            ("NEES (9)", "nees"),
-            ("log score (nats)", "log_score"),
-            ("RMSE (m)", "rmse_m"),
-        ];
-        let folds = Table::of(&json, "/candidates/*/folds/*", &columns);
-        document.folded("Recording by recording", |inside| inside.table(folds));
-        document
-    }
-
-    /// Notes, the most important first.
-    fn notes(&self, document: &mut Document) {
-        let (ranking, folds) = (&self.ranking, &self.ranking.candidates[0].folds);
-        let mut warn = |names: &[String], text: &dyn Fn(String) -> String| {
-            if !names.is_empty() {
-                document.note(Importance::Warning, text(names.join(", ")));
-            }
-        };
-        warn(&self.abnormal, &|names| {
-            let verb = if self.abnormal.len() == 1 {
-                "is"
-            } else {
-                "are"
-            };
-            format!(
-                "{names} {verb} abnormal, and no judge of candidates: nav-sim calibrate says how"
-            )
-        });
-        let is_common = 2 * ranking.undescribed.len() > folds.len();
-        warn(&ranking.undescribed, &|names| {
-            if is_common {
-                format!("no candidate describes {names}: a warm-up? try --skip-s auto")
-            } else {
-                format!("no candidate describes {names}: look at it with nav-sim calibrate")
-            }
-        });
-    }
-
-    /// Log scores against the best, a row a candidate.
-    fn chart(&self) -> Chart {
-        let placed = self.ranking.candidates.iter().rev().enumerate();
-        let (mut names, mut points, mut bars) = (Vec::new(), Vec::new(), Vec::new());
-        for (
-            row,
-            Placed {
-                candidate,
-                difference,
-                ..
-            },
-        ) in placed
-        {
-            let Mean {
-                value,
-                ci95: (low, high),
-            } = difference.log_score;
-            let height = row as f64;
-            names.push(candidate.clone());
-            points.push((value, height, f64::NAN));
-            bars.extend([(low, height), (high, height), (f64::NAN, f64::NAN)]);
-        }
-        let rows = names.len() as f64;
-        let series = vec![
-            Series::dashed("best", Colour::RIGHT, vec![(0.0, -0.5), (0.0, rows - 0.5)]),
-            Series::line("", Colour::BELIEVED, bars),
-            Series::points("", Colour::BELIEVED, points),
-        ];
-        Chart::new(
-            "Log score against the best",
-            Axis::linear("nats"),
-            vec![Panel {
-                height: 0.1 * (rows + 1.0),
-                ..Panel::new(Axis::names(names), series)
-            }],
-        )
-    }
+fn tables(json: &Value, document: &mut Document) {
+    let columns = [
+        ("candidate", "candidate"),
+        ("", "place"),
+        ("log score (nats)", "log_score/value"),
+        ("to the best", "difference/log_score/value"),
+        ("95 %", "difference/log_score/ci95"),
+        ("NEES (9)", "nees/value"),
+        ("95 %", "nees/ci95"),
+        ("RMSE (m)", "rmse_m"),
+    ];
+    document.table(Table::of(json, "/candidates/*", &columns));
+    let columns = [
+        ("candidate", "candidate"),
+        ("RMSE (m)", "rmse_m"),
+        ("believed (m)", "believed_m"),
+        ("coverage (0.95)", "coverage"),
+    ];
+    document.table(Table::of(json, "/candidates/*", &columns));
+    let columns = [
+        ("recording left out", "recording"),
+        ("candidate", "../../candidate"),
+        ("windows", "windows"),
+        ("NEES (9)", "nees"),
+        ("log score (nats)", "log_score"),
+        ("RMSE (m)", "rmse_m"),
+    ];
+    let folds = Table::of(json, "/candidates/*/folds/*", &columns);
+    document.folded("Recording by recording", |inside| inside.table(folds));
 }
-
-const CAPTION: &str = "Log score: the mean log density of the true errors under the filter's covariance, less that of the best. Bars: 95 % intervals over recordings.";

@@ -1,6 +1,7 @@
 //! Candidates beside one another, recording by recording.
 
 use super::candidates::{Candidate, Fold};
+use nav_sim_navigation::linalg::mean;
 use nav_sim_navigation::simulation::{NEES_DOF, OutageRecord, RunRecord};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
@@ -95,8 +96,11 @@ impl Ranking {
         let eligible: Vec<usize> = (0..candidates.len())
             .filter(|c| candidates[*c].is_eligible())
             .collect();
-        let all: Vec<&Fold> = folds.iter().collect();
-        let winner = best(&eligible, &all).expect("one may be chosen, of one recording at least");
+        let score = |c: usize| folds.iter().map(|f| f.scores[c].all.log_score).sum::<f64>();
+        // the first of equals
+        let higher = |best: usize, c: usize| if score(c) > score(best) { c } else { best };
+        let winner = eligible.iter().copied().reduce(higher);
+        let winner = winner.expect("one may be chosen");
         let rivals = eligible.len().saturating_sub(1).max(1);
         let mut placed: Vec<Placed> = (0..candidates.len())
             .map(|c| place(c, &candidates[c], winner, rivals, folds))
@@ -106,42 +110,28 @@ impl Ranking {
                 .cmp(&a.eligible)
                 .then(b.log_score.value.total_cmp(&a.log_score.value))
         });
-        let named = |k: usize| folds[k].recording.clone();
-        let fails = |k: &usize| !all[*k].scores.iter().any(|s| s.all.nees <= FAILS);
+        let fails = |f: &&Fold| !f.scores.iter().any(|s| s.all.nees <= FAILS);
+        let undescribed = folds.iter().filter(fails).map(|f| f.recording.clone());
         let tells = folds.len() >= FEWEST && placed.iter().any(|p| p.eligible && !p.tied);
         let tied = placed.iter().skip(1).filter(|p| p.place == "tied");
         Self {
             winner: placed[0].candidate.clone(),
             tied: tied.map(|p| p.candidate.clone()).collect(),
             candidates: placed,
-            undescribed: (0..folds.len()).filter(fails).map(named).collect(),
+            undescribed: undescribed.collect(),
             tells,
         }
     }
 }
 
-/// The candidate of the highest mean log score; none without a recording.
-fn best(eligible: &[usize], folds: &[&Fold]) -> Option<usize> {
-    let score = |c: usize| folds.iter().map(|f| f.scores[c].all.log_score).sum::<f64>();
-    // the first of equals
-    let higher = |best: usize, c: usize| if score(c) > score(best) { c } else { best };
-    eligible
-        .iter()
-        .copied()
-        .reduce(higher)
-        .filter(|_| !folds.is_empty())
-}
-
 fn place(c: usize, candidate: &Candidate, winner: usize, rivals: usize, folds: &[Fold]) -> Placed {
     let scores = || folds.iter().map(|fold| &fold.scores[c]);
     let per_recording = |value: &dyn Fn(&Score) -> f64| scores().map(value).collect::<Vec<f64>>();
-    let paired = |value: &dyn Fn(&Score) -> f64| -> Vec<f64> {
-        folds
-            .iter()
-            .map(|f| value(&f.scores[c]) - value(&f.scores[winner]))
-            .collect()
-    };
-    let density = paired(&|s| s.all.log_score);
+    let log_scores = folds
+        .iter()
+        .map(|f| &f.scores)
+        .map(|s| (s[c].all.log_score, s[winner].all.log_score));
+    let density: Vec<f64> = log_scores.map(|(own, best)| own - best).collect();
     let (log_score, joint95) = (
         interval(&density, 0.05),
         interval(&density, 0.05 / rivals as f64).ci95,
@@ -388,13 +378,4 @@ impl Score {
             outages,
         }
     }
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (mut sum, mut count) = (0.0, 0_u64);
-    for value in values {
-        sum += value;
-        count += 1;
-    }
-    sum / count as f64
 }

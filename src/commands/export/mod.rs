@@ -3,7 +3,7 @@
 //! [`Export::new`] fits the pair that the target knows ([`noise::practical`](nav_sim_signal::noise::practical)) to the model's
 //! noisiest axis, states by how much the two differ, and [`Export::text`] writes it in the target's own syntax (`targets.rs`).
 
-use crate::app::{Answer, Command, Context, Failure, Out, OutputFile, Refuse, Result, refused};
+use crate::app::{Command, Context, Failure, Out, PlainAnswer, Refuse, Result, refused};
 use crate::io::model_file::{self, ModelFile};
 use crate::parse::{one_of, seconds_range};
 use nav_sim_calibration::percent;
@@ -57,7 +57,7 @@ fn horizon(text: &str) -> Result<Horizon, String> {
 }
 
 impl Command for ExportArgs {
-    type Answer = Export;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "export";
     const OUT: Out = Out::File {
         name: "parameters.txt",
@@ -66,48 +66,32 @@ impl Command for ExportArgs {
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
 
-    fn run(&self, _: &Context<'_>) -> Result<Export> {
+    fn run(&self, _: &Context<'_>) -> Result<PlainAnswer> {
         let file = model_file::read(&self.model)?;
         let model = self.model.display().to_string();
         let export = Export::new(&file, self.target, self.policy, self.horizon)
             .map_err(|failure| failure.within(&model))?;
-        Ok(Export { model, ..export })
-    }
-}
-
-impl Serialize for Export {
-    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        let [accel, gyro] = &self.sensors;
-        json!({
+        let mut document = Document::new(self.target.name, Tone::Good, [""; 0]);
+        for line in export.summary() {
+            document.note(Importance::Remark, line);
+        }
+        for doubt in export.doubts() {
+            document.note(Importance::Warning, doubt);
+        }
+        let [accel, gyro] = &export.sensors;
+        let json = json!({
             "schema_version": 1,
             "target": self.target.name,
-            "model": self.model,
-            "rate_hz": self.rate_hz,
+            "model": model,
+            "rate_hz": export.rate_hz,
             "policy": self.policy.name(),
             "horizon_s": [self.horizon.from_s, self.horizon.to_s],
-            "entries": self.filled(&[]).0,
+            "entries": export.filled(&[]).0,
             "sensors": { "accel": accel, "gyro": gyro },
-            "warnings": self.doubts(),
-        })
-        .serialize(to)
-    }
-}
-
-impl Answer for Export {
-    fn document(&self) -> Document {
-        let mut document = Document::new(self.target.name, Tone::Good, [""; 0]);
-        let mut note = |importance, lines: Vec<String>| {
-            lines
-                .into_iter()
-                .for_each(|line| document.note(importance, line));
-        };
-        note(Importance::Remark, self.summary());
-        note(Importance::Warning, self.doubts());
-        document
-    }
-
-    fn files(&self) -> Vec<OutputFile<'_>> {
-        vec![OutputFile::whole("", self.text(&self.model) + "\n")]
+            "warnings": export.doubts(),
+        });
+        let text = export.text(&model) + "\n";
+        Ok(PlainAnswer::new(json, document).with([("", text)]))
     }
 }
 
@@ -154,8 +138,6 @@ struct SensorExport {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Export {
     target: Target,
-    /// Name of the model.
-    model: String,
     /// Sample rate of the model, for values per sample (Hz).
     rate_hz: f64,
     policy: Policy,
@@ -253,7 +235,6 @@ impl Export {
         }
         Ok(Self {
             target,
-            model: String::new(),
             rate_hz,
             policy,
             horizon,

@@ -267,7 +267,7 @@ fn evidence(finding: &Finding) -> String {
 }
 
 /// Clocks that are not the same, and the option that makes them so.
-pub(super) fn apart(clocks: &ClocksApart) -> String {
+fn apart(clocks: &ClocksApart) -> String {
     let [now, then] = clocks.correlation;
     let delay = match clocks.sigma_s {
         Some(sigma_s) => format!("{:.3} (± {sigma_s:.3})", clocks.delay_s),
@@ -390,28 +390,12 @@ fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
         }
         Chart::over_time(
             name,
-            vec![Panel::new(Axis::linear("").with_zero(), series)],
+            vec![Panel::new(Axis::linear("").including(0.0, 0.0), series)],
             outages,
         )
         .small()
     };
     REPORTED_NAMES.iter().enumerate().map(chart).collect()
-}
-
-/// Fates of fixes, and their colours.
-const FATES: [(bool, &str, Colour); 2] = [
-    (true, "used", Colour::BELIEVED),
-    (false, "withheld", Colour::Soft),
-];
-
-/// A series for each fate of fixes.
-fn fixes(fixes: &[FixRecord], value: &dyn Fn(&FixRecord) -> f64) -> Vec<Series> {
-    let of_fate = |(fate, name, colour): (bool, &str, Colour)| {
-        let of_fate = fixes.iter().filter(|f| f.used == fate);
-        let points: Vec<_> = of_fate.map(|f| (f.t_s, value(f), f64::NAN)).collect();
-        (!points.is_empty()).then(|| Series::points(name, colour, points))
-    };
-    FATES.into_iter().filter_map(of_fate).collect()
 }
 
 fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
@@ -427,14 +411,19 @@ fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
             Colour::RIGHT,
             Mark::Zone(-1.96, 1.96),
         )];
-        series.extend(fixes(&solution.fixes, &normalised));
-        Panel {
-            height: 0.55,
-            ..Panel::new(
-                Axis::linear(&format!("{name} (σ)")).including(-3.0, 3.0),
-                series,
-            )
+        for (used, name, colour) in [
+            (true, "used", Colour::BELIEVED),
+            (false, "withheld", Colour::Soft),
+        ] {
+            let of_fate = solution.fixes.iter().filter(|f| f.used == used);
+            let points: Vec<_> = of_fate.map(|f| (f.t_s, normalised(f), f64::NAN)).collect();
+            series.extend((!points.is_empty()).then(|| Series::points(name, colour, points)));
         }
+        Panel::new(
+            Axis::linear(&format!("{name} (σ)")).including(-3.0, 3.0),
+            series,
+        )
+        .of_height(0.55)
     };
     Chart::over_time(
         "Innovations of position, normalised",

@@ -8,8 +8,8 @@ use crate::app::{
 use crate::commands::run::reduction_of;
 use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
 use crate::io::model_file::ModelFile;
-use crate::io::trajectory_file::{self, load_reference};
-use crate::parse::{self, numbers};
+use crate::io::trajectory_file::load_reference;
+use crate::parse::{numbers, pair, positive};
 use crate::report::json;
 use glam::{DMat3, DQuat, DVec3};
 use nav_sim_document::{Document, shortest, window};
@@ -126,7 +126,6 @@ pub struct Fuse {
     /// auto: level from the IMU, heading from the GNSS course
     #[arg(
         long,
-        alias = "heading",
         value_name = "FILE|DEG:SD|auto",
         default_value = "auto",
         allow_hyphen_values = true
@@ -157,7 +156,7 @@ pub struct Fuse {
     filter: FilterStates,
     /// Constant biases that the filter expects beside the model: standard deviations, accelerometer in m/s²,
     /// gyroscope in rad/s
-    #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair)]
+    #[arg(long, value_name = "ACCEL,GYRO", value_parser = pair)]
     turn_on_bias: Option<[f64; 2]>,
     /// Standard deviations where the GNSS file states none: of the position in m, and after a colon of the velocity in
     /// m/s; each one number or north,east,down. x3 or x3:2: times what it states
@@ -208,18 +207,6 @@ impl Fuse {
         match self.initial {
             StartChoice::Heading(heading) => Some(heading),
             _ => None,
-        }
-    }
-
-    /// The filter's expectation of constant biases, over that of a file.
-    fn expected(&self, of_file: InitialSettings) -> InitialSettings {
-        let Some([accel, gyro]) = self.turn_on_bias else {
-            return of_file;
-        };
-        InitialSettings {
-            accel_bias_sigma_m_s2: Some(accel),
-            gyro_bias_sigma_rad_s: Some(gyro),
-            ..of_file
         }
     }
 
@@ -306,11 +293,9 @@ fn correlation(text: &str) -> Result<Correlation, &'static str> {
     match text {
         "auto" => Ok(Correlation::Auto),
         "none" => Ok(Correlation::None),
-        _ => number(text)
-            .ok()
-            .filter(|seconds| *seconds > 0.0)
+        _ => positive(text)
             .map(Correlation::Seconds)
-            .ok_or("expected auto, none, or a correlation time in seconds"),
+            .map_err(|_| "expected auto, none, or a correlation time in seconds"),
     }
 }
 
@@ -319,11 +304,10 @@ fn gnss_sigma(text: &str) -> Result<GnssSigma, &'static str> {
         return Ok((Some(fix_sigma(text)?), [1.0; 2]));
     };
     let (position, velocity) = factors.split_once(':').unwrap_or((factors, factors));
-    let factor = |text: &str| number(text).ok().filter(|factor| *factor > 0.0);
-    factor(position)
-        .zip(factor(velocity))
-        .map(|(position, velocity)| (None, [position, velocity]))
-        .ok_or("expected factors > 0: x3 or x3:2")
+    match (positive(position), positive(velocity)) {
+        (Ok(position), Ok(velocity)) => Ok((None, [position, velocity])),
+        _ => Err("expected factors > 0: x3 or x3:2"),
+    }
 }
 
 /// `POS` or `N,E,D` in metres, then `:VEL` or `:N,E,D` in m/s.
@@ -464,12 +448,15 @@ impl<'a> Drive<'a> {
             .transpose()?;
         let model = inputs::model(&request.model, context)?;
         let of_file = initial.as_ref().map(|start| start.sigma.clone());
-        let mut expected = request.expected(of_file.unwrap_or_default());
+        let mut expected = of_file.unwrap_or_default();
+        if let Some([accel, gyro]) = request.turn_on_bias {
+            expected.accel_bias_sigma_m_s2 = Some(accel);
+            expected.gyro_bias_sigma_rad_s = Some(gyro);
+        }
         inputs::expect_turn_on(&mut expected, model.turn_on, &request.model, context);
         expected.validate().refuse()?;
-        let options = trajectory_file::Options::default();
         let reference = request.reference.as_deref().map(|path| {
-            let (reference, warnings) = load_reference(path, &options)?;
+            let (reference, warnings) = load_reference(path)?;
             context.warn_each(&warnings);
             Ok::<_, Failure>(reference)
         });
@@ -527,7 +514,7 @@ impl<'a> Drive<'a> {
         let mounting = match self.request.mounting {
             Some(MountingChoice::Auto) => Some(
                 mounting::find(&recorded, &settings, &belief)
-                    .map_err(|e| self.not_mounted(e, &recorded, &settings, &belief))?,
+                    .map_err(|e| Failure::input(e).hint(NOT_MOUNTED))?,
             ),
             _ => None,
         };
@@ -645,6 +632,9 @@ impl<'a> Drive<'a> {
     }
 }
 
+/// Help where the mounting is not found.
+const NOT_MOUNTED: &str = "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, velocities in the fixes and one clock (--gnss-delay)";
+
 impl Drive<'_> {
     /// Brings fixes to the clock of the IMU where the two have nothing in common and no delay is given; by how much (s).
     fn common_origin(&mut self) -> Result<Option<f64>> {
@@ -687,38 +677,6 @@ impl Drive<'_> {
             ),
             _ => Ok(()),
         }
-    }
-
-    /// Why the mounting is not found: the clocks, where they are apart.
-    fn not_mounted(
-        &self,
-        e: Refused,
-        recorded: &Recorded<'_>,
-        settings: &Settings,
-        belief: &Belief,
-    ) -> Failure {
-        let rest = |there: &Recorded<'_>| {
-            let found = mounting::find(there, settings, belief).ok()?;
-            let settings = Settings {
-                q_s_b: found.q_s_b,
-                mounting_sigma_b: found.sigma_b,
-                ..settings.clone()
-            };
-            displaced(
-                there,
-                belief,
-                &coarse(there, &settings, belief).ok()?.start,
-                &settings,
-            )?
-            .delay_s
-        };
-        let Some(mut clocks) = clocks_apart(recorded, rest) else {
-            return Failure::input(e).hint(
-                "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, and velocities in the fixes",
-            );
-        };
-        clocks.delay_s += self.request.gnss_delay_s;
-        Failure::input(e).hint(document::apart(&clocks))
     }
 }
 

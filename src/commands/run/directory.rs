@@ -5,7 +5,7 @@ use crate::commands::run::RunOrigin;
 use crate::failure::{Failure, Place, Result};
 use crate::io::run_tables::{REPEAT, parse_epochs, parse_runs};
 use crate::io::{input, source};
-use nav_sim_navigation::metrics::{Measured, PerState, VerdictKind};
+use nav_sim_navigation::metrics::{Measured, PerState};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::{OutageRecord, RunRecord};
 use serde::Deserialize;
@@ -84,15 +84,7 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory> {
 /// `summary.json`, as far as it must be right.
 #[derive(Deserialize)]
 struct Found {
-    #[expect(dead_code, reason = "words are made of it")]
-    verdict: FoundVerdict,
     outages: Vec<FoundOutage>,
-}
-
-#[derive(Deserialize)]
-struct FoundVerdict {
-    #[expect(dead_code, reason = "words are made of it")]
-    kind: VerdictKind,
 }
 
 #[derive(Deserialize)]

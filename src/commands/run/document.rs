@@ -247,10 +247,7 @@ fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
     ];
     Chart::over_time(
         "Horizontal position error",
-        vec![Panel {
-            height: 1.2,
-            ..Panel::new(Axis::log("horizontal error (m)"), series)
-        }],
+        vec![Panel::new(Axis::log("horizontal error (m)"), series).of_height(1.2)],
         &windows(summary),
     )
 }
@@ -289,10 +286,7 @@ fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
                 ),
             );
         }
-        Panel {
-            height: 0.8,
-            ..Panel::new(axis, series)
-        }
+        Panel::new(axis, series).of_height(0.8)
     };
     let (nees, coverage) = (&summary.nees, &summary.coverage);
     let title = format!("coverage at level {}", coverage.level);

@@ -6,7 +6,6 @@ use crate::app::{
 };
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::ModelFile;
-use crate::io::scenario_file;
 use crate::parse;
 use crate::report::tables::{epochs_csv, runs_csv};
 use crate::report::verdict::requirement_line;
@@ -69,9 +68,6 @@ pub struct Run {
     /// Outages and other settings of the run.
     #[command(flatten)]
     settings: SettingsArgs,
-    /// Scenario file whose section gnss is used
-    #[arg(long, value_name = "FILE")]
-    gnss: Option<PathBuf>,
     /// Monte-Carlo runs (default: 100)
     #[arg(long, value_name = "N")]
     runs: Option<u64>,
@@ -202,9 +198,6 @@ impl Run {
     /// The scenario file with the options over it, checked.
     pub(crate) fn scenario(&self) -> Result<Scenario> {
         let mut scenario = self.settings.scenario()?;
-        if let Some(path) = &self.gnss {
-            scenario.gnss = scenario_file::read(path)?.gnss;
-        }
         scenario.run.runs = self.runs.unwrap_or(scenario.run.runs);
         scenario.run.method = self.method.unwrap_or(scenario.run.method);
         self.filter
@@ -257,7 +250,7 @@ impl Run {
         let analysed = scenario.run.method == Method::Lincov;
         let draws = |path: &Path, file: &ModelFile| -> Option<Draws> {
             analysed
-                .then(|| draws_file::usable(path, file, imu_hz, None))?
+                .then(|| draws_file::usable(path, file, imu_hz))?
                 .unwrap_or_else(|doubt| {
                     context.warn(format!("{doubt}: no intervals from the calibration"));
                     None
@@ -348,15 +341,13 @@ impl PreparedRun<'_> {
     fn filter(&self) -> Result<(Track, Belief)> {
         let (scenario, outages) = (&self.origin.configuration, self.outages());
         let (model, request) = (&self.inputs.model, self.request);
+        let file = &request.settings.file;
         let track = scenario.track(&self.inputs.trajectory, model, &outages)?;
         let belief = scenario.belief(model, &outages, &track).map_err(|e| {
             inputs::no_filter(
                 &e,
                 &request.model,
-                request
-                    .gnss
-                    .as_deref()
-                    .or(request.settings.file.scenario.as_deref()),
+                file.gnss.as_deref().or(file.scenario.as_deref()),
                 "raise it, or take the full filter (--filter full), which reduces nothing",
             )
         })?;

@@ -22,12 +22,11 @@
 use super::Failure;
 use super::suggest::nearest;
 use super::toml_file::Source;
-use crate::io::toml_file::{
-    Between, Finite, NonNegative, OneOrEach, Positive, Share, Stationary, Version,
-};
+use crate::io::toml_file::OneOrEach;
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Process;
 use nav_sim_signal::noise::contamination::{Contamination, Extent, Operation, Rule};
+use nav_sim_signal::units::{Between, NonNegative, Positive, Share, Stationary};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::num::NonZero;
@@ -81,16 +80,13 @@ pub(crate) fn meant(name: &str) -> Option<&'static str> {
 fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, Failure> {
     let Description { accel, gyro, .. } = source.get()?;
     // the same by the names of keys
-    let named: toml::Table = source.get()?;
+    let named = source.table()?;
     let mut rules = Vec::new();
     for (sensor, tables) in [(Sensor::Accel, accel), (Sensor::Gyro, gyro)] {
         for (number, table) in (1..).zip(&tables) {
             let key = format!("{}[{number}]", sensor.name());
             let replicates = table.replicates.as_ref();
             let listed = replicates.map_or(1, Vec::len);
-            if listed == 0 {
-                return Err(source.refused(&format!("{key}.replicates"), "lists none"));
-            }
             let values = named[sensor.name()][number - 1].as_table();
             for (name, value) in values.into_iter().flatten() {
                 let count = value.as_array().map_or(listed, Vec::len);
@@ -345,7 +341,7 @@ mod tests {
         );
         assert_eq!(
             step("at_s = -1\namplitude = 1"),
-            "c.toml, line 3: \"accel[1].at_s\" = -1 is not a finite number ≥ 0 | "
+            "c.toml, line 3: \"accel[1].at_s\" = -1 is refused: it must be a finite number ≥ 0 | "
         );
         assert_eq!(
             step("at_s = 1\nat_share = 0.5\namplitude = 1"),
@@ -357,7 +353,7 @@ mod tests {
         );
         assert_eq!(
             step("amplitude = 1\nreplicates = [0]"),
-            "c.toml, line 4: \"accel[1].replicates\" = 0 is not a whole number ≥ 1 | "
+            "c.toml, line 4: \"accel[1].replicates\" = 0 is refused: it must be a finite number ≥ 1 | "
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"jump\"\n"),
@@ -369,17 +365,17 @@ mod tests {
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"ar1\"\nphi = 1\nsigma2 = 1\n"),
-            "c.toml, line 3: \"gyro[1].phi\" = 1 is not between −1 and 1 (exclusive) | "
+            "c.toml, line 3: \"gyro[1].phi\" = 1 is refused: it must be a finite number > -1 and < 1 | "
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"heavy-tails\"\nfreedom = 2\nsigma = 1\n"),
-            "c.toml, line 3: \"gyro[1].freedom\" = 2 is not a finite number > 2 | "
+            "c.toml, line 3: \"gyro[1].freedom\" = 2 is refused: it must be a finite number > 2 | "
         );
         assert_eq!(
             refusal(
                 "[[gyro]]\noperation = \"replace\"\nshare = 0.5\nsigma = 1\nlength_samples = 0\n"
             ),
-            "c.toml, line 5: \"gyro[1].length_samples\" = 0 is not a whole number ≥ 1 | "
+            "c.toml, line 5: \"gyro[1].length_samples\" = 0 is refused: it must be a finite number ≥ 1 | "
         );
         assert_eq!(meant("section5-2"), Some("section5-I"));
     }
@@ -394,7 +390,8 @@ mod tests {
 struct Description {
     /// Version of the layout
     #[serde(rename = "schema")]
-    _schema: Option<Version>,
+    #[schemars(range(min = 1, max = 1))]
+    _schema: Option<u64>,
     /// Of all axes of the accelerometers
     #[serde(default)]
     accel: Vec<RuleTable>,
@@ -410,19 +407,18 @@ struct RuleTable {
     /// Replicates, counted from 1 (default: every one)
     #[schemars(length(min = 1))]
     replicates: Option<Vec<NonZero<u64>>>,
-    #[schemars(flatten)]
+    #[serde(flatten)]
     operation: Described,
 }
 
 /// The operations of files, each with its keys.
 #[derive(Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-#[schemars(tag = "operation", !deny_unknown_fields)]
+#[serde(rename_all = "kebab-case", tag = "operation")]
 enum Described {
     /// A jump of the mean
     Step {
         /// Height of the step (units of the signal)
-        amplitude: OneOrEach<Finite>,
+        amplitude: OneOrEach<f64>,
         /// Where in the record, as a share of it (default: 0.5)
         at_share: Option<OneOrEach<Share>>,
         /// Where in the record (s)
@@ -431,7 +427,7 @@ enum Described {
     /// A drift over the whole record
     Drift {
         /// Value at the end of the record (units of the signal)
-        amplitude: OneOrEach<Finite>,
+        amplitude: OneOrEach<f64>,
     },
     /// Samples replaced by outliers
     Replace {
@@ -442,7 +438,7 @@ enum Described {
         /// Standard deviation of what replaces them
         sigma: OneOrEach<NonNegative>,
         /// Mean of what replaces them (default: the signal's)
-        mean: Option<OneOrEach<Finite>>,
+        mean: Option<OneOrEach<f64>>,
     },
     /// Bursts of vibration
     Bursts {
@@ -455,7 +451,7 @@ enum Described {
         /// Length of the record that these are meant for (samples; default: as it is)
         of_samples: Option<OneOrEach<AtLeastOne>>,
         /// Amplitude (units of the signal)
-        amplitude: OneOrEach<Finite>,
+        amplitude: OneOrEach<f64>,
         /// Frequency (Hz; default: 5)
         frequency_hz: Option<OneOrEach<Positive>>,
     },

@@ -25,6 +25,7 @@ use crate::report::readable;
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::noise::{Composite, Flicker, Model, ParameterError, Process, continuous};
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
+use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -539,7 +540,7 @@ pub(crate) const CATALOGUE: &[(&str, &str)] = catalogue![
     "vn100",
 ];
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct File {
     unit: Unit,
@@ -549,7 +550,7 @@ struct File {
     gyro: BTreeMap<String, Given>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Unit {
     manufacturer: String,
@@ -559,7 +560,7 @@ struct Unit {
     assumptions: Vec<String>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Given {
     value: String,

@@ -5,7 +5,7 @@ use super::logs::LogOptions;
 use super::recordings::timing::{median_step, unit_of_step};
 use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
 use super::table::{Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table};
-use super::toml_file::{Between, Finite, Source};
+use super::toml_file::Source;
 use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
 use chrono::{DateTime, NaiveDateTime};
 use glam::DVec3;
@@ -18,6 +18,7 @@ use nav_sim_navigation::fusion::{LONGEST_GAP_S, Start, WheelSpeed, bridged};
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
 use nav_sim_navigation::strapdown::MAX_ROTATION;
 use nav_sim_signal::imu::ImuIncrement;
+use nav_sim_signal::units::Between;
 use nav_sim_signal::units::DEG;
 pub(crate) use nmea::is_nmea;
 use schemars::JsonSchema;
@@ -86,51 +87,26 @@ const MAX_SPEED: f64 = 8000.0;
 
 /// Quantities of fixes; a deviation up is one down.
 static FIX_QUANTITIES: [Quantity; 15] = [
-    Quantity::time(&["t", "time", "timestamp", "tow", "sow"]),
-    Quantity::angle("lat_deg", &["lat", "latitude"]).within(LATITUDE),
-    Quantity::angle("lon_deg", &["lon", "lng", "longitude"]).within(LONGITUDE),
-    Quantity::length("h_m", &["h", "height", "alt", "altitude"]),
+    Quantity::time("t time timestamp tow sow"),
+    Quantity::angle("lat_deg", "lat latitude").within(LATITUDE),
+    Quantity::angle("lon_deg", "lon lng longitude").within(LONGITUDE),
+    Quantity::length("h_m", "h height alt altitude"),
     Quantity::length("sd_n_m", SD_N).positive(),
     Quantity::length("sd_e_m", SD_E).positive(),
     Quantity::length("sd_d_m", SD_D).positive(),
-    Quantity::speed("v_n_m_s", &["v_n", "vn"]),
-    Quantity::speed("v_e_m_s", &["v_e", "ve"]),
+    Quantity::speed("v_n_m_s", "v_n vn"),
+    Quantity::speed("v_e_m_s", "v_e ve"),
     V_D,
-    V_D.reversed(&["v_u", "vu"]),
-    Quantity::speed("sd_vn_m_s", &["sd_vn", "sd_v_n", "vel_std_n", "sdvn"]).positive(),
-    Quantity::speed("sd_ve_m_s", &["sd_ve", "sd_v_e", "vel_std_e", "sdve"]).positive(),
-    Quantity::speed("sd_vd_m_s", &["sd_vd", "sd_v_d", "vel_std_d", "sdvu"]).positive(),
-    Quantity::number("week", &["week", "gps_week"]),
+    V_D.reversed("v_u vu"),
+    Quantity::speed("sd_vn_m_s", "sd_vn sd_v_n vel_std_n sdvn").positive(),
+    Quantity::speed("sd_ve_m_s", "sd_ve sd_v_e vel_std_e sdve").positive(),
+    Quantity::speed("sd_vd_m_s", "sd_vd sd_v_d vel_std_d sdvu").positive(),
+    Quantity::number("week", "week gps_week"),
 ];
-const SD_N: &[&str] = &[
-    "sd_n",
-    "std_n",
-    "sigma_n",
-    "pos_std_n",
-    "sd_north",
-    "sd_lat",
-    "sdn",
-];
-const SD_E: &[&str] = &[
-    "sd_e",
-    "std_e",
-    "sigma_e",
-    "pos_std_e",
-    "sd_east",
-    "sd_lon",
-    "sde",
-];
-const SD_D: &[&str] = &[
-    "sd_d",
-    "std_d",
-    "sigma_d",
-    "pos_std_d",
-    "sd_u",
-    "std_u",
-    "sd_h",
-    "sdu",
-];
-const V_D: Quantity = Quantity::speed("v_d_m_s", &["v_d", "vd"]);
+const SD_N: &str = "sd_n std_n sigma_n pos_std_n sd_north sd_lat sdn";
+const SD_E: &str = "sd_e std_e sigma_e pos_std_e sd_east sd_lon sde";
+const SD_D: &str = "sd_d std_d sigma_d pos_std_d sd_u std_u sd_h sdu";
+const V_D: Quantity = Quantity::speed("v_d_m_s", "v_d vd");
 const PLACE: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
 const PLACE_SIGMA: [&str; 3] = ["sd_n_m", "sd_e_m", "sd_d_m"];
 const VELOCITY: [&str; 3] = ["v_n_m_s", "v_e_m_s", "v_d_m_s"];
@@ -139,24 +115,8 @@ const VELOCITY_SIGMA: [&str; 3] = ["sd_vn_m_s", "sd_ve_m_s", "sd_vd_m_s"];
 /// Dictionary of fixes. Texts without a header are those of KF-GINS.
 const FIXES: Dictionary<'_> = Dictionary {
     bare: &[
-        &[
-            "t_s", "lat_deg", "lon_deg", "h_m", "sd_n_m", "sd_e_m", "sd_d_m",
-        ],
-        &[
-            "t_s",
-            "lat_deg",
-            "lon_deg",
-            "h_m",
-            "v_n_m_s",
-            "v_e_m_s",
-            "v_d_m_s",
-            "sd_n_m",
-            "sd_e_m",
-            "sd_d_m",
-            "sd_vn_m_s",
-            "sd_ve_m_s",
-            "sd_vd_m_s",
-        ],
+        "t_s lat_deg lon_deg h_m sd_n_m sd_e_m sd_d_m",
+        "t_s lat_deg lon_deg h_m v_n_m_s v_e_m_s v_d_m_s sd_n_m sd_e_m sd_d_m sd_vn_m_s sd_ve_m_s sd_vd_m_s",
     ],
     bad_cell: "remove the row: a fix that is not whole is no fix; angles are in degrees, or named lat_rad, lon_rad",
     ..Dictionary::new(
@@ -189,7 +149,7 @@ fn of_rows(
     let has = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
     let has_velocity = has(VELOCITY) || has(VELOCITY_SIGMA);
     let own = VELOCITY.into_iter().filter(|_| has_velocity);
-    table.require(["t_s"].into_iter().chain(PLACE).chain(own), &FIXES)?;
+    table.require(["t_s"].into_iter().chain(PLACE).chain(own))?;
     // what is missing in all of a position or velocity may be given for the whole file
     let is_unsaid = has_velocity && unsaid.is_none_or(|sigma| sigma.vel_m_s.is_none());
     let sigmas = [(PLACE_SIGMA, unsaid.is_none()), (VELOCITY_SIGMA, is_unsaid)];
@@ -197,9 +157,9 @@ fn of_rows(
         .into_iter()
         .filter(|(names, is_needed)| *is_needed || has(*names));
     // a receiver's log that has all but these
-    let found = table.require(sigmas.flat_map(|(names, _)| names), &FIXES);
+    let found = table.require(sigmas.flat_map(|(names, _)| names));
     found.map_err(|e| e.or_option(help::FIX_SIGMA))?;
-    let [time] = table.columns(["t_s"], &FIXES)?;
+    let [time] = table.columns(["t_s"])?;
     let groups = [PLACE, PLACE_SIGMA, VELOCITY, VELOCITY_SIGMA].map(|names| table.all(names));
     let fix = |row: usize| {
         let weeks = table.get("week").map_or(0.0, |week| week.si(row));
@@ -489,43 +449,34 @@ fn rtklib(
         let advice = "write the solution in GPS time, as the IMU's clock is";
         return Err(refuse(at, "times that are not GPST", advice));
     }
-    let cells = |line: &'_ str| -> Vec<String> {
-        let cells = line.split([' ', ',', '\t', '%']).filter(|c| !c.is_empty());
-        cells.map(str::to_owned).collect()
-    };
-    let mut columns: Vec<(String, Vec<f64>)> = cells(names)
-        .into_iter()
-        .map(|name| (name, vec![]))
-        .collect();
-    "t_s".clone_into(&mut columns[0].0);
-    let mut lines = Vec::new();
-    let rows = text.lines().enumerate();
-    for (i, line) in rows.filter(|(_, l)| !(l.starts_with('%') || l.trim().is_empty())) {
-        let row = cells(line);
-        let t_s = match &row[..] {
-            [first, second, ..] if row.len() > columns.len() => gps_time_s(first, second),
-            _ => None,
-        };
-        let t_s = t_s.ok_or_else(|| {
-            let message = "not a row of time, position, quality, satellites and standard deviations";
-            let advice = "2021/03/01 00:00:01.000 (or 2147 86401.000), latitude, longitude, height, Q, ns, sdn, sde, sdu";
-            refuse(i, message, advice)
-        })?;
-        columns[0].1.push(t_s);
-        for ((name, values), cell) in columns[1..].iter_mut().zip(&row[2..]) {
-            values.push(cell.parse().map_err(|_| {
-                Error::cell(
-                    path,
-                    i as u64 + 1,
-                    name,
-                    format!("\"{cell}\""),
-                    "is not a number",
-                )
-            })?);
+    // the time, which takes two columns, in one
+    let (mut whole, mut count) = (String::new(), 0);
+    for (i, line) in text.lines().enumerate() {
+        let cells = line.split([' ', ',', '\t', '%']);
+        let cells: Vec<&str> = cells.filter(|cell| !cell.is_empty()).collect();
+        let is_row = !(line.starts_with('%') || cells.is_empty());
+        match cells[..] {
+            [_, ref names @ ..] if i == at => {
+                count = names.len();
+                whole += &format!("t_s {}", names.join(" "));
+            }
+            [first, second, ref rest @ ..] if is_row => {
+                let t_s = gps_time_s(first, second).ok_or_else(|| {
+                    let message = "not a row of time, position, quality, satellites and standard deviations";
+                    let advice = "2021/03/01 00:00:01.000 (or 2147 86401.000), latitude, longitude, height, Q, ns, sdn, sde, sdu";
+                    refuse(i, message, advice)
+                })?;
+                whole += &format!("{t_s} {}", rest[..count.min(rest.len())].join(" "));
+            }
+            _ => {}
         }
-        lines.push(i as u64 + 1);
+        whole.push('\n');
     }
-    let t_s = &mut columns[0].1;
+    let mut table = table::parse(path, &whole, &SOLUTION)?;
+    let Some(time) = table.columns.iter_mut().find(|c| c.quantity.name == "t_s") else {
+        return Err(table.refused("no time"));
+    };
+    let t_s = &mut time.values;
     let span = t_s.first().copied().zip(t_s.last().copied());
     let (first_s, last_s) = span.unwrap_or_default();
     let gps_s = gps_origin_s(first_s + GPS_EPOCH_S as f64);
@@ -535,7 +486,6 @@ fn rtklib(
     // the difference of two numbers of 1e9 keeps 0.2 µs
     let on_clock = |t_s: f64| (1e6 * (t_s + gps_s - clock.origin_s)).round() / 1e6;
     t_s.iter_mut().for_each(|t_s| *t_s = on_clock(*t_s));
-    let mut table = table::of_columns(path, columns, lines, &SOLUTION)?;
     table.ignored.clear();
     Ok((table, format!("an RTKLIB solution, in {}", clock.name)))
 }
@@ -590,7 +540,7 @@ mod rtklib_tests {
         std::fs::write(file.path(), HEAD).unwrap();
         let refusal = read_gnss(file.path(), None, None, None).unwrap_err();
         assert!(
-            refusal.to_string().ends_with(": no fixes in it"),
+            refusal.to_string().ends_with(": no rows in it"),
             "{refusal}"
         );
     }
@@ -670,25 +620,8 @@ pub(crate) struct ImuFile {
 /// Dictionary of recordings under way. Texts without a header are those of KF-GINS, with or without an odometer.
 const SAMPLES: Dictionary<'_> = Dictionary {
     bare: &[
-        &[
-            "t_s",
-            "dtheta_x_rad",
-            "dtheta_y_rad",
-            "dtheta_z_rad",
-            "dv_x_m_s",
-            "dv_y_m_s",
-            "dv_z_m_s",
-        ],
-        &[
-            "t_s",
-            "dtheta_x_rad",
-            "dtheta_y_rad",
-            "dtheta_z_rad",
-            "dv_x_m_s",
-            "dv_y_m_s",
-            "dv_z_m_s",
-            "odometer_m_s",
-        ],
+        "t_s dtheta_x_rad dtheta_y_rad dtheta_z_rad dv_x_m_s dv_y_m_s dv_z_m_s",
+        "t_s dtheta_x_rad dtheta_y_rad dtheta_z_rad dv_x_m_s dv_y_m_s dv_z_m_s odometer_m_s",
     ],
     advice: "columns: t_s, gyro_x_rad_s … accel_z_m_s2 (rates) or t_s, dtheta_x_rad … dv_z_m_s (increments); without a header, \
              as KF-GINS has it, 7 of them (t_s, dtheta_x, dtheta_y, dtheta_z in rad, dv_x, dv_y, dv_z in m/s), or 8 with an \
@@ -720,7 +653,7 @@ pub(crate) fn read_imu(
     let names = [
         "t_s", "accel.x", "accel.y", "accel.z", "gyro.x", "gyro.y", "gyro.z",
     ];
-    let [time, signals @ ..] = table.columns(names, &SAMPLES)?;
+    let [time, signals @ ..] = table.columns(names)?;
     let unit_s = |values| unit_of_step(median_step(values)).0;
     let unit_s = time.factor.unwrap_or_else(|| unit_s(&time.values));
     let from_gravity = gravity_factor(&table)?;
@@ -831,30 +764,30 @@ fn doubt_units(path: &str, samples: &[ImuIncrement]) -> Result<Option<String>, E
 #[schemars(title = "Initial state", deny_unknown_fields)]
 struct Description {
     /// Time (s)
-    t_s: Finite,
+    t_s: f64,
     /// Latitude of the IMU (degrees)
     #[schemars(range(min = -MAX_LATITUDE_DEG, max = MAX_LATITUDE_DEG))]
-    lat_deg: Finite,
+    lat_deg: f64,
     /// Longitude of the IMU (degrees)
     lon_deg: Between<-360, 360, false>,
     /// Height of the IMU above the ellipsoid (m)
-    h_m: Finite,
+    h_m: f64,
     /// Velocity north (m/s; default: 0)
     #[serde(default)]
-    v_n_m_s: Finite,
+    v_n_m_s: f64,
     /// Velocity east (m/s; default: 0)
     #[serde(default)]
-    v_e_m_s: Finite,
+    v_e_m_s: f64,
     /// Velocity down (m/s; default: 0)
     #[serde(default)]
-    v_d_m_s: Finite,
+    v_d_m_s: f64,
     /// Roll of the vehicle (degrees)
     roll_deg: Between<-180, 180, false>,
     /// Pitch (degrees)
     pitch_deg: Between<-90, 90, false>,
     /// Yaw (degrees)
     yaw_deg: Between<-360, 360, false>,
-    #[schemars(flatten)]
+    #[serde(flatten)]
     sigma: InitialSettings,
 }
 
@@ -875,24 +808,20 @@ pub(crate) fn read_initial(path: &Path) -> Result<Start, Failure> {
 
 fn parse(source: &Source) -> Result<Start, Failure> {
     let d: Description = source.get()?;
-    if d.lat_deg.0.abs() > MAX_LATITUDE_DEG {
-        return Err(source.refused("lat_deg", format!("is not within ±{MAX_LATITUDE_DEG}")));
-    }
     let (roll, pitch, yaw) = (d.roll_deg.0 * DEG, d.pitch_deg.0 * DEG, d.yaw_deg.0 * DEG);
     let state = NavState {
-        lat: d.lat_deg.0 * DEG,
+        lat: d.lat_deg * DEG,
         lon: d.lon_deg.0 * DEG,
-        h: d.h_m.0,
-        v_n: DVec3::new(d.v_n_m_s.0, d.v_e_m_s.0, d.v_d_m_s.0),
+        h: d.h_m,
+        v_n: DVec3::new(d.v_n_m_s, d.v_e_m_s, d.v_d_m_s),
         q_b_n: RollPitchYaw { roll, pitch, yaw }.to_quat(),
     };
     let sigma = d.sigma;
     if sigma.perfect {
         return Err(source.refused("perfect", "is for simulations only"));
     }
-    sigma.validate().map_err(|e| source.setting(&e))?;
     Ok(Start {
-        t_s: d.t_s.0,
+        t_s: d.t_s,
         state,
         sigma,
         found: None,
@@ -918,17 +847,17 @@ mod initial_tests {
             (
                 "= 46",
                 "= 91",
-                "i.toml, line 2: \"lat_deg\" = 91 is not within ±89.9 | ",
+                "i.toml, line 2: \"lat_deg\" = 91 is refused: it must be a finite number ≥ -89.9 and ≤ 89.9 | ",
             ),
             (
                 "= 46",
                 "= 89.95",
-                "i.toml, line 2: \"lat_deg\" = 89.95 is not within ±89.9 | ",
+                "i.toml, line 2: \"lat_deg\" = 89.95 is refused: it must be a finite number ≥ -89.9 and ≤ 89.9 | ",
             ),
             (
                 "= 400",
                 "= inf",
-                "i.toml, line 4: \"h_m\" = inf is not a finite number such as 1.5e-4 | ",
+                "i.toml, line 4: \"h_m\" = inf is refused: it must be a finite number | ",
             ),
             (
                 "h_m = 400\n",
@@ -942,13 +871,13 @@ mod initial_tests {
             ),
             (
                 "t_s = 0",
-                "pos_sigma_m = [1, 1, -1]",
+                "pos_sigma_m = [1, 1, 1]",
                 "i.toml, line 1: \"t_s\" is missing | add t_s",
             ),
             (
                 "t_s = 0",
                 "t_s = 0\npos_sigma_m = [1, 1, -1]",
-                "i.toml, line 2: \"pos_sigma_m\" = [1, 1, -1] is refused: it must be a finite number > 0 and ≤ 100000 | ",
+                "i.toml, line 2: \"pos_sigma_m\" = -1 is refused: it must be a finite number > 0 and ≤ 100000 | ",
             ),
         ] {
             assert_eq!(refused(&sound.replacen(old, new, 1)), expected);
@@ -963,21 +892,10 @@ static SPEED_QUANTITIES: [Quantity; 5] = [
     Quantity::time(OF_CLOCK),
     Quantity::time(STAMP),
     Quantity::time(OF_RECEIVER),
-    Quantity::new("t_s", &["timeus"], NONE, Bare::Is(1e-6)),
+    Quantity::new("t_s", "timeus", NONE, Bare::Is(1e-6)),
     Quantity::new(
         "speed",
-        &[
-            "speed",
-            "velocity",
-            "vel",
-            "v",
-            "wheel",
-            "wheel_speed",
-            "odometer",
-            "odo",
-            "forward",
-            "forward_speed",
-        ],
+        "speed velocity vel v wheel wheel_speed odometer odo forward forward_speed",
         SPEED,
         Bare::Unknown,
     ),
@@ -994,7 +912,7 @@ const SPEEDS: Dictionary<'_> = Dictionary::new(
 /// Whatever is wrong with it, with its line.
 pub(crate) fn read_wheel(path: &Path) -> Result<Vec<WheelSpeed>, Error> {
     let table = table::read(path, &SPEEDS)?;
-    let [time, speed] = table.columns(["t_s", "speed"], &SPEEDS)?;
+    let [time, speed] = table.columns(["t_s", "speed"])?;
     if speed.factor.is_none() {
         return Err(table.no_unit(speed));
     }

@@ -6,7 +6,7 @@
 
 use super::{Fixes, clock, doubt, remark};
 use crate::io::Failure as Error;
-use chrono::NaiveDate;
+use chrono::{NaiveDate, NaiveTime, Timelike};
 use glam::{DVec2, DVec3};
 use nav_sim_navigation::gnss::FixSigma;
 use nav_sim_signal::units::DEG;
@@ -197,17 +197,10 @@ fn fields(line: &str) -> Result<Vec<&str>, &'static str> {
     }
 }
 
-/// Two digits.
-fn two(text: &str, start: usize) -> Option<u32> {
-    text.get(start..start + 2)?.parse().ok()
-}
-
 /// `hhmmss.ss` (s of the day).
 fn time_of_day(text: &str) -> Option<f64> {
-    let (hours, minutes) = (two(text, 0)?, two(text, 2)?);
-    let seconds: f64 = text.get(4..)?.parse().ok()?;
-    (hours < 24 && minutes < 60 && (0.0..61.0).contains(&seconds))
-        .then_some(f64::from(3600 * hours + 60 * minutes) + seconds)
+    let time = NaiveTime::parse_from_str(text, "%H%M%S%.f").ok()?;
+    Some(f64::from(time.num_seconds_from_midnight()) + f64::from(time.nanosecond()) / 1e9)
 }
 
 /// `ddmm.mmmm` or `dddmm.mmmm` and its hemisphere (rad).
@@ -224,12 +217,10 @@ fn angle(text: &str, hemisphere: &str, limit_deg: f64) -> Option<f64> {
     ((0.0..60.0).contains(&minutes) && value <= limit_deg).then_some(sign * value * DEG)
 }
 
-/// Midnight of a date `ddmmyy` (Unix s); years from 80 on are of the last century, as receivers count GPS.
+/// Midnight of a date `ddmmyy` (Unix s).
 fn midnight(text: &str) -> Option<f64> {
-    let (day, month, year) = (two(text, 0)?, two(text, 2)?, two(text, 4)?);
-    let century = if year < 80 { 2000 } else { 1900 };
-    let date = NaiveDate::from_ymd_opt((century + year) as i32, month, day)?;
-    Some(date.and_hms_opt(0, 0, 0)?.and_utc().timestamp() as f64)
+    let date = NaiveDate::parse_from_str(text, "%d%m%y").ok()?;
+    Some(date.and_time(NaiveTime::MIN).and_utc().timestamp() as f64)
 }
 
 /// Speed and course as north and east; without a course, as receivers have none at rest, nothing but as slow as that.

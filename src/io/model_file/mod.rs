@@ -18,20 +18,18 @@
 //! [`ModelFile::missing`].
 
 use super::file_kind::FileKind;
-use super::toml_file::{
-    Between, Finite, NonNegative, OneOrEach, Positive, Source, Stationary, Version,
-};
+use super::toml_file::{OneOrEach, Source};
 use super::{Failure, atomic, file_kind};
 use crate::report::readable;
 use nav_sim_calibration::duration;
 use nav_sim_navigation::sensors::defects::{MAX_BIAS_M_S2, MAX_BIAS_RAD_S};
 use nav_sim_signal::imu::{Axis, Channel, MAX_RATE_HZ, Sensor};
-use nav_sim_signal::noise::{
-    Composite, Kind, Law, Model, ParameterError, Process, Spread, Variation,
-};
-use schemars::JsonSchema;
+use nav_sim_signal::noise::{Composite, Kind, Law, Model, Parameter, Process, Spread, Variation};
+use nav_sim_signal::units::{Between, NonNegative, Positive, Stationary};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde_json::{Map, json};
+use std::borrow::Cow;
 use std::fmt;
 use std::fmt::Write;
 use std::path::Path;
@@ -163,6 +161,9 @@ pub struct Interval {
     pub high: f64,
 }
 
+/// Key of a schema under which advice stands on a value that is refused.
+pub(super) const HINT: &str = "x-hint";
+
 /// Ending of the key of a parameter's interval.
 const CI: &str = "_ci95";
 
@@ -178,10 +179,11 @@ mod tests;
 struct Description {
     /// Version of the layout
     #[serde(rename = "schema")]
-    _schema: Option<Version>,
+    #[schemars(range(min = SCHEMA, max = SCHEMA))]
+    _schema: Option<u64>,
     /// Sample rate that the variances are of (Hz)
     #[schemars(with = "Positive", range(max = MAX_RATE_HZ))]
-    pub(super) rate_hz: Finite,
+    rate_hz: f64,
     accel: Option<SensorTable>,
     gyro: Option<SensorTable>,
     turn_on: Option<TurnOnTable>,
@@ -206,82 +208,65 @@ struct SensorTable {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(inline)]
-#[expect(
-    dead_code,
-    reason = "its values are read by the names of their parameters"
-)]
 struct AxisTable {
     processes: Vec<ProcessTable>,
 }
 
-/// Ends of a 95 % interval.
-type Ends = [f64; 2];
+/// A process: its parameters by their names, and their intervals.
+#[derive(Deserialize)]
+struct ProcessTable(toml::Table);
 
-/// A process: variances in units² of the signal
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(tag = "type", inline)]
-#[expect(
-    dead_code,
-    reason = "its values are read by the names of their parameters"
-)]
-enum ProcessTable {
-    /// White noise: variance a sample
-    WN {
-        #[schemars(with = "NonNegative")]
-        sigma2: Finite,
-        sigma2_ci95: Option<Ends>,
-    },
-    /// Quantization noise, Q²
-    QN {
-        #[schemars(with = "NonNegative")]
-        q2: Finite,
-        q2_ci95: Option<Ends>,
-    },
-    /// First-order autoregression: coefficient e^(−1/(rate × correlation time)), variance of the innovation
-    AR1 {
-        #[schemars(with = "Stationary")]
-        phi: Finite,
-        phi_ci95: Option<Ends>,
-        #[schemars(with = "NonNegative")]
-        sigma2: Finite,
-        sigma2_ci95: Option<Ends>,
-    },
-    /// Gauss-Markov process: reciprocal correlation time (1/s), variance of the process
-    GM {
-        #[schemars(with = "Positive")]
-        beta: Finite,
-        beta_ci95: Option<Ends>,
-        #[schemars(with = "NonNegative")]
-        s2: Finite,
-        s2_ci95: Option<Ends>,
-    },
-    /// First-order moving average: coefficient, variance of the innovation
-    MA1 {
-        #[schemars(with = "Between<-1, 1, false>")]
-        theta: Finite,
-        theta_ci95: Option<Ends>,
-        #[schemars(with = "NonNegative")]
-        sigma2: Finite,
-        sigma2_ci95: Option<Ends>,
-    },
-    /// Flicker noise, B²: bias instability
-    FN {
-        #[schemars(with = "NonNegative")]
-        b2: Finite,
-        b2_ci95: Option<Ends>,
-    },
-    /// Random walk: variance of an increment
-    RW {
-        #[schemars(with = "NonNegative")]
-        gamma2: Finite,
-        gamma2_ci95: Option<Ends>,
-    },
-    /// Drift (units a sample)
-    DR {
-        slope: Finite,
-        slope_ci95: Option<Ends>,
-    },
+impl JsonSchema for ProcessTable {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Process".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut kind = |kind: Kind| {
+            let mut properties = Map::new();
+            let code = json!({ "type": "string", "const": kind.code() });
+            properties.insert("type".to_owned(), code);
+            for parameter in kind.parameters() {
+                let mut schema = match parameter {
+                    Parameter::Phi => generator.subschema_for::<Stationary>(),
+                    Parameter::Theta => generator.subschema_for::<Between<-1, 1, false>>(),
+                    Parameter::Beta => generator.subschema_for::<Positive>(),
+                    Parameter::Slope => json_schema!({ "type": "number" }),
+                    _ => generator.subschema_for::<NonNegative>(),
+                };
+                let hint = match parameter {
+                    Parameter::Phi => {
+                        "phi = exp(−1/(T·rate_hz)) for a correlation time of T seconds; phi = 1 is a random walk: RW"
+                    }
+                    _ => "a variance is never negative; 0 switches the process off",
+                };
+                if !matches!(
+                    parameter,
+                    Parameter::Theta | Parameter::Beta | Parameter::Slope
+                ) {
+                    schema.insert(HINT.to_owned(), hint.into());
+                }
+                let ends = json!({ "type": "array", "minItems": 2, "maxItems": 2 });
+                let name = parameter.name();
+                properties.insert(format!("{name}{CI}"), ends);
+                properties.insert(name.to_owned(), schema.to_value());
+            }
+            let required = properties.keys().filter(|key| !key.ends_with(CI));
+            let required: Vec<String> = required.cloned().collect();
+            json!({
+                "description": format!("In units of {}", kind.units("the signal")),
+                "type": "object",
+                "properties": properties,
+                "required": required,
+                "additionalProperties": false,
+            })
+        };
+        json_schema!({ "oneOf": Kind::ALL.map(&mut kind) })
+    }
 }
 
 /// Standard deviations of the constant bias of a switching-on: one, or one for each axis
@@ -289,9 +274,12 @@ enum ProcessTable {
 #[serde(deny_unknown_fields)]
 #[schemars(inline)]
 struct TurnOnTable {
-    accel_m_s2: Option<OneOrEach<Finite, [Finite; 3]>>,
-    gyro_rad_s: Option<OneOrEach<Finite, [Finite; 3]>>,
+    accel_m_s2: Option<Sigmas<{ MAX_BIAS_M_S2 as i64 }>>,
+    gyro_rad_s: Option<Sigmas<{ MAX_BIAS_RAD_S as i64 }>>,
 }
+
+/// One standard deviation for the three axes, or one for each.
+type Sigmas<const MOST: i64> = OneOrEach<Between<0, MOST, false>, [Between<0, MOST, false>; 3]>;
 
 /// How parameters vary between recordings: of all three axes of a sensor, or of each
 #[derive(Deserialize, JsonSchema)]
@@ -317,7 +305,7 @@ struct LawAxes {
 struct LawTable {
     process: String,
     parameter: String,
-    #[schemars(flatten)]
+    #[serde(flatten)]
     distribution: Law,
 }
 
@@ -429,7 +417,7 @@ pub fn from_text(path: &Path, text: &str) -> Result<ModelFile, Failure> {
 
 pub(super) fn parse(source: &Source) -> Result<ModelFile, Failure> {
     let Description {
-        rate_hz: Between(rate_hz),
+        rate_hz,
         accel,
         gyro,
         turn_on,
@@ -437,19 +425,13 @@ pub(super) fn parse(source: &Source) -> Result<ModelFile, Failure> {
         provenance,
         ..
     } = source.get()?;
-    // the same by the names of keys
-    let named: toml::Table = source.get()?;
-    if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
-        let reason = format!("is not a rate: it must be > 0 and at most {MAX_RATE_HZ}");
-        return Err(source.refused("rate_hz", reason));
-    }
     let mut file = ModelFile::new(Model {
         rate_hz,
         axes: Default::default(),
     });
     for (sensor, table) in Sensor::ALL.into_iter().zip([accel, gyro]) {
         match table {
-            Some(table) => read_sensor(source, sensor, table, &named[sensor.name()], &mut file)?,
+            Some(table) => read_sensor(source, sensor, &table, &mut file)?,
             None => file
                 .missing
                 .extend(Axis::ALL.map(|axis| Channel { sensor, axis })),
@@ -458,9 +440,14 @@ pub(super) fn parse(source: &Source) -> Result<ModelFile, Failure> {
     if file.missing.len() == Channel::ALL.len() {
         return Err(source.missing("", &Sensor::ALL.map(Sensor::name)));
     }
-    file.turn_on = turn_on
-        .map(|table| read_turn_on(source, &table))
-        .transpose()?;
+    file.turn_on = turn_on.map(|table| TurnOn {
+        accel_m_s2: table
+            .accel_m_s2
+            .map(|all| [0, 1, 2].map(|axis| all.of(axis))),
+        gyro_rad_s: table
+            .gyro_rad_s
+            .map(|all| [0, 1, 2].map(|axis| all.of(axis))),
+    });
     if let Some(spread) = spread {
         let mut read = Spread::default();
         for (sensor, laws) in Sensor::ALL.into_iter().zip([spread.accel, spread.gyro]) {
@@ -476,13 +463,12 @@ pub(super) fn parse(source: &Source) -> Result<ModelFile, Failure> {
 fn read_sensor(
     source: &Source,
     sensor: Sensor,
-    table: SensorTable,
-    named: &Value,
+    table: &SensorTable,
     file: &mut ModelFile,
 ) -> Result<(), Failure> {
     let name = sensor.name();
-    let own = [table.x, table.y, table.z];
-    if table.processes.is_none() && own.iter().all(Option::is_none) {
+    let own = [&table.x, &table.y, &table.z];
+    if table.processes.is_none() && own.iter().all(|axis| axis.is_none()) {
         return Err(source.missing(name, &["processes"]));
     }
     for (axis, own) in Axis::ALL.into_iter().zip(own) {
@@ -493,48 +479,24 @@ fn read_sensor(
                 let error = source.refused(&key, "is given both for all axes and for this one");
                 return Err(error.or_hint(format!("write either [{name}] or one table an axis")));
             }
-            (Some(_), None) => read_processes(source, name, named, channel, file)?,
-            (None, Some(_)) => read_processes(source, &key, &named[axis.name()], channel, file)?,
+            (Some(all), None) => read_processes(source, name, all, channel, file)?,
+            (None, Some(own)) => read_processes(source, &key, &own.processes, channel, file)?,
             (None, None) => file.missing.push(channel),
         }
     }
     Ok(())
 }
 
-fn read_turn_on(source: &Source, table: &TurnOnTable) -> Result<TurnOn, Failure> {
-    let axes = |sensor: Sensor, given: &Option<OneOrEach<Finite, [Finite; 3]>>, limit: f64| {
-        let axes = match given {
-            None => return Ok(None),
-            Some(given) => [0, 1, 2].map(|axis| given.of(axis)),
-        };
-        if axes.iter().all(|sigma| (0.0..=limit).contains(sigma)) {
-            return Ok(Some(axes));
-        }
-        let reason = format!(
-            "is not a standard deviation between 0 and {limit} {}",
-            sensor.unit()
-        );
-        Err(source.refused(&format!("turn_on.{}", TurnOn::key(sensor)), reason))
-    };
-    Ok(TurnOn {
-        accel_m_s2: axes(Sensor::Accel, &table.accel_m_s2, MAX_BIAS_M_S2)?,
-        gyro_rad_s: axes(Sensor::Gyro, &table.gyro_rad_s, MAX_BIAS_RAD_S)?,
-    })
-}
-
 fn read_processes(
     source: &Source,
     key: &str,
-    named: &Value,
+    tables: &[ProcessTable],
     channel: Channel,
     file: &mut ModelFile,
 ) -> Result<(), Failure> {
     let rate_hz = file.model.rate_hz;
-    let tables = named["processes"].as_array().into_iter().flatten();
-    let tables: Vec<(String, &Value)> = (1..)
-        .zip(tables)
-        .map(|(i, table)| (format!("{key}.processes[{i}]"), table))
-        .collect();
+    let keys = (1..).map(|i| format!("{key}.processes[{i}]"));
+    let tables: Vec<_> = keys.zip(tables.iter().map(|table| &table.0)).collect();
     let processes = tables
         .iter()
         .map(|(key, values)| read_process(source, key, values, rate_hz));
@@ -576,7 +538,7 @@ fn number(value: &Value) -> f64 {
 fn read_process(
     source: &Source,
     key: &str,
-    values: &Value,
+    values: &toml::Table,
     rate_hz: f64,
 ) -> Result<Process, Failure> {
     let code = values["type"].as_str().unwrap_or_default();
@@ -587,23 +549,10 @@ fn read_process(
         let reason = format!("is more than {LARGEST:e}, which no sensor has");
         return Err(source.refused(&format!("{key}.{name}"), reason));
     }
-    Process::of_values(kind, &values, rate_hz).map_err(|e| refuse_parameter(source, key, &e))
-}
-
-fn refuse_parameter(source: &Source, key: &str, e: &ParameterError) -> Failure {
-    let refusal = source.refused(
-        &format!("{key}.{}", e.parameter),
-        format!("is not {}", e.domain),
-    );
-    match e.parameter {
-        "phi" => refusal.or_hint(
-            "phi = exp(−1/(T·rate_hz)) for a correlation time of T seconds; phi = 1 is a random walk: RW",
-        ),
-        "sigma2" | "gamma2" | "q2" | "s2" => {
-            refusal.or_hint("a variance is never negative; 0 switches the process off")
-        }
-        _ => refusal,
-    }
+    Process::of_values(kind, &values, rate_hz).map_err(|e| {
+        let key = format!("{key}.{}", e.parameter);
+        source.refused(&key, format!("is not {}", e.domain))
+    })
 }
 
 fn read_laws(
@@ -754,11 +703,7 @@ fn laws(file: &ModelFile, channel: Channel) -> Option<Vec<String>> {
 }
 
 fn law(v: &Variation) -> String {
-    let mut table = toml::Table::new();
-    for (distribution, constants) in json!(v.law).as_object().into_iter().flatten() {
-        table = known(constants.clone());
-        table.insert("distribution".into(), distribution.as_str().into());
-    }
+    let mut table = known(json!(v.law));
     table.insert("process".into(), v.process.as_str().into());
     table.insert("parameter".into(), v.of.parameter.name().into());
     table.to_string()

@@ -162,12 +162,12 @@ fn intervals_stand_beside_their_parameters() {
 fn wrong_values_are_refused_with_line_key_and_value() {
     assert_eq!(
         process_refusal("type = \"AR1\", phi = 1.0, sigma2 = 1"),
-        "m.toml, line 4: \"accel.processes[1].phi\" = 1.0 is not between −1 and 1 (exclusive) | \
+        "m.toml, line 4: \"accel.processes[1].phi\" = 1.0 is refused: it must be a finite number > -1 and < 1 | \
          phi = exp(−1/(T·rate_hz)) for a correlation time of T seconds; phi = 1 is a random walk: RW"
     );
     assert_eq!(
         process_refusal("type = \"WN\", sigma2 = -5e-5"),
-        "m.toml, line 4: \"accel.processes[1].sigma2\" = -5e-5 is not a finite number ≥ 0 | \
+        "m.toml, line 4: \"accel.processes[1].sigma2\" = -5e-5 is refused: it must be a finite number ≥ 0 | \
          a variance is never negative; 0 switches the process off"
     );
     assert_eq!(
@@ -176,7 +176,7 @@ fn wrong_values_are_refused_with_line_key_and_value() {
     );
     assert_eq!(
         process_refusal("type = \"QN\", q2 = nan"),
-        "m.toml, line 4: \"accel.processes[1].q2\" = nan is not a finite number such as 1.5e-4 | "
+        "m.toml, line 4: \"accel.processes[1].q2\" = nan is refused: it must be a finite number ≥ 0 | a variance is never negative; 0 switches the process off"
     );
     assert_eq!(
         process_refusal("type = \"WN\", sigma2 = \"1\""),
@@ -184,18 +184,21 @@ fn wrong_values_are_refused_with_line_key_and_value() {
     );
     assert_eq!(
         process_refusal("type = \"WN\", sigma2 = 1, sigma2_ci95 = [1]"),
-        "m.toml, line 4: \"accel.processes[1].sigma2_ci95\" = [1] is not an array of length 2 | "
+        "m.toml, line 4: \"accel.processes[1].sigma2_ci95\" = [1] is not a list of 2 | "
     );
     assert_eq!(
         refusal("rate_hz = 0\n"),
-        "m.toml, line 1: \"rate_hz\" = 0 is not a rate: it must be > 0 and at most 100000 | "
+        "m.toml, line 1: \"rate_hz\" = 0 is refused: it must be a finite number > 0 and ≤ 100000 | "
     );
-    assert!(refusal("rate_hz = 1e300\n").contains("\"rate_hz\" = 1e300 is not a rate"));
+    assert!(
+        refusal("rate_hz = 1e300\n")
+            .contains("\"rate_hz\" = 1e300 is refused: it must be a finite number > 0")
+    );
     let twice = refusal("rate_hz = 1\nrate_hz = 2\n");
     assert_eq!(twice, "m.toml, line 2: duplicate key: \"rate_hz\" | ");
     assert_eq!(
         refusal("schema = 2\n"),
-        "m.toml, line 1: \"schema\" = 2 is not a schema this version reads: it reads 1 | "
+        "m.toml, line 1: \"schema\" = 2 is refused: it must be 1 | "
     );
 }
 
@@ -323,73 +326,23 @@ fn turn_on_biases_are_one_or_three_standard_deviations() {
     for (text, reason) in [
         (
             "accel_m_s2 = -1",
-            "\"turn_on.accel_m_s2\" = -1 is not a standard deviation between 0 and 10 m/s²",
+            "\"turn_on.accel_m_s2\" = -1 is refused: it must be a finite number ≥ 0 and ≤ 10 (mg or g named m/s²?)",
         ),
         (
             "gyro_rad_s = 2",
-            "\"turn_on.gyro_rad_s\" = 2 is not a standard deviation between 0 and 1 rad/s",
+            "\"turn_on.gyro_rad_s\" = 2 is refused: it must be a finite number ≥ 0 and ≤ 1 (degrees named radians?)",
         ),
         (
             "gyro_rad_s = [1.0, 2.0, 3.0, 4.0]",
-            "\"turn_on.gyro_rad_s\" = [1.0, 2.0, 3.0, 4.0] is too long a list",
+            "\"turn_on.gyro_rad_s\" = [1.0, 2.0, 3.0, 4.0] is not a list of 3",
         ),
         (
             "gyro_rad_s = [1e-3, 2e-3]",
-            "\"turn_on.gyro_rad_s\" = [1e-3, 2e-3] is not an array of length 3",
+            "\"turn_on.gyro_rad_s\" = [1e-3, 2e-3] is not a list of 3",
         ),
         ("gyro_deg_h = 1", "unknown key \"turn_on.gyro_deg_h\""),
     ] {
         let message = with(text).unwrap_err().to_string();
         assert!(message.ends_with(reason), "{message}");
     }
-}
-
-/// At each bound of a parameter in the schema, and just outside, the reader does what the schema says.
-#[test]
-fn the_schema_has_the_bounds_of_the_reader() {
-    let schema = schema();
-    let processes = schema
-        .pointer("/properties/accel/properties/processes/items/oneOf")
-        .unwrap();
-    let mut bounds = 0;
-    for process in processes.as_array().unwrap() {
-        let properties = process["properties"].as_object().unwrap();
-        let numbers: Vec<&String> = properties
-            .keys()
-            .filter(|key| properties[*key]["type"] == "number")
-            .collect();
-        let reads = |key: &str, value: f64| {
-            let value_of = |name: &str| if name == key { value } else { 0.5 };
-            let keys: Vec<String> = numbers
-                .iter()
-                .map(|name| format!("{name} = {:?}", value_of(name)))
-                .collect();
-            with_process(&format!(
-                "type = {}, {}",
-                properties["type"]["const"],
-                keys.join(", ")
-            ))
-            .is_ok()
-        };
-        for key in &numbers {
-            for (name, outward, is_open) in [
-                ("minimum", -1e-9, false),
-                ("exclusiveMinimum", -1e-9, true),
-                ("maximum", 1e-9, false),
-                ("exclusiveMaximum", 1e-9, true),
-            ] {
-                let Some(bound) = properties[*key][name].as_f64() else {
-                    continue;
-                };
-                bounds += 1;
-                assert!(
-                    reads(key, bound) != is_open && !reads(key, bound + outward),
-                    "{key} {name} {bound}"
-                );
-                assert!(reads(key, bound - outward), "{key} {name} {bound}");
-            }
-        }
-    }
-    // seven variances, and of the shapes of AR1, GM and MA1 two ends, one and two
-    assert_eq!(bounds, 7 + 2 + 1 + 2);
 }

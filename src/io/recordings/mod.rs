@@ -4,6 +4,7 @@
 //! what was assumed, is told in the [`Report`]. What cannot be right is refused with file and line
 //! ([`Failure`]).
 
+use super::input::listed;
 use super::logs::LogOptions;
 use super::table::{
     ACCELERATION, ANGLE, ANGULAR_RATE, Bare, Column, Dictionary, NO_COLUMN, Quantity, TIME, Table,
@@ -60,70 +61,18 @@ pub enum Gaps {
 nav_sim_signal::named!(Gaps { Refuse = "refuse", Keep = "keep", Split = "split", Ignore = "ignore" });
 
 /// Names before the axis, and those that mean SI by convention.
-const ACCEL: &[&str] = &[
-    "accel",
-    "acc",
-    "accelerometer",
-    "acceleration",
-    "specific_force",
-    "lin_acc",
-    "a",
-    "f",
-    "raw_acc",
-];
-const ACCEL_SI: &[&str] = &[
-    "linear_acceleration",
-    "field_linear_acceleration",
-    "a_rs_s",
-    "alpha",
-];
-const GYRO: &[&str] = &[
-    "gyro",
-    "gyr",
-    "gyroscope",
-    "angular_rate",
-    "ang_vel",
-    "g",
-    "w",
-    "raw_gyro",
-];
-const GYRO_SI: &[&str] = &[
-    "angular_velocity",
-    "field_angular_velocity",
-    "w_rs_s",
-    "omega",
-];
-const INCREMENT: Units = &[(&["m_s"], 1.0), (&["mps"], 1.0)];
+const ACCEL: &str = "accel acc accelerometer acceleration specific_force lin_acc a f raw_acc";
+const ACCEL_SI: &str = "linear_acceleration field_linear_acceleration a_rs_s alpha";
+const GYRO: &str = "gyro gyr gyroscope angular_rate ang_vel g w raw_gyro";
+const GYRO_SI: &str = "angular_velocity field_angular_velocity w_rs_s omega";
+const INCREMENT: Units = &[("m_s", 1.0), ("mps", 1.0)];
 /// Time of measurement, preferred to the time of arrival beside it.
-pub(crate) const STAMP: &[&str] = &["field_header_stamp", "header_stamp", "stamp"];
-pub(crate) const OF_CLOCK: &[&str] = &[
-    "t",
-    "time",
-    "timestamp",
-    "time_stamp",
-    "elapsed",
-    "elapsed_time",
-    "epoch",
-];
+pub(crate) const STAMP: &str = "field_header_stamp header_stamp stamp";
+pub(crate) const OF_CLOCK: &str = "t time timestamp time_stamp elapsed elapsed_time epoch";
 /// Time of a receiver, of the week or not: the last to be taken, because it may be that of its last fix.
-pub(crate) const OF_RECEIVER: &[&str] = &[
-    "tow",
-    "gps_tow",
-    "gpstow",
-    "time_of_week",
-    "gps_time_of_week",
-    "sow",
-    "gps_sow",
-    "seconds_of_week",
-    "second_of_week",
-    "gps_seconds_of_week",
-    "gps_seconds",
-    "gps_time",
-    "gpstime",
-    "gps_timestamp",
-];
+pub(crate) const OF_RECEIVER: &str = "tow gps_tow gpstow time_of_week gps_time_of_week sow gps_sow seconds_of_week second_of_week gps_seconds_of_week gps_seconds gps_time gpstime gps_timestamp";
 
-const fn time(stems: &'static [&'static str], bare: Bare, rank: u8) -> Quantity {
+const fn time(stems: &'static str, bare: Bare, rank: u8) -> Quantity {
     Quantity {
         rank: Some(rank),
         ..Quantity::new("t_s", stems, TIME, bare)
@@ -133,7 +82,7 @@ const fn time(stems: &'static [&'static str], bare: Bare, rank: u8) -> Quantity 
 /// Rates of a signal, in units that are to be found out or SI by convention, and its increments.
 const fn signal(
     name: &'static str,
-    [free, si, increment]: [&'static [&'static str]; 3],
+    [free, si, increment]: [&'static str; 3],
     [rate, per_sample]: [Units; 2],
 ) -> [Quantity; 3] {
     let any = Quantity {
@@ -156,11 +105,11 @@ const fn signal(
 }
 
 const fn accel(name: &'static str) -> [Quantity; 3] {
-    signal(name, [ACCEL, ACCEL_SI, &["dv"]], [ACCELERATION, INCREMENT])
+    signal(name, [ACCEL, ACCEL_SI, "dv"], [ACCELERATION, INCREMENT])
 }
 
 const fn gyro(name: &'static str) -> [Quantity; 3] {
-    signal(name, [GYRO, GYRO_SI, &["dtheta"]], [ANGULAR_RATE, ANGLE])
+    signal(name, [GYRO, GYRO_SI, "dtheta"], [ANGULAR_RATE, ANGLE])
 }
 
 /// Quantities of a recording. A packet counter starts again at 0 after 65535.
@@ -171,9 +120,9 @@ static QUANTITIES: [[Quantity; 3]; 8] = [
         time(OF_RECEIVER, Bare::Unknown, 2),
     ],
     [
-        time(&["timeus"], Bare::Is(1e-6), 1),
-        time(&["timems", "itow"], Bare::Is(1e-3), 1),
-        Quantity::number("counter", &["packetcounter", "packet_counter"]),
+        time("timeus", Bare::Is(1e-6), 1),
+        time("timems itow", Bare::Is(1e-3), 1),
+        Quantity::number("counter", "packetcounter packet_counter"),
     ],
     accel("accel.x"),
     accel("accel.y"),
@@ -183,30 +132,19 @@ static QUANTITIES: [[Quantity; 3]; 8] = [
     gyro("gyro.z"),
 ];
 
-const SIX: [&str; 6] = [
-    "accel_x_m_s2",
-    "accel_y_m_s2",
-    "accel_z_m_s2",
-    "gyro_x_rad_s",
-    "gyro_y_rad_s",
-    "gyro_z_rad_s",
-];
-const SEVEN: [&str; 7] = ["t_s", SIX[0], SIX[1], SIX[2], SIX[3], SIX[4], SIX[5]];
+const SIX: &str = "accel_x_m_s2 accel_y_m_s2 accel_z_m_s2 gyro_x_rad_s gyro_y_rad_s gyro_z_rad_s";
+const SEVEN: &str =
+    "t_s accel_x_m_s2 accel_y_m_s2 accel_z_m_s2 gyro_x_rad_s gyro_y_rad_s gyro_z_rad_s";
 
 /// Dictionary of recordings.
 pub(crate) const DICTIONARY: Dictionary<'_> = Dictionary {
-    array: &[&SIX, &SEVEN],
+    array: &[SIX, SEVEN],
     bad_cell: "remove the line, or record again: a sample that is made up would change the noise",
     ..Dictionary::new(
         QUANTITIES.as_flattened(),
         "name the columns t_s, accel_x_m_s2 … gyro_z_rad_s (also _g, _mg, _deg_s, _deg_h; t_ms, t_us, t_ns)",
     )
 };
-
-/// The name of a channel's column in files of this program.
-const fn column_name(channel: Channel) -> &'static str {
-    SIX[channel.index()]
-}
 
 /// The channel that a column is of.
 fn channel_of(column: &Column) -> Option<Channel> {
@@ -355,7 +293,12 @@ fn expand(paths: &[PathBuf]) -> Result<Vec<(PathBuf, bool)>, Failure> {
     for path in paths {
         let io = |e| unreadable(path, e);
         if std::fs::metadata(path).map_err(io)?.is_dir() && !is_oxts(path) {
-            let inside = listing(path).map_err(io)?;
+            let mut inside = listed(std::slice::from_ref(path))?;
+            inside.retain(|path| {
+                let name = file_name(path);
+                !name.starts_with('.') && is_recording(&name)
+            });
+            inside.sort_by_key(|path| natural(&file_name(path)));
             if inside.is_empty() {
                 return Err(no_files(path.display().to_string()));
             }
@@ -383,32 +326,9 @@ fn no_files(path: String) -> Failure {
     )
 }
 
-fn listing(directory: &Path) -> std::io::Result<Vec<PathBuf>> {
-    let mut paths = Vec::new();
-    for entry in std::fs::read_dir(directory)? {
-        let path = entry?.path();
-        let name = file_name(&path);
-        if !name.starts_with('.') && is_recording(&name) && path.is_file() {
-            paths.push(path);
-        }
-    }
-    paths.sort_by_key(|p| natural(&file_name(p)));
-    Ok(paths)
-}
-
 fn file_name(path: &Path) -> String {
-    path.file_name()
-        .map(|n| n.to_string_lossy().into_owned())
-        .unwrap_or_default()
-}
-
-/// Whether a name ends like a recording's.
-fn is_recording(name: &str) -> bool {
-    let lower = name.to_lowercase();
-    let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
-    plain
-        .rsplit_once('.')
-        .is_some_and(|(stem, ending)| !stem.is_empty() && ENDINGS.contains(&ending))
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
 }
 
 /// Sort key: digits compare by value, so that `replicate_9` is before `replicate_10`.
@@ -422,6 +342,15 @@ fn natural(name: &str) -> (String, String) {
         word => word.into_owned(),
     });
     (padded.collect(), name.to_owned())
+}
+
+/// Whether a name ends like a recording's.
+fn is_recording(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
+    plain
+        .rsplit_once('.')
+        .is_some_and(|(stem, ending)| !stem.is_empty() && ENDINGS.contains(&ending))
 }
 
 #[cfg(test)]
@@ -823,7 +752,8 @@ fn same_rate(files: &[FileReport]) -> Result<(), Failure> {
 
 /// Signals of the same length (m/s² or rad/s), sampled at `rate_hz` from time 0 on, with ten significant digits.
 pub(crate) fn csv(rate_hz: f64, signals: &[(Channel, Vec<f64>)]) -> String {
-    let names: Vec<&str> = signals.iter().map(|(c, _)| column_name(*c)).collect();
+    let name = |(c, _): &(Channel, _)| SIX.split(' ').nth(c.index());
+    let names: Vec<&str> = signals.iter().filter_map(name).collect();
     let mut text = format!("t_s,{}\n", names.join(","));
     for k in 0..signals.first().map_or(0, |(_, x)| x.len()) {
         let _ = write!(text, "{}", k as f64 / rate_hz);

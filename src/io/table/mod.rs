@@ -13,6 +13,7 @@ pub(crate) use quantity::{
     ACCELERATION, ANGLE, ANGULAR_RATE, Bare, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, TIME,
     Units, normalised,
 };
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{BufRead, Cursor, Read};
 use std::path::{Path, PathBuf};
@@ -23,10 +24,10 @@ mod quantity;
 pub(crate) struct Dictionary<'a> {
     /// Quantities; of several columns of one with a rank, the first by rank is taken.
     pub(crate) quantities: &'static [Quantity],
-    /// Names of the columns of texts without a header, by their number.
-    pub(crate) bare: &'static [&'static [&'static str]],
-    /// Names of the columns of arrays without names.
-    pub(crate) array: &'static [&'static [&'static str]],
+    /// Headers of texts without one, by the number of their columns.
+    pub(crate) bare: &'static [&'static str],
+    /// Those of arrays.
+    pub(crate) array: &'static [&'static str],
     /// True if cells that hold no number of their range are NaN: who reads them leaves those rows out.
     pub(crate) is_partial: bool,
     /// Advice where columns are not found.
@@ -75,6 +76,8 @@ pub(crate) struct Table {
     lines: Vec<u64>,
     /// True if the text has no header.
     pub(crate) is_bare: bool,
+    /// Advice where columns are not found.
+    advice: &'static str,
     /// Notes on skipped and assumed parts.
     pub(crate) assumptions: Vec<String>,
     /// Warnings.
@@ -112,7 +115,7 @@ pub(crate) fn read(path: &Path, dictionary: &Dictionary<'_>) -> Result<Table, Fa
             .is_some_and(|e| e.eq_ignore_ascii_case(ending))
     };
     let name = path.display().to_string();
-    let of = |columns| of_columns(&name, columns, vec![], dictionary);
+    let of = |columns| of_columns(&name, columns, dictionary);
     let table = match logs::kind_of(path) {
         #[cfg(feature = "npz")]
         Some(LogKind::Npz) => {
@@ -209,6 +212,7 @@ impl Table {
         let mut table = Self {
             path: path.to_owned(),
             header_line,
+            advice: dictionary.advice,
             ..Self::default()
         };
         let unwanted = |quantity: &Quantity| dictionary.unwanted.is_some_and(|is| is(quantity));
@@ -283,7 +287,7 @@ impl Table {
         let endings = quantity
             .units
             .iter()
-            .map(|(names, _)| format!("_{}", names[0]));
+            .filter_map(|(names, _)| Some(format!("_{}", names.split(' ').next()?)));
         let endings: Vec<String> = endings.collect();
         self.refused(format!("column \"{name}\" {problem}"))
             .or_hint(format!("end its name in one of {}", endings.join(", ")))
@@ -442,7 +446,6 @@ impl Table {
     pub(crate) fn require<'a>(
         &self,
         needed: impl IntoIterator<Item = &'a str>,
-        dictionary: &Dictionary<'_>,
     ) -> Result<(), Failure> {
         let missing: Vec<&str> = needed.into_iter().filter(|q| !self.has(q)).collect();
         let slip = |name: &String| Some((name.clone(), nearest(name, missing.iter().copied())?));
@@ -456,7 +459,7 @@ impl Table {
             many => format!("columns {} are missing", many.join(", ")),
         };
         let refusal = self.refused(columns).passing_over(NO_COLUMN);
-        Err(refusal.or_hint(dictionary.advice))
+        Err(refusal.or_hint(self.advice))
     }
 
     /// Columns of quantities that are needed.
@@ -466,11 +469,9 @@ impl Table {
     pub(crate) fn columns<const N: usize>(
         &self,
         needed: [&str; N],
-        dictionary: &Dictionary<'_>,
     ) -> Result<[&Column; N], Failure> {
-        self.require(needed, dictionary)?;
-        self.all(needed)
-            .ok_or_else(|| self.refused(dictionary.advice))
+        self.require(needed)?;
+        self.all(needed).ok_or_else(|| self.refused(self.advice))
     }
 }
 
@@ -486,21 +487,59 @@ mod tests;
 
 // Tables of text: RFC 4180 with `,` `;` tab or blanks, comments and other lines before the header.
 
-type Reader = Box<dyn BufRead>;
-
-/// Longest line before the rows (bytes); what is longer is no table of text.
+/// Longest line (bytes); what is longer is no table of text.
 const LONGEST: u64 = 1 << 16;
 /// Lines that may stand before the header.
 const MOST_BEFORE: u64 = 200;
-const BUFFER: usize = 1 << 17;
+
+/// Lines of a text, one at a time.
+struct Lines<'a> {
+    path: &'a str,
+    reader: Box<dyn BufRead>,
+    /// The line read last, its number from 1, and the bytes up to its end.
+    line: Vec<u8>,
+    number: u64,
+    bytes: u64,
+}
+
+impl Lines<'_> {
+    /// Appends a line to the last one; false at the end.
+    fn more(&mut self) -> Result<bool, Failure> {
+        let mut reader = self.reader.by_ref().take(LONGEST);
+        let read = reader.read_until(b'\n', &mut self.line);
+        let count = read.map_err(|e| unreadable(Path::new(self.path), e))?;
+        self.number += 1;
+        self.bytes += count as u64;
+        Ok(count > 0)
+    }
+
+    /// Reads a line; false at the end.
+    fn next(&mut self) -> Result<bool, Failure> {
+        self.line.clear();
+        self.more()
+    }
+
+    /// True if a quote is open at the end of the line.
+    fn is_open(&self) -> bool {
+        let quotes = self.line.iter().filter(|b| **b == b'"').count();
+        quotes % 2 > 0 && !self.line.starts_with(b"#")
+    }
+}
 
 /// Reads a table.
 fn read_text(
     path: &str,
-    mut reader: Reader,
+    reader: Box<dyn BufRead>,
     dictionary: &Dictionary<'_>,
 ) -> Result<Table, Failure> {
-    let head = Head::read(path, &mut reader, dictionary)?;
+    let mut lines = Lines {
+        path,
+        reader,
+        line: Vec::new(),
+        number: 0,
+        bytes: 0,
+    };
+    let head = Head::read(&mut lines, dictionary)?;
     let mut table = Table::new(path, head.line, &head.names, dictionary, head.is_xsens)?;
     table.rate_hz = head.rate_hz.map(|rate_hz| (rate_hz, "head of the file"));
     table.is_bare = head.is_bare;
@@ -509,7 +548,7 @@ fn read_text(
         table.assumptions.push(text.to_owned());
     }
     if !table.columns.is_empty() {
-        head.rows(&mut table, reader, dictionary)?;
+        head.rows(&mut table, lines, dictionary)?;
     }
     table.comments.splice(..0, head.comments);
     Ok(table)
@@ -522,9 +561,8 @@ struct Head {
     delimiter: u8,
     /// Line of the header, from 1.
     line: u64,
-    /// Lines before the rows, and the first row where it was read in search of a header.
-    before: u64,
-    first_row: Vec<u8>,
+    /// True if the line read last is the first row.
+    has_row: bool,
     comments: Vec<String>,
     /// True if it is that of an Xsens MT Manager export, which is in SI.
     is_xsens: bool,
@@ -536,50 +574,48 @@ struct Head {
 }
 
 impl Head {
-    fn read(path: &str, reader: &mut Reader, dictionary: &Dictionary<'_>) -> Result<Self, Failure> {
+    fn read(lines: &mut Lines<'_>, dictionary: &Dictionary<'_>) -> Result<Self, Failure> {
         let mut head = Self {
             delimiter: b',',
             ..Self::default()
         };
         // the first line of words, which is the header where none names a quantity
         let mut words: Option<(u64, Vec<String>)> = None;
-        for line in 1.. {
-            let mut bytes = Vec::new();
-            let read = reader.by_ref().take(LONGEST).read_until(b'\n', &mut bytes);
-            read.map_err(|e| unreadable(Path::new(path), e))?;
-            let is_end = bytes.is_empty() || line > MOST_BEFORE;
-            if is_end && let Some((line, names)) = words.take() {
-                (head.line, head.names) = (line, names);
-                return Ok(head);
-            }
-            if is_end {
-                return Err(empty(path));
-            }
-            if let Some(what) = no_text(&bytes) {
+        while lines.next()? && lines.number <= MOST_BEFORE {
+            let line = lines.number;
+            if let Some(what) = no_text(&lines.line) {
                 let message = format!("is no table of text: {what}");
-                return Err(Failure::contents(path, Place::Itself, message).or_hint(
+                return Err(Failure::contents(lines.path, Place::Itself, message).or_hint(
                     "save it as CSV in UTF-8, one row a line; arrays end in .npy, gzipped tables in .gz",
                 ));
             }
-            let utf_8 = std::str::from_utf8(&bytes).ok().map(str::to_owned);
+            let utf_8 = std::str::from_utf8(&lines.line).ok().map(str::to_owned);
             head.is_latin_1 = utf_8.is_none();
-            let text = utf_8.unwrap_or_else(|| bytes.iter().map(|b| char::from(*b)).collect());
+            let latin_1 = || lines.line.iter().map(|b| char::from(*b)).collect();
+            let text: String = utf_8.unwrap_or_else(latin_1);
             let text = text.trim_start_matches('\u{feff}').trim();
             if let Some(comment) = text.strip_prefix("//") {
                 head.is_xsens = true;
                 head.rate_hz = head.rate_hz.or_else(|| rate_in(comment));
                 continue;
             }
-            if text.is_empty()
-                || text
-                    .get(..4)
-                    .is_some_and(|t| t.eq_ignore_ascii_case("sep="))
-            {
+            let start = text.get(..4).unwrap_or_default();
+            if text.is_empty() || start.eq_ignore_ascii_case("sep=") {
                 continue;
             }
             let inside = text.trim_start_matches(['#', '%']).trim();
             let delimiter = delimiter_of(inside, dictionary);
-            let cells = split(inside, delimiter);
+            let cell = |cell: &Cow<'_, [u8]>| String::from_utf8_lossy(cell).trim().to_owned();
+            let mut cells: Vec<String> = split(inside.as_bytes(), delimiter)
+                .iter()
+                .map(cell)
+                .collect();
+            cells.truncate(
+                cells
+                    .iter()
+                    .rposition(|cell| !cell.is_empty())
+                    .map_or(0, |at| at + 1),
+            );
             let known = |cell: &&String| {
                 find(dictionary.quantities, cell).is_some_and(|(q, _)| q.rank.is_none())
             };
@@ -591,23 +627,17 @@ impl Head {
                     continue;
                 }
             }
-            (head.delimiter, head.line, head.before) = (delimiter, line, line);
-            if cells
-                .iter()
-                .all(|c| number(c.as_bytes(), delimiter).is_some())
-            {
-                (head.first_row, head.before) = (bytes, line - 1);
-                if let Some((line, names)) = words.take() {
-                    // what names no quantity is the header all the same: its reader says what it lacks
-                    (head.line, head.names) = (line, names);
-                    return Ok(head);
-                }
+            (head.delimiter, head.line) = (delimiter, line);
+            let is_number = |cell: &String| number(cell.as_bytes(), delimiter).is_some();
+            head.has_row = cells.iter().all(is_number);
+            if head.has_row && words.is_some() {
+                break;
+            }
+            if head.has_row {
                 head.is_bare = dictionary.names.is_none();
-                head.names = dictionary
-                    .names
-                    .map(<[String]>::to_vec)
-                    .or_else(|| layout(dictionary.bare, cells.len()))
-                    .ok_or_else(|| no_header(path, line, text, dictionary))?;
+                let names = dictionary.names.map(<[String]>::to_vec);
+                let names = names.or_else(|| layout(dictionary.bare, cells.len()));
+                head.names = names.ok_or_else(|| no_header(lines.path, line, text, dictionary))?;
                 return Ok(head);
             }
             let names = dictionary.names.map_or(cells, <[String]>::to_vec);
@@ -617,98 +647,85 @@ impl Head {
             }
             words.get_or_insert((line, names));
         }
-        unreachable!("the lines end")
+        // what names no quantity is the header all the same: its reader says what it lacks
+        (head.line, head.names) = words.ok_or_else(|| empty(lines.path))?;
+        Ok(head)
     }
 
     /// Appends the rows; what is passed over becomes a note.
     fn rows(
         &self,
         table: &mut Table,
-        reader: Reader,
+        mut lines: Lines<'_>,
         dictionary: &Dictionary<'_>,
     ) -> Result<(), Failure> {
-        let path = table.path.clone();
-        let rows = Cursor::new(self.first_row.clone()).chain(reader);
-        let rows: Box<dyn Read> = match self.delimiter {
-            b' ' => Box::new(Blanks {
-                inner: rows,
-                is_inside: false,
-            }),
-            _ => Box::new(rows),
-        };
-        let mut rows = csv::ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .delimiter(self.delimiter)
-            .buffer_capacity(BUFFER)
-            .from_reader(rows);
+        let path = lines.path;
         // of a packed file no more than what is read is known
-        let length = std::fs::metadata(&path).map_or(0, |m| m.len());
-        let cannot = |e| unreadable(Path::new(&path), of_csv(e));
-        let (mut record, mut row, mut has_units) = (csv::ByteRecord::new(), 0, false);
-        let expected = self.names.len();
-        while rows.read_byte_record(&mut record).map_err(cannot)? {
-            let line = self.before + line_of(&record, rows.position().line());
-            let found = record.len();
-            let first = record.get(0).unwrap_or_default().trim_ascii_start();
+        let length = std::fs::metadata(path).map_or(0, |m| m.len());
+        let (expected, mut row, mut has_units) = (self.names.len(), 0, false);
+        let mut is_there = self.has_row || lines.next()?;
+        while is_there {
+            let line = lines.number;
+            while lines.is_open() && lines.line.len() < LONGEST as usize && lines.more()? {}
+            let cells = split(&lines.line, self.delimiter);
+            let first = cells
+                .first()
+                .map_or(&[][..], |cell| cell.trim_ascii_start());
+            let is_empty = |cell: &Cow<'_, [u8]>| cell.trim_ascii().is_empty();
             if first.starts_with(b"#") || first.starts_with(b"%") {
-                let cells: Vec<&[u8]> = record.iter().collect();
-                let text = String::from_utf8_lossy(&cells.join(&self.delimiter)).into_owned();
-                let inside = text.trim_start_matches(['#', '%', ' ']);
+                let text = String::from_utf8_lossy(&lines.line);
+                let inside = text.trim_start_matches(['#', '%', ' ']).trim_end();
                 table.comments.push(inside.to_owned());
-                continue;
-            }
-            if row == 0 && !has_units && found == expected && is_words(&record) {
+            } else if cells.iter().all(is_empty) {
+            } else if row == 0 && !has_units && cells.len() == expected && is_words(&cells) {
                 has_units = true;
                 let text = format!("line {line} has words and no numbers: passed over");
                 table.assumptions.push(text);
-                continue;
-            }
-            let is_empty = |cell: &[u8]| cell.trim_ascii().is_empty();
-            let is_trailing = found == expected + 1 && record.get(expected).is_some_and(is_empty);
-            if found != expected && !is_trailing {
-                if record.iter().all(is_empty) {
-                    continue;
-                }
-                // more than one line in a row
-                if record.as_slice().contains(&b'\n') {
-                    return Err(Failure::contents(&path, line, "a quote is not closed")
+            } else if cells.len() < expected || !cells[expected..].iter().all(is_empty) {
+                let found = cells.len();
+                if lines.is_open() {
+                    return Err(Failure::contents(path, line, "a quote is not closed")
                         .or_hint("close it, or remove it"));
                 }
+                while lines.next()? && lines.line.trim_ascii().is_empty() {}
                 // a logger that lost its power within a row
-                let is_cut = found < expected && row > 0;
-                if is_cut && !rows.read_byte_record(&mut record).map_err(cannot)? {
+                if found < expected && row > 0 && lines.line.is_empty() {
                     let text = format!("line {line}, the last, is cut off: left out");
                     table.assumptions.push(text);
-                    break;
+                    return Ok(());
                 }
-                return Err(Failure::row_length(&path, line, found, expected));
+                return Err(Failure::row_length(path, line, found, expected));
+            } else {
+                if row % BETWEEN == 0 {
+                    let all = (row as u64).saturating_mul(length) / lines.bytes.max(1);
+                    table.fits(all.max((row + BETWEEN) as u64))?;
+                }
+                for column in 0..table.columns.len() {
+                    let cell = &cells[table.columns[column].place];
+                    let Some(value) = number(cell, self.delimiter) else {
+                        let value = shown(&String::from_utf8_lossy(cell.trim_ascii()), 40);
+                        let (value, reason) = (format!("\"{value}\""), "is not a number");
+                        let name = &table.columns[column].name;
+                        return Err(table.bad_cell(name, line, &value, reason, dictionary));
+                    };
+                    table.push(column, value, Some(cell), line, dictionary)?;
+                }
+                table.lines.push(line);
+                row += 1;
             }
-            if row % BETWEEN == 0 {
-                let all = (row as u64).saturating_mul(length) / rows.position().byte().max(1);
-                table.fits(all.max((row + BETWEEN) as u64))?;
-            }
-            for column in 0..table.columns.len() {
-                let cell = record.get(table.columns[column].place).unwrap_or_default();
-                let Some(value) = number(cell, self.delimiter) else {
-                    let value = shown(&String::from_utf8_lossy(cell.trim_ascii()), 40);
-                    let (value, reason) = (format!("\"{value}\""), "is not a number");
-                    let name = &table.columns[column].name;
-                    return Err(table.bad_cell(name, line, &value, reason, dictionary));
-                };
-                table.push(column, value, Some(cell), line, dictionary)?;
-            }
-            table.lines.push(line);
-            row += 1;
+            is_there = lines.next()?;
         }
         Ok(())
     }
 }
 
-/// The names of so many columns.
-fn layout(layouts: &[&[&str]], columns: usize) -> Option<Vec<String>> {
-    let found = layouts.iter().find(|names| names.len() == columns)?;
-    Some(found.iter().map(|name| (*name).to_owned()).collect())
+/// The header of so many columns.
+fn layout(headers: &[&str], columns: usize) -> Option<Vec<String>> {
+    let names = headers.iter().map(|header| header.split(' '));
+    let found = names
+        .into_iter()
+        .find(|names| names.clone().count() == columns)?;
+    Some(found.map(str::to_owned).collect())
 }
 
 fn no_header(path: &str, line: u64, text: &str, dictionary: &Dictionary<'_>) -> Failure {
@@ -741,47 +758,36 @@ fn delimiter_of(line: &str, dictionary: &Dictionary<'_>) -> u8 {
         .unwrap_or(if is_spaced { b' ' } else { b',' })
 }
 
-/// The cells of a line, quotes removed, without empty ones at the end.
-fn split(text: &str, delimiter: u8) -> Vec<String> {
-    let blanks: String;
-    let text = match delimiter {
-        b' ' => {
-            blanks = text.split_ascii_whitespace().collect::<Vec<_>>().join(" ");
-            &blanks
-        }
-        _ => text,
-    };
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .delimiter(delimiter)
-        .from_reader(text.as_bytes());
-    let record = reader
-        .records()
-        .next()
-        .and_then(Result::ok)
-        .unwrap_or_default();
-    let mut cells: Vec<String> = record.iter().map(|c| c.trim().to_owned()).collect();
-    while cells.last().is_some_and(String::is_empty) {
-        cells.pop();
+/// The cells of a line, quotes removed.
+fn split(line: &[u8], delimiter: u8) -> Vec<Cow<'_, [u8]>> {
+    let is_end = |b: &u8| b"\r\n".contains(b);
+    let line = &line[..line.iter().rposition(|b| !is_end(b)).map_or(0, |at| at + 1)];
+    if line.contains(&b'"') {
+        let mut reader = csv::ReaderBuilder::new();
+        let mut reader = reader
+            .has_headers(false)
+            .delimiter(delimiter)
+            .from_reader(line);
+        let record = reader
+            .byte_records()
+            .next()
+            .and_then(Result::ok)
+            .unwrap_or_default();
+        return record.iter().map(|cell| cell.to_vec().into()).collect();
     }
-    cells
+    let is_between = |b: &u8| *b == delimiter || delimiter == b' ' && *b == b'\t';
+    let cells = line.split(is_between);
+    let cells = cells.filter(|cell| delimiter != b' ' || !cell.is_empty());
+    cells.map(Cow::Borrowed).collect()
 }
 
 /// True if a row has units, say, below the names: no cell begins as a number does.
-fn is_words(record: &csv::ByteRecord) -> bool {
-    let is_word = |cell: &[u8]| {
+fn is_words(cells: &[Cow<'_, [u8]>]) -> bool {
+    let is_word = |cell: &Cow<'_, [u8]>| {
         let first = cell.trim_ascii().first();
         number(cell, b',').is_none() && first.is_none_or(|b| !b"+-.0123456789".contains(b))
     };
-    record.iter().all(is_word) && record.iter().any(|cell| !cell.trim_ascii().is_empty())
-}
-
-/// Error of the system, with its kind.
-fn of_csv(e: csv::Error) -> std::io::Error {
-    match e.into_kind() {
-        csv::ErrorKind::Io(source) => source,
-        other => std::io::Error::other(format!("{other:?}")),
-    }
+    cells.iter().all(is_word)
 }
 
 /// The reason why a line is no text, if there is one.
@@ -801,19 +807,6 @@ fn no_text(bytes: &[u8]) -> Option<&'static str> {
     has_lone.then_some("its lines end in a carriage return only")
 }
 
-/// Line of a record that ended before line `next`. (The record's own position is that before any empty
-/// lines.)
-fn line_of(record: &csv::ByteRecord, next: u64) -> u64 {
-    let start = record.position().map_or(0, csv::Position::line);
-    // behind a last row without a line end the reader stands in the row itself
-    if next <= start + 1 {
-        return start;
-    }
-    let inside = record.as_slice().iter().filter(|b| **b == b'\n').count() as u64;
-    // an open quote has the end of the last line in it
-    next.saturating_sub(1 + inside).max(start)
-}
-
 /// A number; with a decimal comma where semicolons separate.
 #[inline]
 pub(super) fn number(cell: &[u8], delimiter: u8) -> Option<f64> {
@@ -823,46 +816,13 @@ pub(super) fn number(cell: &[u8], delimiter: u8) -> Option<f64> {
     parsed.or_else(|| if delimiter == b';' { comma() } else { None })
 }
 
-/// Bytes with one blank for several blanks and tabs, and none at the beginning of a line.
-struct Blanks<R> {
-    inner: R,
-    /// True if a blank may follow.
-    is_inside: bool,
-}
-
-impl<R: Read> Read for Blanks<R> {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        loop {
-            let count = self.inner.read(buffer)?;
-            let mut kept = 0;
-            for i in 0..count {
-                let byte = if buffer[i] == b'\t' { b' ' } else { buffer[i] };
-                if byte != b' ' || self.is_inside {
-                    buffer[kept] = byte;
-                    kept += 1;
-                }
-                self.is_inside = !b" \r\n".contains(&byte);
-            }
-            // blanks alone are not the end
-            if kept > 0 || count == 0 {
-                return Ok(kept);
-            }
-        }
-    }
-}
-
 // Tables that are no text: arrays of NumPy, Parquet, directories of KITTI, logs.
 
 /// Columns by their names.
 type Columns = Vec<(String, Vec<f64>)>;
 
-/// The table of such columns; the rows stand in these lines, or are counted from 1.
-pub(crate) fn of_columns(
-    path: &str,
-    columns: Columns,
-    lines: Vec<u64>,
-    dictionary: &Dictionary<'_>,
-) -> Result<Table, Failure> {
+/// The table of such columns.
+fn of_columns(path: &str, columns: Columns, dictionary: &Dictionary<'_>) -> Result<Table, Failure> {
     let names: Vec<String> = match dictionary.names {
         Some(names) if names.len() != columns.len() => {
             return Err(Failure::row_length(path, 1, columns.len(), names.len()));
@@ -871,7 +831,6 @@ pub(crate) fn of_columns(
         None => columns.iter().map(|(name, _)| name.clone()).collect(),
     };
     let mut table = Table::new(path, 0, &names, dictionary, false)?;
-    table.lines = lines;
     table.fits(columns.first().map_or(0, |(_, values)| values.len() as u64))?;
     for column in 0..table.columns.len() {
         let (_, values) = &columns[table.columns[column].place];

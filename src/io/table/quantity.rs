@@ -15,40 +15,35 @@
 use nav_sim_navigation::earth::MAX_LATITUDE_DEG;
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 
-/// Endings of names, each with the SI units in one of that.
-pub(crate) type Units = &'static [(&'static [&'static str], f64)];
+/// Endings of names, between blanks, each with the SI units in one of that.
+pub(crate) type Units = &'static [(&'static str, f64)];
 
 pub(crate) const NONE: Units = &[];
 pub(crate) const TIME: Units = &[
-    (&["s", "sec", "secs", "second", "seconds"], 1.0),
-    (&["ms", "msec", "millis", "milliseconds"], 1e-3),
-    (&["us", "usec", "micros", "microseconds"], 1e-6),
-    (&["ns", "nsec", "nanos", "nanoseconds"], 1e-9),
+    ("s sec secs second seconds", 1.0),
+    ("ms msec millis milliseconds", 1e-3),
+    ("us usec micros microseconds", 1e-6),
+    ("ns nsec nanos nanoseconds", 1e-9),
 ];
 pub(crate) const ACCELERATION: Units = &[
-    (
-        &[
-            "m_s2", "m_s_2", "m_s_s", "mps2", "ms2", "ms_2", "m_sec2", "m_sec_2",
-        ],
-        1.0,
-    ),
-    (&["g"], STANDARD_GRAVITY),
-    (&["mg"], 1e-3 * STANDARD_GRAVITY),
-    (&["ug"], 1e-6 * STANDARD_GRAVITY),
+    ("m_s2 m_s_2 m_s_s mps2 ms2 ms_2 m_sec2 m_sec_2", 1.0),
+    ("g", STANDARD_GRAVITY),
+    ("mg", 1e-3 * STANDARD_GRAVITY),
+    ("ug", 1e-6 * STANDARD_GRAVITY),
 ];
 pub(crate) const ANGULAR_RATE: Units = &[
-    (&["rad_s", "rad_s_1", "radps", "rads", "rad_sec"], 1.0),
-    (&["mrad_s", "mradps"], 1e-3),
-    (&["deg_s", "deg_s_1", "degps", "dps", "deg_sec"], DEG),
-    (&["mdeg_s", "mdps"], 1e-3 * DEG),
-    (&["deg_h", "deg_h_1", "deg_hr", "dph"], DEG_PER_HOUR),
+    ("rad_s rad_s_1 radps rads rad_sec", 1.0),
+    ("mrad_s mradps", 1e-3),
+    ("deg_s deg_s_1 degps dps deg_sec", DEG),
+    ("mdeg_s mdps", 1e-3 * DEG),
+    ("deg_h deg_h_1 deg_hr dph", DEG_PER_HOUR),
 ];
-pub(crate) const ANGLE: Units = &[(&["deg"], DEG), (&["rad"], 1.0)];
-const LENGTH: Units = &[(&["m"], 1.0)];
+pub(crate) const ANGLE: Units = &[("deg", DEG), ("rad", 1.0)];
+const LENGTH: Units = &[("m", 1.0)];
 pub(crate) const SPEED: Units = &[
-    (&["m_s", "mps", "m_s_1", "m_sec"], 1.0),
-    (&["km_h", "kmh", "kph", "kmph", "km_hr"], 1.0 / 3.6),
-    (&["mph", "mi_h"], 0.447_04),
+    ("m_s mps m_s_1 m_sec", 1.0),
+    ("km_h kmh kph kmph km_hr", 1.0 / 3.6),
+    ("mph mi_h", 0.447_04),
 ];
 
 /// Meaning of a name without a unit.
@@ -75,8 +70,8 @@ pub(crate) const LONGITUDE: Range = (-180.0, 360.0, "is not a longitude");
 #[derive(Debug)]
 pub(crate) struct Quantity {
     pub(crate) name: &'static str,
-    /// Names without their unit and axis.
-    pub(crate) stems: &'static [&'static str],
+    /// Names without their unit and axis, between blanks.
+    pub(crate) stems: &'static str,
     /// Last part of the name before the unit, with or without an underscore: x, y, z.
     pub(crate) axis: &'static str,
     pub(crate) units: Units,
@@ -94,7 +89,7 @@ pub(crate) struct Quantity {
 impl Quantity {
     pub(crate) const fn new(
         name: &'static str,
-        stems: &'static [&'static str],
+        stems: &'static str,
         units: Units,
         bare: Bare,
     ) -> Self {
@@ -112,27 +107,27 @@ impl Quantity {
     }
 
     /// An angle: degrees where the name does not say it.
-    pub(crate) const fn angle(name: &'static str, stems: &'static [&'static str]) -> Self {
+    pub(crate) const fn angle(name: &'static str, stems: &'static str) -> Self {
         Self::new(name, stems, ANGLE, Bare::Is(DEG))
     }
 
     /// A length (m).
-    pub(crate) const fn length(name: &'static str, stems: &'static [&'static str]) -> Self {
+    pub(crate) const fn length(name: &'static str, stems: &'static str) -> Self {
         Self::new(name, stems, LENGTH, Bare::Is(1.0))
     }
 
     /// A speed (m/s).
-    pub(crate) const fn speed(name: &'static str, stems: &'static [&'static str]) -> Self {
+    pub(crate) const fn speed(name: &'static str, stems: &'static str) -> Self {
         Self::new(name, stems, SPEED, Bare::Is(1.0))
     }
 
     /// A number.
-    pub(crate) const fn number(name: &'static str, stems: &'static [&'static str]) -> Self {
+    pub(crate) const fn number(name: &'static str, stems: &'static str) -> Self {
         Self::new(name, stems, NONE, Bare::Is(1.0))
     }
 
     /// The time (s).
-    pub(crate) const fn time(stems: &'static [&'static str]) -> Self {
+    pub(crate) const fn time(stems: &'static str) -> Self {
         Self {
             rank: Some(0),
             ..Self::new("t_s", stems, TIME, Bare::Is(1.0))
@@ -165,7 +160,7 @@ impl Quantity {
     }
 
     /// The same in the other direction.
-    pub(crate) const fn reversed(self, stems: &'static [&'static str]) -> Self {
+    pub(crate) const fn reversed(self, stems: &'static str) -> Self {
         Self {
             sign: -1.0,
             stems,
@@ -178,7 +173,8 @@ impl Quantity {
             return false;
         };
         let is_axis = !self.axis.is_empty();
-        self.stems.contains(&stem) || is_axis && self.stems.contains(&stem.trim_end_matches('_'))
+        let has = |stem: &str| self.stems.split(' ').any(|own| own == stem);
+        has(stem) || is_axis && has(stem.trim_end_matches('_'))
     }
 
     /// The factor of a column of this name, of none without a unit; nothing of another quantity.
@@ -186,7 +182,7 @@ impl Quantity {
         let endings = self
             .units
             .iter()
-            .flat_map(|(names, factor)| names.iter().map(move |name| (*name, *factor)));
+            .flat_map(|(names, factor)| names.split(' ').map(move |name| (name, *factor)));
         let stem = |ending: &str| plain.strip_suffix(ending)?.strip_suffix('_');
         let mut with_unit =
             endings.filter(|(ending, _)| stem(ending).is_some_and(|s| self.has_stem(s)));
@@ -200,14 +196,14 @@ impl Quantity {
 
     /// True if a name is that of an axis and something else, such as `accel_x_ft_s2`.
     pub(super) fn is_in_unknown_unit(&self, plain: &str) -> bool {
-        let rest_of = |stem: &&str| {
+        let rest_of = |stem: &str| {
             let rest = plain.strip_prefix(stem)?.trim_start_matches('_');
             let unit = rest.strip_prefix(self.axis)?.strip_prefix('_')?;
             // `a_x_…` may be anything; `ax_…` is an accelerometer
             let is_clear = stem.len() > 1 || !plain[1..].starts_with('_');
             (is_clear && !unit.is_empty()).then_some(())
         };
-        !self.axis.is_empty() && self.stems.iter().any(|stem| rest_of(stem).is_some())
+        !self.axis.is_empty() && self.stems.split(' ').any(|stem| rest_of(stem).is_some())
     }
 }
 

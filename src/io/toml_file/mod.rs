@@ -1,27 +1,25 @@
 //! TOML files, read as a type describes them: what is refused is named by file, line, key and value.
 //!
-//! Keys have paths, `outage[2].end_s`; entries of lists of tables are counted from 1.
+//! The JSON schema of the type, which editors have too, is what a file is checked against: its keys, kinds of values,
+//! words and bounds. Keys have paths, `outage[2].end_s`; entries of lists are counted from 1.
 
+use super::model_file::HINT;
 use super::suggest::nearest;
 use super::table::shown;
 use super::{Failure, Place, source};
+use nav_sim_navigation::sensors::check_number;
 use nav_sim_signal::units::SettingError;
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer, StrDeserializer};
-use serde::de::{
-    DeserializeOwned, DeserializeSeed, Deserializer, Error as DeserializeError, Expected,
-    IgnoredAny, IntoDeserializer, MapAccess, SeqAccess, Unexpected, Visitor,
-};
-use serde::{Deserialize, forward_to_deserialize_any};
-use std::borrow::Cow;
-use std::fmt;
+use schemars::{JsonSchema, schema_for};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value as Schema;
 use std::fmt::Display;
 use std::io::ErrorKind;
-use std::marker::PhantomData;
+use std::iter::once;
 use std::ops::Range;
 use std::path::Path;
-use std::slice;
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
+use toml::{Table, Value};
 
 /// A key with the path of its table before it.
 fn dotted(path: &str, key: &str) -> String {
@@ -83,14 +81,24 @@ impl Source {
         &self.path
     }
 
+    /// The file by the names of its keys.
+    ///
+    /// # Errors
+    /// Line of what is not TOML.
+    pub(crate) fn table(&self) -> Result<Table, Failure> {
+        self.text.parse().map_err(|e| self.syntax(&e))
+    }
+
     /// The file as its description has it.
     ///
     /// # Errors
     /// Line of what is not TOML; line, key and value of what is refused, a mistyped key with the nearest legal one.
-    pub(crate) fn get<T: DeserializeOwned>(&self) -> Result<T, Failure> {
-        let table = DeTable::parse(&self.text).map_err(|e| self.syntax(&e))?;
-        let value = DeValue::Table(table.into_inner());
-        T::deserialize(Node::new(&value, "")).map_err(|refusal| self.explained(refusal))
+    pub(crate) fn get<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, Failure> {
+        let value = Value::Table(self.table()?);
+        let (source, root) = (self, &schema_for!(T).to_value());
+        Checker { source, root }.check(root, &value, "")?;
+        let read = value.try_into();
+        read.map_err(|e: toml::de::Error| self.at(Place::Within, e.message()))
     }
 
     fn syntax(&self, e: &toml::de::Error) -> Failure {
@@ -198,410 +206,249 @@ impl Source {
             .or_hint(advice)
     }
 
-    /// The refusal of a value or key by its type.
-    fn explained(&self, refusal: Refusal) -> Failure {
-        let key = refusal.path.unwrap_or_default();
-        match refusal.what {
-            What::Unknown(field, legal) => {
-                self.unknown(&dotted(&key, &field), legal.iter().copied())
-            }
-            What::Missing(field) => self.missing(&key, &[field]),
-            What::Variant(word, legal) => {
-                let meant = nearest(&word, legal.iter().copied());
-                let words: Vec<String> = legal.iter().map(|w| format!("\"{w}\"")).collect();
-                self.refused(&key, format!("is not one of {}", words.join(", ")))
-                    .or_hint_if(meant.map(|meant| format!("did you mean \"{meant}\"?")))
-            }
-            What::NoList => {
-                let name = key.rsplit('.').next().unwrap_or_default();
-                let advice = format!("there may be several: write [[{name}]], in double brackets");
-                self.refused(&key, "is not a list").or_hint(advice)
-            }
-            What::Reason(reason) => self.refused(&key, reason),
-        }
+    /// The refusal of a word that is none of these.
+    fn no_word(&self, key: &str, word: &str, words: &[&str]) -> Failure {
+        let meant = nearest(word, words.iter().copied());
+        let words: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).collect();
+        self.refused(key, format!("is not one of {}", words.join(", ")))
+            .or_hint_if(meant.map(|meant| format!("did you mean \"{meant}\"?")))
     }
 }
 
 #[cfg(test)]
 mod tests;
 
-// A value of a TOML file as serde reads it. What is refused comes with the path of its key.
-//
-// A word chooses among the kinds of a table (`type = "AR1"`), in an enum without attributes of serde for it; the keys that
-// all kinds have stand in a struct around it, whose field has the name of the word.
+// A file against the schema of its type.
 
-/// Words that choose among the kinds of a table.
-static TAGS: [&str; 4] = ["type", "operation", "kind", "distribution"];
-/// Fields that are no keys: a struct of the keys that are none of the others.
-const REST: [&str; 1] = ["sigma"];
-
-/// What is wrong, and the path of the value or of its table.
-#[derive(Debug)]
-struct Refusal {
-    path: Option<String>,
-    what: What,
+struct Checker<'a> {
+    source: &'a Source,
+    root: &'a Schema,
 }
 
-#[derive(Debug)]
-enum What {
-    Unknown(String, Vec<&'static str>),
-    Missing(&'static str),
-    Variant(String, &'static [&'static str]),
-    NoList,
-    /// In words that follow the value.
-    Reason(String),
+/// Words that a schema lists.
+fn words(schema: &Schema) -> impl Iterator<Item = &str> {
+    let listed = schema["enum"].as_array().into_iter().flatten();
+    once(&schema["const"])
+        .chain(listed)
+        .filter_map(Schema::as_str)
 }
 
-impl From<What> for Refusal {
-    fn from(what: What) -> Self {
-        Self { path: None, what }
+impl<'a> Checker<'a> {
+    /// The schema that one refers to.
+    fn resolved(&self, schema: &'a Schema) -> &'a Schema {
+        let of = |place: &str| self.root.pointer(&place[1..]);
+        let place = schema["$ref"].as_str();
+        place.map_or(schema, |place| of(place).expect("a schema is whole"))
     }
-}
 
-impl fmt::Display for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{self:?}")
+    /// Alternatives, of which a value meets one.
+    fn kinds(&self, schema: &'a Schema) -> Vec<&'a Schema> {
+        let lists = ["oneOf", "anyOf"].map(|name| schema[name].as_array());
+        let kinds = lists.into_iter().flatten().flatten();
+        kinds.map(|kind| self.resolved(kind)).collect()
     }
-}
 
-impl std::error::Error for Refusal {}
-
-impl DeserializeError for Refusal {
-    fn custom<T: fmt::Display>(message: T) -> Self {
-        let message = message.to_string();
-        let words = match message.split(' ').next() {
-            Some("is" | "has" | "lists" | "needs" | "of") => message,
-            Some("not") => format!("is {message}"),
-            Some("expected") => message.replacen("expected", "is not", 1),
-            _ => format!("is refused: {message}"),
+    /// True if a value is of the type of a schema. A number may stand for a word.
+    fn admits(&self, schema: &'a Schema, value: &Value) -> bool {
+        let is = |name: &str| schema["type"].to_string().contains(name);
+        let is_own = match value {
+            Value::Integer(_) => {
+                is("number") || is("integer") || is("string") && words(schema).next().is_some()
+            }
+            Value::Float(_) => is("number"),
+            Value::String(_) | Value::Datetime(_) => is("string"),
+            Value::Boolean(_) => is("boolean"),
+            Value::Array(_) => is("array"),
+            Value::Table(_) => is("object"),
         };
-        What::Reason(words).into()
+        let kinds = self.kinds(schema);
+        (is_own || schema["type"].is_null())
+            && (kinds.is_empty() || kinds.iter().any(|kind| self.admits(kind, value)))
     }
 
-    fn invalid_type(_: Unexpected<'_>, expected: &dyn Expected) -> Self {
-        let expected = expected.to_string();
-        let words = match expected.as_str() {
-            "f64" => "a number",
-            "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number ≥ 0",
-            "a nonzero u64" => "a whole number ≥ 1",
-            "a string" => "a text in quotes",
-            "a sequence" => "a list",
-            "a boolean" => "true or false",
-            "path string" => "a path",
-            other if other.starts_with("struct") => "a table",
-            other => other,
-        };
-        What::Reason(format!("is not {words}")).into()
-    }
-
-    fn invalid_value(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
-        Self::invalid_type(found, expected)
-    }
-
-    fn invalid_length(_: usize, expected: &dyn Expected) -> Self {
-        What::Reason(format!("is not {expected}")).into()
-    }
-
-    fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
-        What::Variant(variant.to_owned(), expected).into()
-    }
-
-    fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
-        What::Unknown(field.to_owned(), expected.to_vec()).into()
-    }
-
-    fn missing_field(field: &'static str) -> Self {
-        What::Missing(field).into()
-    }
-}
-
-impl From<&str> for Refusal {
-    fn from(reason: &str) -> Self {
-        What::Reason(reason.to_owned()).into()
-    }
-}
-
-/// A value and its path; of a table, without the keys that are passed.
-#[derive(Clone)]
-struct Node<'a> {
-    value: &'a DeValue<'a>,
-    path: String,
-    passed: &'static [&'static str],
-}
-
-impl<'a> Node<'a> {
-    fn new(value: &'a DeValue<'a>, path: impl Into<String>) -> Self {
-        Self {
-            value,
-            path: path.into(),
-            passed: &[],
+    /// The type of a schema in words.
+    fn expected(&self, schema: &'a Schema) -> &'static str {
+        let own = &schema["type"];
+        match own.as_str().or(own[0].as_str()) {
+            Some("number") => "a number",
+            Some("integer") => "a whole number",
+            Some("string") => "a text in quotes",
+            Some("boolean") => "true or false",
+            Some("array") => "a list",
+            Some(_) => "a table",
+            None => self
+                .kinds(schema)
+                .first()
+                .map_or("", |kind| self.expected(kind)),
         }
     }
 
-    /// Keys of a table.
-    fn keys(&self, table: &'a DeTable<'a>) -> impl Iterator<Item = (&'a str, Self)> {
-        table.iter().filter_map(|(key, value)| {
-            let key = key.get_ref().as_ref();
-            let node = Self::new(value.get_ref(), dotted(&self.path, key));
-            (!self.passed.contains(&key)).then_some((key, node))
-        })
-    }
-
-    /// Reads it; a refusal that has no path yet gets this one.
-    fn blamed<T>(self, read: impl FnOnce(Self) -> Result<T, Refusal>) -> Result<T, Refusal> {
-        let (path, passed) = (self.path.clone(), self.passed);
-        read(self).map_err(|mut e| {
-            if let (What::Unknown(_, legal), None) = (&mut e.what, &e.path) {
-                legal.extend(passed);
-            }
-            e.path.get_or_insert(path);
-            e
-        })
-    }
-}
-
-impl<'de> Deserializer<'de> for Node<'_> {
-    type Error = Refusal;
-
-    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        const TOO_LARGE: &str = "is too large a number";
-        match self.value {
-            DeValue::String(text) => visitor.visit_str(text),
-            DeValue::Integer(number) => {
-                let parsed = i64::from_str_radix(number.as_str(), number.radix());
-                visitor.visit_i64(parsed.map_err(|_| TOO_LARGE)?)
-            }
-            DeValue::Float(number) => {
-                visitor.visit_f64(number.as_str().parse().map_err(|_| TOO_LARGE)?)
-            }
-            DeValue::Boolean(is) => visitor.visit_bool(*is),
-            DeValue::Datetime(time) => visitor.visit_string(time.to_string()),
-            DeValue::Array(items) => {
-                let entries = (1_usize..).zip(items.iter());
-                let node = |i, item| Node::new(item, format!("{}[{i}]", self.path));
-                visitor.visit_seq(Entries::new(
-                    entries.map(|(i, item)| ("", node(i, item.get_ref()))),
-                ))
-            }
-            DeValue::Table(table) => visitor.visit_map(Entries::new(self.keys(table))),
+    /// The kind of a table, told by the word or the key that it has and others have not.
+    fn kind_of_table(
+        &self,
+        (schema, kinds): (&Schema, &[&'a Schema]),
+        table: &Table,
+        path: &str,
+    ) -> Result<&'a Schema, Failure> {
+        fn key_of(kind: &Schema) -> Option<&str> {
+            kind["required"][0].as_str()
         }
-    }
-
-    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        visitor.visit_some(self)
-    }
-
-    fn deserialize_newtype_struct<V: Visitor<'de>>(
-        self,
-        _: &'static str,
-        visitor: V,
-    ) -> Result<V::Value, Refusal> {
-        visitor.visit_newtype_struct(self)
-    }
-
-    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
-        match self.value {
-            DeValue::Table(_) => Err(What::NoList.into()),
-            _ => self.deserialize_any(visitor),
+        let mut properties = kinds[0]["properties"].as_object().into_iter().flatten();
+        if let Some((tag, _)) = properties.find(|(_, schema)| schema["const"].is_string()) {
+            let words = kinds
+                .iter()
+                .map(|kind| kind["properties"][tag]["const"].as_str());
+            let missing = || self.source.missing(path, &[tag]);
+            let word = table.get(tag).ok_or_else(missing)?.as_str();
+            let found = kinds
+                .iter()
+                .zip(words.clone())
+                .find(|(_, own)| *own == word);
+            let all: Vec<&str> = words.flatten().collect();
+            let key = dotted(path, tag);
+            let no_word = || self.source.no_word(&key, word.unwrap_or_default(), &all);
+            return found.map(|(kind, _)| *kind).ok_or_else(no_word);
         }
-    }
-
-    fn deserialize_struct<V: Visitor<'de>>(
-        self,
-        _: &'static str,
-        fields: &'static [&'static str],
-        visitor: V,
-    ) -> Result<V::Value, Refusal> {
-        let is_rest = |field: &str| REST.contains(&field);
-        let tag = fields
-            .iter()
-            .find(|field| TAGS.contains(field) || is_rest(field));
-        match (self.value, tag) {
-            (DeValue::Array(_), _) => Err("is not a table".into()),
-            // the kind that the word chooses has the keys that are none of these fields
-            (DeValue::Table(table), Some(tag)) if table.contains_key(*tag) || is_rest(tag) => {
-                let own = self.keys(table);
-                let own = own.filter(|(key, _)| key != tag && fields.contains(key));
-                let kind = Node {
-                    passed: fields,
-                    ..self.clone()
+        let is_given = |kind: &&&Schema| key_of(kind).is_none_or(|key| table.contains_key(key));
+        let mut given = kinds.iter().filter(is_given);
+        match (given.next(), given.next()) {
+            (None, _) => {
+                let keys: Vec<&str> = kinds.iter().filter_map(|kind| key_of(kind)).collect();
+                let is_slip = |key: &&String| {
+                    schema["properties"][*key].is_null() && nearest(key, keys.clone()).is_some()
                 };
-                visitor.visit_map(Entries::new(own.chain([(*tag, kind)])))
+                Err(match table.keys().find(is_slip) {
+                    Some(key) => self
+                        .source
+                        .unknown(&dotted(path, key), keys.iter().copied()),
+                    None => self.source.missing(path, &keys),
+                })
             }
-            _ => self.deserialize_any(visitor),
-        }
-    }
-
-    fn deserialize_enum<V: Visitor<'de>>(
-        mut self,
-        _: &'static str,
-        _: &'static [&'static str],
-        visitor: V,
-    ) -> Result<V::Value, Refusal> {
-        let table = match self.value {
-            DeValue::Table(table) => table,
-            DeValue::String(word) => {
-                return visitor.visit_enum(word.as_ref().into_deserializer());
-            }
-            _ => return Err("is not a table".into()),
-        };
-        let tag = TAGS.iter().find(|tag| table.contains_key(**tag));
-        let tag = tag.ok_or(What::Missing(TAGS[0]))?;
-        if self.passed.is_empty() {
-            self.passed = slice::from_ref(tag);
-        }
-        Node::new(table[*tag].get_ref(), dotted(&self.path, tag)).blamed(|word| {
-            let word = word.value.as_str().ok_or("is not a text in quotes")?;
-            let kind = Entries::new([(word, self)].into_iter());
-            visitor.visit_enum(MapAccessDeserializer::new(kind))
-        })
-    }
-
-    forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct tuple
-        tuple_struct map identifier ignored_any
-    }
-}
-
-/// Keys of a table with their values, or entries of a list.
-struct Entries<'a, I> {
-    rest: I,
-    value: Option<Node<'a>>,
-}
-
-impl<'a, I: Iterator<Item = (&'a str, Node<'a>)>> Entries<'a, I> {
-    const fn new(rest: I) -> Self {
-        Self { rest, value: None }
-    }
-}
-
-impl<'de, 'a, I: Iterator<Item = (&'a str, Node<'a>)>> MapAccess<'de> for Entries<'a, I> {
-    type Error = Refusal;
-
-    fn next_key_seed<K: DeserializeSeed<'de>>(
-        &mut self,
-        seed: K,
-    ) -> Result<Option<K::Value>, Refusal> {
-        let next = self.rest.next().map(|(key, value)| {
-            self.value = Some(value);
-            seed.deserialize(StrDeserializer::new(key))
-        });
-        next.transpose()
-    }
-
-    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Refusal> {
-        let value = self.value.take().ok_or("has no value")?;
-        value.blamed(|value| seed.deserialize(value))
-    }
-}
-
-impl<'de, 'a, I: Iterator<Item = (&'a str, Node<'a>)>> SeqAccess<'de> for Entries<'a, I> {
-    type Error = Refusal;
-
-    fn next_element_seed<T: DeserializeSeed<'de>>(
-        &mut self,
-        seed: T,
-    ) -> Result<Option<T::Value>, Refusal> {
-        let next = self.rest.next();
-        let read = |(_, value): (_, Node<'a>)| value.blamed(|value| seed.deserialize(value));
-        next.map(read).transpose()
-    }
-}
-
-// Numbers with bounds, and one value or a list of them.
-
-/// A number between two whole ones, or one of them unless it is open; `i64::MIN` and `i64::MAX` are no ends.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
-#[serde(try_from = "f64")]
-pub(crate) struct Between<const LOW: i64, const HIGH: i64, const OPEN: bool>(pub(crate) f64);
-
-/// A number that is neither nan nor inf.
-pub(crate) type Finite = Between<{ i64::MIN }, { i64::MAX }, false>;
-/// A part of a whole.
-pub(crate) type Share = Between<0, 1, false>;
-pub(crate) type NonNegative = Between<0, { i64::MAX }, false>;
-pub(crate) type Positive = Between<0, { i64::MAX }, true>;
-/// Coefficients of a stationary AR(1), as [`Process::ar1`](nav_sim_signal::noise::Process::ar1) takes them.
-pub(crate) type Stationary = Between<-1, 1, true>;
-
-impl<const LOW: i64, const HIGH: i64, const OPEN: bool> TryFrom<f64> for Between<LOW, HIGH, OPEN> {
-    type Error = String;
-
-    fn try_from(value: f64) -> Result<Self, Self::Error> {
-        let end = |end: i64| match end {
-            i64::MIN => f64::MIN,
-            i64::MAX => f64::MAX,
-            end => end as f64,
-        };
-        let (low, high) = (end(LOW), end(HIGH));
-        let is_inside = match OPEN {
-            true => low < value && value < high,
-            false => (low..=high).contains(&value),
-        };
-        match (LOW, HIGH, OPEN) {
-            _ if is_inside => Ok(Self(value)),
-            (i64::MIN, ..) => Err("is not a finite number such as 1.5e-4".to_owned()),
-            (_, i64::MAX, true) => Err(format!("is not a finite number > {LOW}")),
-            (_, i64::MAX, false) => Err(format!("is not a finite number ≥ {LOW}")),
-            _ => {
-                let ends = if OPEN { " (exclusive)" } else { "" };
-                Err(format!("is not between {LOW} and {HIGH}{ends}").replace('-', "−"))
+            (Some(only), None) => Ok(only),
+            (Some(first), Some(second)) => {
+                let [first, second] = [first, second].map(|kind| key_of(kind).unwrap_or_default());
+                let key = dotted(path, second);
+                let refusal = self.source.refused(&key, format!("stands beside {first}"));
+                Err(refusal.or_hint("give one of them"))
             }
         }
     }
-}
 
-impl<const LOW: i64, const HIGH: i64, const OPEN: bool> From<Between<LOW, HIGH, OPEN>> for f64 {
-    fn from(value: Between<LOW, HIGH, OPEN>) -> Self {
-        value.0
-    }
-}
-
-impl<const LOW: i64, const HIGH: i64, const OPEN: bool> JsonSchema for Between<LOW, HIGH, OPEN> {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "Between".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        let [least, most] = match OPEN {
-            true => ["exclusiveMinimum", "exclusiveMaximum"],
-            false => ["minimum", "maximum"],
+    /// The schemas that a value has to meet: its own and, of alternatives, the one that it is of.
+    fn parts(
+        &self,
+        schema: &'a Schema,
+        value: &Value,
+        path: &str,
+    ) -> Result<Vec<&'a Schema>, Failure> {
+        let schema = self.resolved(schema);
+        if !self.admits(schema, value) {
+            let expected = self.expected(schema);
+            let name = path.rsplit('.').next().unwrap_or_default();
+            let several = format!("there may be several: write [[{name}]], in double brackets");
+            let is_one = expected == "a list" && value.is_table();
+            let refusal = self.source.refused(path, format!("is not {expected}"));
+            return Err(refusal.or_hint_if(is_one.then_some(several)));
+        }
+        let mut kinds = self.kinds(schema);
+        kinds.retain(|kind| self.admits(kind, value));
+        let listed: Vec<&str> = once(schema).chain(kinds.clone()).flat_map(words).collect();
+        let kind = match value {
+            _ if !listed.is_empty() => {
+                let text = value
+                    .as_str()
+                    .map_or_else(|| value.to_string(), str::to_owned);
+                return match listed.contains(&text.as_str()) {
+                    true => Ok(vec![schema]),
+                    false => Err(self.source.no_word(path, &text, &listed)),
+                };
+            }
+            Value::Table(table) if !kinds.is_empty() => {
+                Some(self.kind_of_table((schema, &kinds), table, path)?)
+            }
+            _ => kinds.first().copied(),
         };
-        let mut schema = json_schema!({ "type": "number" });
-        for (name, end) in [(least, LOW), (most, HIGH)] {
-            if end > i64::MIN && end < i64::MAX {
-                schema.insert(name.to_owned(), end.into());
+        let mut parts = vec![schema];
+        if let Some(kind) = kind {
+            parts.extend(self.parts(kind, value, path)?);
+        }
+        Ok(parts)
+    }
+
+    fn check(&self, schema: &'a Schema, value: &Value, path: &str) -> Result<(), Failure> {
+        let parts = self.parts(schema, value, path)?;
+        let schema = parts[parts.len() - 1];
+        match value {
+            Value::Table(table) => self.check_table(&parts, table, path),
+            Value::Array(list) => {
+                let [least, most] = ["minItems", "maxItems"].map(|name| schema[name].as_u64());
+                let reason = match least {
+                    Some(n) if most.is_some() && n != list.len() as u64 => {
+                        format!("is not a list of {n}")
+                    }
+                    Some(_) if list.is_empty() => "lists none".to_owned(),
+                    _ => {
+                        let mut entries = (1..).zip(list);
+                        return entries.try_for_each(|(i, entry)| {
+                            self.check(&schema["items"], entry, &format!("{path}[{i}]"))
+                        });
+                    }
+                };
+                Err(self.source.refused(path, reason))
+            }
+            Value::Integer(_) | Value::Float(_) if !schema["type"].is_null() => {
+                let number = value.as_integer().map(|number| number as f64);
+                let number = number.or(value.as_float()).unwrap_or(f64::NAN);
+                let hint = schema[HINT].as_str().map(str::to_owned);
+                let refused = |e| self.source.setting(&e).or_hint_if(hint);
+                check_number(schema, number, path).map_err(refused)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn check_table(&self, parts: &[&'a Schema], table: &Table, path: &str) -> Result<(), Failure> {
+        let named = || {
+            let properties = parts
+                .iter()
+                .filter_map(|part| part["properties"].as_object());
+            properties.flatten()
+        };
+        let rest = ["additionalProperties", "unevaluatedProperties"];
+        let rest = rest
+            .iter()
+            .flat_map(|name| parts.iter().filter_map(|part| part.get(*name)));
+        let rest = rest.last();
+        let schema = |key: &str| {
+            let own = named().find(|(name, _)| *name == key);
+            own.map(|(_, schema)| schema).or(rest)
+        };
+        for key in table.keys() {
+            if schema(key).is_some_and(|schema| *schema == false) {
+                let legal = named().map(|(name, _)| name.as_str());
+                return Err(self.source.unknown(&dotted(path, key), legal));
             }
         }
-        schema
-    }
-}
-
-/// The version of a file's layout: there is one
-#[derive(Deserialize, JsonSchema)]
-#[serde(try_from = "u64")]
-#[schemars(inline, extend("minimum" = 1, "maximum" = 1))]
-pub(crate) struct Version;
-
-impl TryFrom<u64> for Version {
-    type Error = &'static str;
-
-    fn try_from(version: u64) -> Result<Self, Self::Error> {
-        if version == 1 {
-            Ok(Self)
-        } else {
-            Err("is not a schema this version reads: it reads 1")
+        for (key, value) in table {
+            if let Some(schema) = schema(key) {
+                self.check(schema, value, &dotted(path, key))?;
+            }
+        }
+        let required = parts.iter().filter_map(|part| part["required"].as_array());
+        let mut required = required.flatten().filter_map(Schema::as_str);
+        match required.find(|key| !table.contains_key(*key)) {
+            Some(key) => Err(self.source.missing(path, &[key])),
+            None => Ok(()),
         }
     }
 }
+
+// One value or a list of them.
 
 /// One value for all, or a list with one for each.
-#[derive(Debug, JsonSchema)]
-#[schemars(untagged, inline)]
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(untagged)]
+#[schemars(inline)]
 pub(crate) enum OneOrEach<One, Each = Vec<One>> {
     One(One),
     Each(Each),
@@ -616,42 +463,6 @@ impl<One: Copy + Into<f64>, Each: AsRef<[One]>> OneOrEach<One, Each> {
                 .as_ref()
                 .get(i)
                 .map_or(f64::NAN, |value| (*value).into()),
-        }
-    }
-}
-
-impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Deserialize<'de> for OneOrEach<One, Each> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(EitherVisitor(PhantomData))
-    }
-}
-
-struct EitherVisitor<One, Each>(PhantomData<(One, Each)>);
-
-impl<'de, One: Deserialize<'de>, Each: Deserialize<'de>> Visitor<'de> for EitherVisitor<One, Each> {
-    type Value = OneOrEach<One, Each>;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("one value or a list of them")
-    }
-
-    fn visit_i64<E: DeserializeError>(self, number: i64) -> Result<Self::Value, E> {
-        One::deserialize(number.into_deserializer()).map(OneOrEach::One)
-    }
-
-    fn visit_f64<E: DeserializeError>(self, number: f64) -> Result<Self::Value, E> {
-        One::deserialize(number.into_deserializer()).map(OneOrEach::One)
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
-        One::deserialize(MapAccessDeserializer::new(map)).map(OneOrEach::One)
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
-        let each = Each::deserialize(SeqAccessDeserializer::new(&mut list))?;
-        match list.next_element::<IgnoredAny>()? {
-            None => Ok(OneOrEach::Each(each)),
-            Some(_) => Err(A::Error::custom("is too long a list")),
         }
     }
 }

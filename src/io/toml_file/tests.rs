@@ -1,9 +1,10 @@
 //! What is refused, and where it is said to stand.
 
 use super::*;
+use nav_sim_signal::units::{Positive, Share};
 use serde::Deserialize;
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[expect(dead_code, reason = "only whether it reads matters")]
 struct File {
@@ -15,7 +16,7 @@ struct File {
     place: Option<std::path::PathBuf>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[expect(dead_code, reason = "only whether it reads matters")]
 struct Part {
@@ -23,7 +24,7 @@ struct Part {
     xyz: Option<[f64; 3]>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 enum Word {
     North,
@@ -35,11 +36,11 @@ fn refusals_name_file_line_key_and_value() {
     for (text, expected) in [
         (
             "count = -1",
-            "line 1: \"count\" = -1 is not a whole number ≥ 0 | ",
+            "line 1: \"count\" = -1 is refused: it must be a finite number ≥ 0 | ",
         ),
         (
             "count = \"many\"",
-            "line 1: \"count\" = \"many\" is not a whole number ≥ 0 | ",
+            "line 1: \"count\" = \"many\" is not a whole number | ",
         ),
         (
             "\n[part]\nx = 1\n",
@@ -71,11 +72,11 @@ fn refusals_name_file_line_key_and_value() {
         ),
         (
             "count = 1\nplace = 3\n",
-            "line 2: \"place\" = 3 is not a path | ",
+            "line 2: \"place\" = 3 is not a text in quotes | ",
         ),
         (
             "count = 1\n[part]\nx = 1\nxyz = [1, 2]\n",
-            "line 4: \"part.xyz\" = [1, 2] is not an array of length 3 | ",
+            "line 4: \"part.xyz\" = [1, 2] is not a list of 3 | ",
         ),
         (
             "count = 1\nwords = \"north\"",
@@ -150,39 +151,41 @@ fn what_is_not_set_lies_in_the_innermost_table_that_is() {
     }
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[expect(dead_code, reason = "only whether it reads matters")]
 struct Rules {
     #[serde(default)]
     rule: Vec<Rule>,
     axis: Option<Axis>,
-    other: Option<OneOrEach<Finite>>,
+    other: Option<OneOrEach<f64>>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[expect(dead_code, reason = "only whether it reads matters")]
 struct Axis {
     rules: Vec<Rule>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 #[expect(dead_code, reason = "only whether it reads matters")]
 struct Rule {
     replicates: Option<Vec<u64>>,
+    #[serde(flatten)]
     operation: Operation,
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(tag = "operation", rename_all = "lowercase")]
 #[expect(dead_code, reason = "only whether it reads matters")]
 enum Operation {
     Step(Step),
     Drift(Part),
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[expect(dead_code, reason = "only whether it reads matters")]
 struct Step {
@@ -196,14 +199,14 @@ fn keys_of_tagged_tables_are_found() {
         format!("[[rule]]\noperation = \"step\"\nheight = 0.5\n[[rule]]\n{second}\n")
     };
     for (text, expected) in [
-        (two("operation = \"step\"\nheight = 2"), "line 6: \"rule[2].height\" = 2 is not between 0 and 1 | "),
+        (two("operation = \"step\"\nheight = 2"), "line 6: \"rule[2].height\" = 2 is refused: it must be a finite number ≥ 0 and ≤ 1 | "),
         (
             two("operation = \"step\"\nheight = [0, \"a\"]"),
             "line 6: \"rule[2].height\" = \"a\" is not a number | ",
         ),
         (
             two("operation = \"step\"\nheight = 1\nat = 0"),
-            "line 7: \"rule[2].at\" = 0 is not a finite number > 0 | ",
+            "line 7: \"rule[2].at\" = 0 is refused: it must be a finite number > 0 | ",
         ),
         (
             two("operation = \"step\"\nat = 1"),
@@ -220,7 +223,7 @@ fn keys_of_tagged_tables_are_found() {
         (two("height = 1"), "line 4: \"rule[2].operation\" is missing | add operation to rule[2]"),
         (
             two("operation = \"drift\"\nx = 1\nreplicates = [1, -2]"),
-            "line 7: \"rule[2].replicates\" = -2 is not a whole number ≥ 0 | ",
+            "line 7: \"rule[2].replicates\" = -2 is refused: it must be a finite number ≥ 0 | ",
         ),
         (
             "[axis]\nrules = [\n{ operation = \"drift\", x = 1 },\n{ operation = \"drift\", x = nam },\n]"
@@ -229,7 +232,7 @@ fn keys_of_tagged_tables_are_found() {
         ),
         (
             "other = [1, nan]".to_owned(),
-            "line 1: \"other\" = nan is not a finite number such as 1.5e-4 | ",
+            "line 1: \"other\" = nan is refused: it must be a finite number | ",
         ),
     ] {
         let e = Source::new("f.toml", &text).get::<Rules>().unwrap_err();
@@ -240,7 +243,7 @@ fn keys_of_tagged_tables_are_found() {
 #[test]
 fn syntax_errors_have_their_line() {
     let e = Source::new("f.toml", "a = 1\nb = = 2\n")
-        .get::<toml::Table>()
+        .table()
         .unwrap_err();
     assert!(e.to_string().starts_with("f.toml, line 2: "), "{e}");
 }

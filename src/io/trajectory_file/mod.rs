@@ -23,14 +23,6 @@ use std::path::Path;
 
 mod profile;
 
-/// How to read a trajectory file.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Options {
-    /// Where local coordinates begin: latitude, longitude (rad), height (m). Without it: the file's own
-    /// `# origin:` line.
-    pub origin: Option<[f64; 3]>,
-}
-
 const KNOWN: &str =
     ".toml (motion profile), .csv, .tsv, .txt, .nav (KF-GINS), .tum or .gpx (also .gz)";
 
@@ -43,8 +35,8 @@ const KNOWN: &str =
 ///
 /// # Errors
 /// Whatever is wrong with the file, with its line.
-pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<String>), Failure> {
-    match read(path, options, false)? {
+pub fn load(path: &Path, origin: Option<[f64; 3]>) -> Result<(Trajectory, Vec<String>), Failure> {
+    match read(path, origin, false)? {
         None => Ok((profile::load(path)?, Vec::new())),
         Some(rows) => rows.trajectory(),
     }
@@ -56,18 +48,15 @@ pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<String>),
 ///
 /// # Errors
 /// What cannot be read at all, with its line; rows of which no stretch is usable.
-pub(crate) fn load_reference(
-    path: &Path,
-    options: &Options,
-) -> Result<(Reference, Vec<String>), Failure> {
-    match read(path, options, true)? {
+pub(crate) fn load_reference(path: &Path) -> Result<(Reference, Vec<String>), Failure> {
+    match read(path, None, true)? {
         None => Ok((profile::load(path)?.into(), Vec::new())),
         Some(rows) => rows.reference(),
     }
 }
 
 /// The rows of a file; none of a motion profile.
-fn read(path: &Path, options: &Options, is_partial: bool) -> Result<Option<Rows>, Failure> {
+fn read(path: &Path, origin: Option<[f64; 3]>, is_partial: bool) -> Result<Option<Rows>, Failure> {
     let name = path.display().to_string();
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
@@ -76,7 +65,7 @@ fn read(path: &Path, options: &Options, is_partial: bool) -> Result<Option<Rows>
         "gpx" => gpx(&name, &source::table_text(path)?).map(Some),
         ending @ ("nav" | "tum" | "csv" | "tsv" | "txt") => {
             let text = source::table_text(path)?;
-            rows(&name, &text, ending, options, is_partial).map(Some)
+            rows(&name, &text, ending, origin, is_partial).map(Some)
         }
         _ => {
             let message = format!("a trajectory file ends in {KNOWN}");
@@ -103,39 +92,35 @@ const MAX_DURATION_S: f64 = 86_400.0;
 /// Quantities of a trajectory; x, y, z and quaternions are in the axes of ROS ([REP 103](https://www.ros.org/reps/rep-0103.html)):
 /// position east, north, up of the origin; body forward, left, up.
 static QUANTITIES: [Quantity; 23] = [
-    Quantity::time(&["t", "time", "timestamp"]),
-    Quantity::number("week", &["week", "gps_week"]),
-    Quantity::angle("lat_deg", &["lat", "latitude"]).within(LATITUDE),
-    Quantity::angle("lon_deg", &["lon", "lng", "longitude"]).within(LONGITUDE),
-    Quantity::length("h_m", &["h", "alt", "height", "altitude"]),
+    Quantity::time("t time timestamp"),
+    Quantity::number("week", "week gps_week"),
+    Quantity::angle("lat_deg", "lat latitude").within(LATITUDE),
+    Quantity::angle("lon_deg", "lon lng longitude").within(LONGITUDE),
+    Quantity::length("h_m", "h alt height altitude"),
     N,
     E,
     D,
-    D.reversed(&["u", "up"]),
-    Quantity::angle("roll_deg", &["roll"]).within((-180.0, 180.0, "is not a roll angle")),
-    Quantity::angle("pitch_deg", &["pitch"]).within((-90.0, 90.0, "is not a pitch angle")),
+    D.reversed("u up"),
+    Quantity::angle("roll_deg", "roll").within((-180.0, 180.0, "is not a roll angle")),
+    Quantity::angle("pitch_deg", "pitch").within((-90.0, 90.0, "is not a pitch angle")),
     // one that was unwrapped goes on below −180 and above 180: the same angle
-    Quantity::angle("yaw_deg", &["yaw", "heading", "azimuth"]).within((
-        -360.0,
-        360.0,
-        "is not a heading",
-    )),
-    Quantity::speed("v_n_m_s", &["v_n", "vn", "v_north"]).with_unit(),
-    Quantity::speed("v_e_m_s", &["v_e", "ve", "v_east"]).with_unit(),
+    Quantity::angle("yaw_deg", "yaw heading azimuth").within((-360.0, 360.0, "is not a heading")),
+    Quantity::speed("v_n_m_s", "v_n vn v_north").with_unit(),
+    Quantity::speed("v_e_m_s", "v_e ve v_east").with_unit(),
     V_D,
-    V_D.reversed(&["v_u", "v_up"]),
-    Quantity::length("x", &["x"]),
-    Quantity::length("y", &["y"]),
-    Quantity::length("z", &["z"]),
-    Quantity::number("qx", &["qx", "q_x"]),
-    Quantity::number("qy", &["qy", "q_y"]),
-    Quantity::number("qz", &["qz", "q_z"]),
-    Quantity::number("qw", &["qw", "q_w"]),
+    V_D.reversed("v_u v_up"),
+    Quantity::length("x", "x"),
+    Quantity::length("y", "y"),
+    Quantity::length("z", "z"),
+    Quantity::number("qx", "qx q_x"),
+    Quantity::number("qy", "qy q_y"),
+    Quantity::number("qz", "qz q_z"),
+    Quantity::number("qw", "qw q_w"),
 ];
-const N: Quantity = Quantity::length("n_m", &["n", "north"]).with_unit();
-const E: Quantity = Quantity::length("e_m", &["e", "east"]).with_unit();
-const D: Quantity = Quantity::length("d_m", &["d", "down"]).with_unit();
-const V_D: Quantity = Quantity::speed("v_d_m_s", &["v_d", "vd", "v_down"]).with_unit();
+const N: Quantity = Quantity::length("n_m", "n north").with_unit();
+const E: Quantity = Quantity::length("e_m", "e east").with_unit();
+const D: Quantity = Quantity::length("d_m", "d down").with_unit();
+const V_D: Quantity = Quantity::speed("v_d_m_s", "v_d vd v_down").with_unit();
 
 /// Dictionary of trajectories.
 const DICTIONARY: Dictionary<'_> = Dictionary {
@@ -147,21 +132,10 @@ const DICTIONARY: Dictionary<'_> = Dictionary {
 };
 /// A KF-GINS navigation result or truth: week, seconds of week, position, velocity, attitude, between blanks. Time is counted on
 /// from the first week.
-const KF_GINS: &[&str] = &[
-    "week",
-    "t_s",
-    "lat_deg",
-    "lon_deg",
-    "h_m",
-    "v_n_m_s",
-    "v_e_m_s",
-    "v_d_m_s",
-    "roll_deg",
-    "pitch_deg",
-    "yaw_deg",
-];
+const KF_GINS: &str =
+    "week t_s lat_deg lon_deg h_m v_n_m_s v_e_m_s v_d_m_s roll_deg pitch_deg yaw_deg";
 /// A TUM file: time, position (m), quaternion, between blanks.
-const TUM: &[&str] = &["t_s", "x", "y", "z", "qx", "qy", "qz", "qw"];
+const TUM: &str = "t_s x y z qx qy qz qw";
 
 const GEODETIC: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
 const LOCAL: [&str; 3] = ["n_m", "e_m", "d_m"];
@@ -268,7 +242,7 @@ fn rows(
     path: &str,
     text: &str,
     ending: &str,
-    options: &Options,
+    origin: Option<[f64; 3]>,
     is_partial: bool,
 ) -> Result<Rows, Error> {
     let dictionary = Dictionary {
@@ -294,12 +268,12 @@ fn rows(
         .into_iter()
         .chain(position)
         .chain(optional.flatten());
-    table.require(needed, &DICTIONARY)?;
+    table.require(needed)?;
     check_units(&table)?;
     let left_out = table.keep_whole();
-    let origin = is_local.then(|| origin(&table, options)).transpose()?;
-    let [time] = table.columns(["t_s"], &DICTIONARY)?;
-    let place = table.columns(position, &DICTIONARY)?;
+    let origin = is_local.then(|| local_origin(&table, origin)).transpose()?;
+    let [time] = table.columns(["t_s"])?;
+    let place = table.columns(position)?;
     let (attitude, velocity) = (table.all(ATTITUDE), table.all(VELOCITY));
     let (quaternion, week) = (table.all(["qx", "qy", "qz", "qw"]), table.get("week"));
     let triad = |columns: [&Column; 3], row| columns.map(|column| column.si(row));
@@ -397,9 +371,9 @@ fn local(t_s: f64, [lat0, lon0, h0]: [f64; 3], r_n0: DVec3, q_b_n0: DQuat) -> Tr
     }
 }
 
-/// The origin of local coordinates: the option, or the file's `# origin: lat, lon, h` line.
-fn origin(table: &Table, options: &Options) -> Result<[f64; 3], Error> {
-    if let Some(origin) = options.origin {
+/// The origin of local coordinates: the one given, or the file's `# origin: lat, lon, h` line.
+fn local_origin(table: &Table, given: Option<[f64; 3]>) -> Result<[f64; 3], Error> {
+    if let Some(origin) = given {
         return Ok(origin);
     }
     let line = table.comments.iter().find_map(|c| c.strip_prefix("origin"));
@@ -658,11 +632,11 @@ mod import_tests {
     type Loaded = Result<(Trajectory, Vec<String>), Error>;
 
     fn nav(text: &str) -> Loaded {
-        rows("truth.nav", text, "nav", &Options::default(), false)?.trajectory()
+        rows("truth.nav", text, "nav", None, false)?.trajectory()
     }
 
-    fn tum(path: &str, text: &str, options: &Options) -> Loaded {
-        rows(path, text, "tum", options, false)?.trajectory()
+    fn tum(path: &str, text: &str, origin: Option<[f64; 3]>) -> Loaded {
+        rows(path, text, "tum", origin, false)?.trajectory()
     }
 
     #[test]
@@ -699,10 +673,8 @@ mod import_tests {
         let text: String = (0..6)
             .map(|k| format!("{k}.5 {} 0 0 0 0 0 1\n", 3 * k))
             .collect();
-        let options = Options {
-            origin: Some([0.8, 0.1, 50.0]),
-        };
-        let (t, warnings) = tum("a.tum", &text, &options).unwrap();
+        let options = Some([0.8, 0.1, 50.0]);
+        let (t, warnings) = tum("a.tum", &text, options).unwrap();
         assert!(warnings[0].contains("ROS"));
         let state = t.state(2.0);
         let rpy = RollPitchYaw::from_quat(state.q_b_n);
@@ -715,12 +687,12 @@ mod import_tests {
             (rpy.yaw - 0.5 * PI).abs() < 1e-5 && rpy.roll.abs() < 1e-5 && rpy.pitch.abs() < 1e-5,
             "{rpy:?}"
         );
-        let e = tum("a.tum", &text, &Options::default()).unwrap_err();
+        let e = tum("a.tum", &text, None).unwrap_err();
         assert!(
             e.to_string().contains("needs an origin on the Earth"),
             "{e}"
         );
-        let e = tum("a.tum", "0 0 0 0 0 0 0 2\n", &options)
+        let e = tum("a.tum", "0 0 0 0 0 0 0 2\n", options)
             .unwrap_err()
             .to_string();
         assert_eq!(
@@ -827,7 +799,7 @@ mod gpx_tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.gpx");
         std::fs::write(&path, format!("\u{feff}{}", track())).unwrap();
-        let (t, _) = super::load(&path, &Options::default()).unwrap();
+        let (t, _) = super::load(&path, None).unwrap();
         assert_eq!((t.start_s(), t.end_s()), (0.0, 8.0));
     }
 
@@ -916,26 +888,14 @@ mod gpx_tests {
 
 // Trajectories as CSV.
 
-/// Which instants become rows.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Instants {
-    /// Evenly spaced ones, from the start (Hz).
-    Rate(f64),
-    /// Those the trajectory was made from.
-    Knots,
-}
-
-impl Instants {
-    pub(crate) fn times(self, trajectory: &Trajectory) -> Vec<f64> {
-        match self {
-            Self::Knots => trajectory.knots().to_vec(),
-            Self::Rate(rate_hz) => {
-                let start_s = trajectory.start_s();
-                let steps = ((trajectory.end_s() - start_s) * rate_hz + 1e-6).floor() as u64;
-                (0..=steps).map(|k| start_s + k as f64 / rate_hz).collect()
-            }
-        }
-    }
+/// Instants of a trajectory: evenly spaced ones from the start (Hz), or those that it was made from.
+pub(crate) fn instants(trajectory: &Trajectory, rate_hz: Option<f64>) -> Vec<f64> {
+    let Some(rate_hz) = rate_hz else {
+        return trajectory.knots().to_vec();
+    };
+    let start_s = trajectory.start_s();
+    let steps = ((trajectory.end_s() - start_s) * rate_hz + 1e-6).floor() as u64;
+    (0..=steps).map(|k| start_s + k as f64 / rate_hz).collect()
 }
 
 /// The header of a trajectory as CSV.
@@ -944,9 +904,9 @@ pub(crate) const HEADER: &str =
 
 /// A trajectory as CSV. Positions are written with the digits that read back to them, since accelerations are their second
 /// differences; times to the nanosecond, velocities to 1e-9 m/s, angles to 1e-12 degrees.
-pub(crate) fn csv(trajectory: &Trajectory, rows: Instants) -> String {
+pub(crate) fn csv(trajectory: &Trajectory, rate_hz: Option<f64>) -> String {
     let mut text = HEADER.to_owned();
-    for t_s in rows.times(trajectory) {
+    for t_s in instants(trajectory, rate_hz) {
         let state = trajectory.state(t_s);
         let (v, rpy) = (state.v_n, RollPitchYaw::from_quat(state.q_b_n));
         let [v_n, v_e, v_d] = v.to_array().map(|v| tidy(v, 9));

@@ -9,11 +9,11 @@ use nav_sim_signal::units::DEG;
 const HEADER: &str = "t_s,lat_deg,lon_deg,h_m,roll_deg,pitch_deg,yaw_deg\n";
 
 fn read(text: &str) -> Result<(Trajectory, Vec<String>), Failure> {
-    read_with(text, &Options::default())
+    read_with(text, None)
 }
 
-fn read_with(text: &str, options: &Options) -> Result<(Trajectory, Vec<String>), Failure> {
-    rows("a.csv", text, "csv", options, false)?.trajectory()
+fn read_with(text: &str, origin: Option<[f64; 3]>) -> Result<(Trajectory, Vec<String>), Failure> {
+    rows("a.csv", text, "csv", origin, false)?.trajectory()
 }
 
 /// North-east along 46.5° N at 2 rows a second, 20 rows, heading 45°, with one row replaced.
@@ -270,10 +270,8 @@ fn local_coordinates_need_and_use_an_origin() {
         "a.csv: a trajectory in local coordinates needs an origin on the Earth"
     );
     assert!(hint.starts_with("give --origin") && hint.contains("# origin:"));
-    let options = Options {
-        origin: Some([-30.0 * DEG, 150.0 * DEG, 100.0]),
-    };
-    let (from_option, _) = read_with(&text, &options).unwrap();
+    let origin = Some([-30.0 * DEG, 150.0 * DEG, 100.0]);
+    let (from_option, _) = read_with(&text, origin).unwrap();
     let (from_line, _) = read(&format!("# origin: -30, 150, 100\n{text}")).unwrap();
     let state = from_option.state(2.5);
     assert_eq!(state, from_line.state(2.5));
@@ -343,8 +341,8 @@ fn what_is_written_reads_back_the_same() {
     let (t, _) = read(&drive(None)).unwrap();
     {
         let path = dir.path().join("t.csv");
-        std::fs::write(&path, csv(&t, Instants::Rate(10.0))).unwrap();
-        let (back, warnings) = load(&path, &Options::default()).unwrap();
+        std::fs::write(&path, csv(&t, Some(10.0))).unwrap();
+        let (back, warnings) = load(&path, None).unwrap();
         assert!(warnings.is_empty(), "{warnings:?}");
         assert_eq!((back.knots().len(), back.end_s()), (96, 9.5));
         let (a, b) = (t.state(4.77), back.state(4.77));
@@ -355,18 +353,15 @@ fn what_is_written_reads_back_the_same() {
         );
     }
     let path = dir.path().join("knots.csv");
-    std::fs::write(&path, csv(&t, Instants::Knots)).unwrap();
-    assert_eq!(
-        load(&path, &Options::default()).unwrap().0.knots(),
-        t.knots()
-    );
-    let e = load(&dir.path().join("t.xyz"), &Options::default()).unwrap_err();
+    std::fs::write(&path, csv(&t, None)).unwrap();
+    assert_eq!(load(&path, None).unwrap().0.knots(), t.knots());
+    let e = load(&dir.path().join("t.xyz"), None).unwrap_err();
     assert!(
         e.to_string()
             .contains("t.xyz: a trajectory file ends in .toml"),
         "{e}"
     );
-    let e = load(&dir.path().join("none.csv"), &Options::default()).unwrap_err();
+    let e = load(&dir.path().join("none.csv"), None).unwrap_err();
     assert!(
         e.code() == 1 && e.to_string().contains("none.csv: No such file"),
         "{e}"
@@ -395,7 +390,7 @@ fn a_far_time_stamp_is_refused_with_its_line_in_every_format() {
         "a.tum",
         &format!("# origin: 45, 7, 0\n{tum}"),
         "tum",
-        &Options::default(),
+        None,
         false,
     );
     let e = tum.unwrap().trajectory().unwrap_err().to_string();
@@ -439,7 +434,7 @@ fn jumps_and_heights_of_other_formats_are_refused_as_those_of_tables() {
             .map(|k| format!("{k} {} 0 0 0 0 0 1\n", place(k)))
             .collect();
         let text = format!("# origin: 45, 7, 0\n{text}");
-        let rows = rows("a.tum", &text, "tum", &Options::default(), false);
+        let rows = rows("a.tum", &text, "tum", None, false);
         rows.unwrap().trajectory().unwrap_err().to_string()
     };
     assert!(
@@ -562,7 +557,7 @@ fn references_are_used_but_for_what_jumps() {
     };
     let text = HEADER.to_owned() + &(0..600).map(row).collect::<String>();
     assert!(read(&text.replace("nan", "0.5")).is_err());
-    let parsed = rows("a.csv", &text, "csv", &Options::default(), true).unwrap();
+    let parsed = rows("a.csv", &text, "csv", None, true).unwrap();
     let (reference, warnings) = parsed.reference().unwrap();
     let known = |t: f64| reference.state(t).is_some();
     assert_eq!(
@@ -582,13 +577,6 @@ fn references_are_used_but_for_what_jumps() {
     let mad: String = (0..600)
         .map(|k| format!("{},{},6.6,400,0,0,0\n", 0.1 * f64::from(k), 46 + k % 2))
         .collect();
-    let parsed = rows(
-        "a.csv",
-        &(HEADER.to_owned() + &mad),
-        "csv",
-        &Options::default(),
-        true,
-    )
-    .unwrap();
+    let parsed = rows("a.csv", &(HEADER.to_owned() + &mad), "csv", None, true).unwrap();
     assert!(parsed.reference().is_err());
 }

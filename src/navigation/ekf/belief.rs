@@ -20,7 +20,7 @@ use crate::frames::RollPitchYaw;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Composite, Kind, Ladder, Model, Process, reduction};
 use crate::sensors::check_bounds;
-use crate::units::{NonNegative, Positive, SettingError, exactly};
+use crate::units::{NonNegative, Positive, SettingError};
 use glam::{DQuat, DVec3};
 use nalgebra::Matrix3;
 use nav_sim_signal::names::UnknownName;
@@ -422,15 +422,12 @@ impl TryFrom<WrittenStates> for FilterStates {
 pub struct InitialSettings {
     /// Position north, east, down (m).
     #[schemars(with = "[Positive; 3]", inner(range(max = 1e5)))]
-    #[serde(deserialize_with = "exactly")]
     pub pos_sigma_m: [f64; 3],
     /// Velocity north, east, down (m/s).
     #[schemars(with = "[Positive; 3]", inner(range(max = 1000.0)))]
-    #[serde(deserialize_with = "exactly")]
     pub vel_sigma_m_s: [f64; 3],
     /// Roll, pitch, yaw (degrees).
     #[schemars(with = "[Positive; 3]", inner(range(max = 30.0)))]
-    #[serde(deserialize_with = "exactly")]
     pub att_sigma_deg: [f64; 3],
     /// Turn-on bias of the accelerometers that the filter expects beside the model's processes (m/s²): an
     /// unknown constant, one state an axis; without it, none.

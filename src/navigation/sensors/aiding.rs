@@ -9,7 +9,7 @@
 use super::gnss::MAX_LEVER_ARM_M;
 use super::normal;
 use crate::rng::{Generator, StreamKey};
-use crate::units::{DEG, NonNegative, Positive, exactly};
+use crate::units::{DEG, NonNegative, Positive};
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -490,7 +490,6 @@ pub struct NhcSettings {
     pub sigma_m_s: f64,
     /// The point that moves neither sideways nor up, with respect to the IMU: front, right, down (m).
     #[schemars(inner(range(min = -MAX_LEVER_ARM_M, max = MAX_LEVER_ARM_M)))]
-    #[serde(deserialize_with = "exactly")]
     pub lever_arm_m: [f64; 3],
     /// Pitch and yaw of the vehicle's axes in those of the IMU, as the filter expects them (1 σ, degrees): two states;
     /// 0: none.
@@ -533,7 +532,6 @@ pub struct OdometerSettings {
     pub sigma_m_s: f64,
     /// The wheel, or the middle of its axle, with respect to the IMU: front, right, down (m).
     #[schemars(inner(range(min = -MAX_LEVER_ARM_M, max = MAX_LEVER_ARM_M)))]
-    #[serde(deserialize_with = "exactly")]
     pub lever_arm_m: [f64; 3],
     /// Scale factor of the wheel, as the filter expects it (1 σ): a state; 0: none.
     #[schemars(with = "NonNegative")]

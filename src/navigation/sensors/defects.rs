@@ -3,10 +3,10 @@
 use super::normal;
 use crate::imu::{ImuSample, MAX_RATE_HZ, Sensor};
 use crate::rng::StreamKey;
-use crate::units::{NonNegative, Positive, SettingError, exactly};
+use crate::units::{NonNegative, Positive, SettingError};
 use glam::{DMat3, DVec3};
 use schemars::JsonSchema;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 /// Largest standard deviation of an accelerometer's bias (m/s²): a gravity.
 pub const MAX_BIAS_M_S2: f64 = 10.0;
@@ -234,7 +234,6 @@ const MAX_RECTIFICATION: f64 = 0.01;
 pub struct Temperature {
     /// Time on the trajectory (s) and temperature (°C), one pair after the other: straight between them, constant before and
     /// after. What the IMU has at the first of them is its turn-on bias.
-    #[serde(deserialize_with = "pairs")]
     pub profile_c: Vec<[f64; 2]>,
     /// Change of each accelerometer's bias (1 σ, m/s² per K).
     #[schemars(with = "NonNegative", range(max = MAX_PER_KELVIN[0]))]
@@ -244,16 +243,6 @@ pub struct Temperature {
     #[schemars(with = "NonNegative", range(max = MAX_PER_KELVIN[1]))]
     #[serde(default)]
     pub gyro_rad_s_k: f64,
-}
-
-/// Reads pairs, no triples.
-fn pairs<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 2]>, D::Error> {
-    #[derive(Deserialize)]
-    struct Pair(#[serde(deserialize_with = "exactly")] [f64; 2]);
-    Ok(Vec::<Pair>::deserialize(deserializer)?
-        .into_iter()
-        .map(|Pair(pair)| pair)
-        .collect())
 }
 
 impl Temperature {

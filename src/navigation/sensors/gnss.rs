@@ -2,7 +2,7 @@
 
 use super::normal;
 use crate::rng::{Generator, StreamKey};
-use crate::units::{NonNegative, Positive, exactly};
+use crate::units::{NonNegative, Positive};
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -21,7 +21,6 @@ pub struct GnssSettings {
     pub rate_hz: f64,
     /// Position standard deviations north, east, down (m).
     #[schemars(with = "[Positive; 3]")]
-    #[serde(deserialize_with = "exactly")]
     pub pos_sigma_m: [f64; 3],
     /// Velocity standard deviations north, east, down (m/s); `None` ("none" in files): no velocity.
     #[serde(
@@ -32,12 +31,10 @@ pub struct GnssSettings {
     pub vel_sigma_m_s: Option<[f64; 3]>,
     /// Antenna position with respect to the IMU, in b: front, right, down (m).
     #[schemars(inner(range(min = -MAX_LEVER_ARM_M, max = MAX_LEVER_ARM_M)))]
-    #[serde(deserialize_with = "exactly")]
     pub lever_arm_m: [f64; 3],
     /// Standard deviations of a correlated position error north, east, down (m): a Gauss-Markov process beside
     /// the white noise, in the true receiver only. The filter believes `pos_sigma_m`, white.
     #[schemars(with = "[NonNegative; 3]")]
-    #[serde(deserialize_with = "exactly")]
     pub correlated_pos_sigma_m: [f64; 3],
     /// Correlation time of that error (s).
     #[schemars(with = "Positive")]

@@ -74,7 +74,11 @@ fn check(
     }
 }
 
-fn check_number(schema: &Schema, number: f64, key: &str) -> Result<(), SettingError> {
+/// Checks a number against the bounds that its schema states.
+///
+/// # Errors
+/// The key whose value is refused.
+pub fn check_number(schema: &Schema, number: f64, key: &str) -> Result<(), SettingError> {
     let mut is_within = number.is_finite();
     let mut words = Vec::new();
     let bounds = [
@@ -98,7 +102,10 @@ fn check_number(schema: &Schema, number: f64, key: &str) -> Result<(), SettingEr
         return Ok(());
     }
     let bounds = words.join(" and ");
-    let mut requirement = format!("it must be a finite number {bounds}");
+    let mut requirement = match (schema["minimum"].as_f64(), schema["maximum"].as_f64()) {
+        (Some(only), Some(most)) if only == most => format!("it must be {only}"),
+        _ => format!("it must be a finite number {bounds}"),
+    };
     requirement.truncate(requirement.trim_end().len());
     let slips = [
         ("_m_s2", "mg or g named m/s²?"),

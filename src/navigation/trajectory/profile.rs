@@ -18,10 +18,13 @@
 //! ```
 
 use super::{Trajectory, TrajectorySample};
+use crate::earth::MAX_LATITUDE_DEG;
 use crate::earth::{moved, radii};
 use crate::frames::{RollPitchYaw, wrap_angle};
-use crate::units::{DEG, STANDARD_GRAVITY};
+use crate::units::{DEG, NonNegative, Positive, STANDARD_GRAVITY};
 use glam::DVec3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer};
 
 /// A motion profile.
 #[derive(Debug, Clone)]
@@ -37,25 +40,41 @@ pub struct Profile {
     pub segments: Vec<Segment>,
 }
 
-/// The start of a profile.
-#[derive(Debug, Clone, Copy)]
+/// Reads an angle, which is in degrees in files (rad).
+fn degrees<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(f64::deserialize(deserializer)? * DEG)
+}
+
+/// The start of a profile (angles in rad; in files degrees).
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Start {
     /// Time (s).
+    #[serde(default)]
     pub t_s: f64,
-    /// Geodetic latitude (rad).
+    /// Geodetic latitude.
+    #[serde(rename = "lat_deg", deserialize_with = "degrees")]
+    #[schemars(range(min = -MAX_LATITUDE_DEG, max = MAX_LATITUDE_DEG))]
     pub lat: f64,
-    /// Longitude (rad).
+    /// Longitude.
+    #[serde(rename = "lon_deg", deserialize_with = "degrees")]
     pub lon: f64,
     /// Height above the ellipsoid (m).
+    #[serde(rename = "h_m")]
+    #[schemars(range(min = -12_000, max = 1_000_000))]
     pub h: f64,
-    /// Heading from north (rad).
+    /// Heading from north.
+    #[serde(rename = "heading_deg", deserialize_with = "degrees")]
     pub heading: f64,
     /// Speed (m/s).
+    #[serde(rename = "speed_m_s", default)]
+    #[schemars(with = "NonNegative")]
     pub speed: f64,
 }
 
 /// Roll in turns.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum Bank {
     /// Stays level across, as a land vehicle.
     #[default]
@@ -66,80 +85,117 @@ pub enum Bank {
 }
 
 /// One segment.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct Segment {
     /// What happens.
+    #[serde(flatten)]
     pub kind: Kind,
     /// Height gained over the segment (m), negative downwards.
+    #[serde(default)]
     pub climb_m: f64,
-    /// Overrides [`Profile::ramp_s`].
+    /// Time over which accelerations and rates build up and fade (s), in the place of that of the vehicle.
+    #[schemars(with = "Option<Positive>")]
     pub ramp_s: Option<f64>,
 }
 
-/// What happens in a segment.
-#[derive(Debug, Clone)]
+/// What happens in a segment (angles in rad; in files degrees).
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "lowercase")]
 pub enum Kind {
     /// Constant speed and heading; at speed zero, standing.
     Straight(Length),
     /// Speed changes.
     Accelerate {
         /// Final speed (m/s).
+        #[serde(rename = "to_speed_m_s")]
+        #[schemars(with = "NonNegative")]
         to_speed: f64,
         /// How fast.
+        #[serde(flatten)]
         by: Acceleration,
     },
     /// Heading changes.
     Turn {
-        /// By how much (rad), positive to the right.
+        /// By how much, positive to the right.
+        #[serde(rename = "angle_deg", deserialize_with = "degrees")]
         angle: f64,
         /// How fast.
+        #[serde(flatten)]
         by: Turning,
+    },
+    /// Height changes.
+    Climb {
+        /// Height gained (m).
+        height_m: f64,
+        /// How long it is.
+        #[serde(flatten)]
+        by: Length,
     },
     /// Brakes if moving, then stands.
     Stop {
         /// Time at rest (s).
+        #[serde(rename = "duration_s")]
+        #[schemars(with = "Positive")]
         duration: f64,
         /// Largest deceleration while braking (m/s²).
+        #[serde(rename = "decel_m_s2", default = "braking")]
+        #[schemars(with = "Positive")]
         decel: f64,
     },
     /// From point to point on straight legs, cutting the corners with turns.
     Waypoints {
         /// The points; the path ends at the last and passes inside the others.
+        #[schemars(length(min = 1))]
         points: Vec<Waypoint>,
         /// How fast the turns are.
+        #[serde(flatten)]
         by: Turning,
     },
 }
 
+/// Deceleration of a stop unless said otherwise (m/s²).
+const fn braking() -> f64 {
+    1.5
+}
+
 /// How long a straight is.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 pub enum Length {
     /// In time (s).
-    Duration(f64),
+    #[serde(rename = "duration_s")]
+    Duration(#[schemars(with = "Positive")] f64),
     /// Along the path (m).
-    Distance(f64),
+    #[serde(rename = "distance_m")]
+    Distance(#[schemars(with = "Positive")] f64),
 }
 
 /// How fast speed changes.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 pub enum Acceleration {
     /// Within a time (s).
-    Duration(f64),
+    #[serde(rename = "duration_s")]
+    Duration(#[schemars(with = "Positive")] f64),
     /// With this largest acceleration (m/s²).
-    Peak(f64),
+    #[serde(rename = "accel_m_s2")]
+    Peak(#[schemars(with = "Positive")] f64),
 }
 
 /// How fast heading changes.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 pub enum Turning {
     /// Within a time (s).
-    Duration(f64),
-    /// With this largest rate (rad/s).
-    Rate(f64),
+    #[serde(rename = "duration_s")]
+    Duration(#[schemars(with = "Positive")] f64),
+    /// With this largest rate (rad/s; in files degrees/s).
+    #[serde(rename = "rate_deg_s", deserialize_with = "degrees")]
+    Rate(#[schemars(with = "Positive")] f64),
     /// With this smallest radius (m).
-    Radius(f64),
+    #[serde(rename = "radius_m")]
+    Radius(#[schemars(with = "Positive")] f64),
     /// With this largest lateral acceleration (m/s²).
-    LateralAccel(f64),
+    #[serde(rename = "lateral_accel_m_s2")]
+    LateralAccel(#[schemars(with = "Positive")] f64),
 }
 
 impl Profile {
@@ -300,6 +356,7 @@ impl<'a> Path<'a> {
         let climb = segment.climb_m;
         match &segment.kind {
             Kind::Straight(length) => self.straight(*length, climb, ramp_s),
+            Kind::Climb { height_m, by } => self.straight(*by, climb + height_m, ramp_s),
             Kind::Accelerate { to_speed, by } => self.accelerate(*to_speed, *by, climb, ramp_s),
             Kind::Turn { angle, by } => {
                 let duration = self.turn_duration(*angle, *by, ramp_s)?;
@@ -598,29 +655,39 @@ impl Piece {
 const MAX_CORNER: f64 = 150.0 * DEG;
 
 /// A point to pass.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct Waypoint {
     /// Where.
+    #[serde(flatten)]
     pub place: Place,
     /// Height above the ellipsoid (m), if it is to change.
+    #[serde(rename = "h_m")]
+    #[schemars(range(min = -12_000, max = 1_000_000))]
     pub h: Option<f64>,
 }
 
 /// A horizontal position.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(untagged)]
 pub enum Place {
-    /// Latitude and longitude (rad).
+    /// Latitude and longitude (rad; in files degrees).
     Geodetic {
-        /// Geodetic latitude (rad).
+        /// Geodetic latitude.
+        #[serde(rename = "lat_deg", deserialize_with = "degrees")]
+        #[schemars(range(min = -MAX_LATITUDE_DEG, max = MAX_LATITUDE_DEG))]
         lat: f64,
-        /// Longitude (rad).
+        /// Longitude.
+        #[serde(rename = "lon_deg", deserialize_with = "degrees")]
         lon: f64,
     },
     /// North and east of the profile's start (m), curvilinear.
     Local {
         /// North (m).
+        #[serde(rename = "n_m")]
         north: f64,
         /// East (m).
+        #[serde(rename = "e_m")]
         east: f64,
     },
 }

@@ -58,8 +58,7 @@ const LARGEST_SD: f64 = 10.0;
 
 /// A distribution, as in model files.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase", deny_unknown_fields)]
-#[schemars(tag = "distribution", !deny_unknown_fields)]
+#[serde(rename_all = "lowercase", tag = "distribution")]
 pub enum Law {
     /// low + width × a beta law
     Beta {
@@ -249,27 +248,6 @@ impl Spread {
             }
         }
         drawn
-    }
-
-    /// The model of one replicate of another centre, which has the processes of the model: what is drawn about `model`, moved as
-    /// `centre` lies from it on the scale of each parameter; parameters without a law are those of `centre`.
-    pub fn draw_about(&self, centre: &Model, model: &Model, seed: u64, replicate: u64) -> Model {
-        let drawn = self.draw(model, seed, replicate);
-        let mut moved = centre.clone();
-        for (axis, laws) in self.axes.iter().enumerate() {
-            for of in laws.iter().map(|variation| variation.of) {
-                let [own, from, to] =
-                    [&drawn, model, centre].map(|model| model.axes[axis].value(of));
-                let scaled = [own, from, to].map(|value| of.parameter.scaled(value));
-                let value = of.parameter.unscaled(scaled[0] + scaled[2] - scaled[1]);
-                let noise = &mut moved.axes[axis];
-                // An amplitude of 0 has no logarithm: what was drawn stands.
-                if noise.set(of, value).is_err() {
-                    let _ = noise.set(of, own);
-                }
-            }
-        }
-        moved
     }
 }
 

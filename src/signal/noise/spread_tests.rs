@@ -118,36 +118,6 @@ fn axes_and_replicates_draw_for_themselves_and_repeat() {
 
 /// About a centre of twice the variance and half the correlation time the same draws are twice and half as large.
 #[test]
-fn draws_move_with_their_centre() {
-    let mut s = spread(
-        "WN",
-        "sigma2",
-        Law::Beta {
-            a: 3.0,
-            b: 4.0,
-            low: 5e-5,
-            width: 5e-6,
-        },
-    );
-    let phi = Law::Lognormal {
-        median: 0.98,
-        sd: 0.3,
-        median_ci95: None,
-        sd_ci95: None,
-    };
-    s.axes[0].push(Variation::new(&n1(), "AR1", "phi", phi).unwrap());
-    let model = Model::pooled(RATE, &n1(), &n1());
-    let mut centre = model.clone();
-    centre.axes[0].processes[0] = Process::white(1e-4).unwrap();
-    centre.axes[0].processes[1] = Process::ar1(0.985_f64.powi(2), 3e-8).unwrap();
-    let (own, moved) = (s.draw(&model, 1, 5), s.draw_about(&centre, &model, 1, 5));
-    let value = |m: &Model, p: usize, v: usize| m.axes[0].processes[p].values()[v];
-    assert!((value(&moved, 0, 0) / value(&own, 0, 0) - 2.0).abs() < 1e-12);
-    assert!((value(&moved, 1, 0).ln() / value(&own, 1, 0).ln() - 2.0).abs() < 1e-12);
-    assert_eq!(value(&moved, 1, 1), 3e-8);
-}
-
-#[test]
 fn what_is_not_drawn_keeps_its_value() {
     let s = spread("WN", "sigma2", Law::Normal { sd: 1e-6 });
     assert_eq!(drawn(&s, 5, 3, (1, 0)), [0.985; 5]);

@@ -48,7 +48,7 @@ fn profiles_are_refused_with_line_key_and_hint() {
     assert_eq!(
         segment("kind = \"straight\"\nduration_s = -3"),
         (
-            "p.toml, line 8: \"segment[1].duration_s\" = -3 is not a finite number > 0".into(),
+            "p.toml, line 8: \"segment[1].duration_s\" = -3 is refused: it must be a finite number > 0".into(),
             String::new()
         )
     );
@@ -82,7 +82,7 @@ fn profiles_are_refused_with_line_key_and_hint() {
     );
     assert_eq!(
         e.unwrap_err().to_string(),
-        "p.toml, line 2: \"start.lat_deg\" = 95 is not a latitude within ±89.9°"
+        "p.toml, line 2: \"start.lat_deg\" = 95 is refused: it must be a finite number ≥ -89.9 and ≤ 89.9"
     );
     let e = profile("[[segment]]\nkind = \"stop\"\nduration_s = 1\n").unwrap_err();
     assert_eq!(e.to_string(), "p.toml, line 1: \"start\" is missing");

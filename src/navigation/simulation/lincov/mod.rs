@@ -43,6 +43,4 @@ pub use reduce::{Alike, drive, reduced_belief};
 pub use track::Track;
 pub use truth::{DRIFT, NamedSource, STRAPDOWN, TrueErrors, TruthSide, weak_heading};
 pub(crate) use tune::Crossing;
-pub use tune::{
-    Aim, Departure, Factor, Filter, FilterConsistency, Task, UpperEnd, aiding_factor, scaled,
-};
+pub use tune::{Aim, Departure, Factor, Filter, FilterConsistency, Task, aiding_factor, scaled};

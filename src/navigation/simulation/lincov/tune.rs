@@ -37,9 +37,6 @@ pub struct Task<'a> {
     pub model: &'a Model,
     /// What may make the errors; at least one.
     pub truths: &'a [TrueErrors],
-    /// Where the truths but the first are draws of what is not known of it: the upper end of an interval, which counts in the
-    /// place of the worst truth.
-    pub drawn: Option<&'a UpperEnd<'a>>,
     /// The trajectory with its fixes and outages.
     pub track: &'a Track,
     /// The filter with a state for each process, for which the factors are found.
@@ -61,8 +58,6 @@ const RIDGE: f64 = 2e-5;
 const OVERCONFIDENT: f64 = 200.0;
 /// A filter whose ratio is this close to 1 is consistent.
 const TOLERANCE: f64 = 0.005;
-/// How often at most what draws add is found anew.
-const ROUNDS: usize = 5;
 /// An error that exceeds its sigma by less than this share is as large as stated.
 const EXACT: f64 = 1e-3;
 /// How close the factors come to the smallest, as a logarithm.
@@ -74,27 +69,14 @@ impl Task<'_> {
     /// # Errors
     /// When the model has no such filter.
     pub fn factors(&self) -> Result<Vec<Factor>, BeliefError> {
-        let mut factors = multiplied(self.model);
+        let factors = multiplied(self.model);
         // Asked for its error alone: inside the search a model without a filter is only an infinite cost.
         (self.full)(self.model)?;
-        let (consistency, mut draw_factors) = self.consistency_and_draws(self.filter, &factors)?;
+        let consistency = self.consistency(self.filter, &factors)?;
         if self.excess(&consistency).abs() <= TOLERANCE {
             return Ok(factors);
         }
-        // Draws are many, and what they add to an error hardly depends on the filter: the search has the first truth alone
-        // with that added, and again with what they add under the filter that was found.
-        for _ in 0..ROUNDS {
-            factors = self.search(&factors, draw_factors.as_ref())?;
-            if draw_factors.is_none() {
-                break;
-            }
-            let found = self.consistency_and_draws(self.filter, &factors)?;
-            if self.excess(&found.0).abs() <= TOLERANCE {
-                break;
-            }
-            draw_factors = found.1;
-        }
-        Ok(factors)
+        self.search(&factors)
     }
 
     /// Sensors whose model has no noise that a factor could multiply, where that of a truth has some.
@@ -111,17 +93,10 @@ impl Task<'_> {
         Sensor::ALL.into_iter().filter(is_without).collect()
     }
 
-    /// The factors for all truths, or for the first with what draws add to it.
-    fn search(
-        &self,
-        factors: &[Factor],
-        draw_factors: Option<&DrawFactors>,
-    ) -> Result<Vec<Factor>, BeliefError> {
+    /// The factors for all truths.
+    fn search(&self, factors: &[Factor]) -> Result<Vec<Factor>, BeliefError> {
         let track = self.track.coarse();
-        let value = |ln: &[f64]| {
-            let value = self.value(&set(factors, ln), &track, draw_factors);
-            value.with_ridge(RIDGE, ln)
-        };
+        let value = |ln: &[f64]| self.value(&set(factors, ln), &track).with_ridge(RIDGE, ln);
         let descent = Damped {
             value: &value,
             bounds: (0.0, MAX_LN),
@@ -131,7 +106,7 @@ impl Task<'_> {
         // From the model as it is, which keeps factors small; and from one factor on all that makes it consistent, since between
         // the two the valley may be flat. The second counts where it is better by what can be seen.
         let unchanged = vec![0.0; factors.len()];
-        let at = |ln: &[f64]| self.consistency_with(&set(factors, ln), draw_factors);
+        let at = |ln: &[f64]| self.consistency(self.filter, &set(factors, ln));
         let exact = |ln: &[f64]| self.exact(ln, &at);
         let alike = exact(&unchanged)?;
         let near = descent.minimum(unchanged.clone()).unwrap_or(unchanged);
@@ -172,41 +147,10 @@ impl Task<'_> {
         filter: &Filter<'_>,
         factors: &[Factor],
     ) -> Result<FilterConsistency, BeliefError> {
-        Ok(self.consistency_and_draws(filter, factors)?.0)
-    }
-
-    /// The same, and what draws add to the first truth there.
-    ///
-    /// # Errors
-    /// When the model has no such filter.
-    fn consistency_and_draws(
-        &self,
-        filter: &Filter<'_>,
-        factors: &[Factor],
-    ) -> Result<(FilterConsistency, Option<DrawFactors>), BeliefError> {
         let belief = filter(&scaled(self.model, factors))?;
-        let assessments = self.assessments(&belief, self.track, None);
-        let consistency = FilterConsistency::of(&assessments, self.drawn);
-        let draw_factors = self
-            .drawn
-            .map(|drawn| DrawFactors::of(&assessments, drawn, &consistency));
-        Ok((consistency, draw_factors))
-    }
-
-    /// The consistency by the first truth with what draws add to it; without draws that by all truths.
-    ///
-    /// # Errors
-    /// When the model has no such filter.
-    fn consistency_with(
-        &self,
-        factors: &[Factor],
-        draw_factors: Option<&DrawFactors>,
-    ) -> Result<FilterConsistency, BeliefError> {
-        let Some(draw_factors) = draw_factors else {
-            return self.consistency(self.filter, factors);
-        };
-        let belief = (self.filter)(&scaled(self.model, factors))?;
-        Ok(draw_factors.consistency(&self.assessments(&belief, self.track, Some(draw_factors))))
+        Ok(FilterConsistency::of(
+            &self.assessments(&belief, self.track),
+        ))
     }
 
     /// Every truth under the filter that `knows` makes of it.
@@ -223,23 +167,13 @@ impl Task<'_> {
         };
         let assessments: Result<Vec<Assessment>, BeliefError> =
             self.truths.par_iter().map(assessed).collect();
-        Ok(FilterConsistency::of(&assessments?, self.drawn))
+        Ok(FilterConsistency::of(&assessments?))
     }
 
-    /// Of all truths; of the first alone where what draws add to it is known.
-    fn assessments(
-        &self,
-        belief: &Belief,
-        track: &Track,
-        draw_factors: Option<&DrawFactors>,
-    ) -> Vec<Assessment> {
+    fn assessments(&self, belief: &Belief, track: &Track) -> Vec<Assessment> {
         // No truth changes the filter: its gains are found once.
         let pass = FilterPass::new(track, belief);
-        let truths = match draw_factors {
-            Some(_) => &self.truths[..1],
-            None => self.truths,
-        };
-        truths
+        self.truths
             .par_iter()
             .map(|truth| pass.assess_stated(belief, truth))
             .collect()
@@ -247,12 +181,7 @@ impl Task<'_> {
 
     /// Mean divergence over the truths and the cost of errors that are larger than stated; infinite where the model has no
     /// filter.
-    fn value(
-        &self,
-        factors: &[Factor],
-        track: &Track,
-        draw_factors: Option<&DrawFactors>,
-    ) -> Value {
+    fn value(&self, factors: &[Factor], track: &Track) -> Value {
         let Ok(belief) = (self.full)(&scaled(self.model, factors)) else {
             return Value {
                 cost: f64::INFINITY,
@@ -270,10 +199,7 @@ impl Task<'_> {
                 .map(|r| overconfident * r.ln().max(0.0).powi(2))
                 .sum()
         };
-        let mut assessments = self.assessments(&belief, track, draw_factors);
-        if let Some(draw_factors) = draw_factors {
-            assessments.iter_mut().for_each(|a| draw_factors.enlarge(a));
-        }
+        let assessments = self.assessments(&belief, track);
         let share = 1.0 / assessments.len() as f64;
         let (mut cost, mut parts) = (0.0, Vec::new());
         for assessment in &assessments {
@@ -334,7 +260,7 @@ pub fn aiding_factor(track: &Track, belief: &Belief, truth: &TrueErrors) -> Opti
     let largest = |ln: f64| {
         let track = track.with_aiding_sigmas(ln.exp());
         let assessment = FilterPass::new(&track, belief).assess_stated(belief, truth);
-        FilterConsistency::of(&[assessment], None).largest.ratio
+        FilterConsistency::of(&[assessment]).largest.ratio
     };
     let covers = |ln: f64| Ok(largest(ln) <= 1.0 + TOLERANCE);
     let ln = smallest((0.0, 1000.0_f64.ln()), covers).ok()?;
@@ -384,18 +310,6 @@ fn smallest(
 
 // Consistency of a filter with several truths.
 
-/// The upper end of the interval of a figure, from the figure itself and those of the draws around it.
-pub type UpperEnd<'a> = dyn Fn(f64, Vec<f64>) -> f64 + Sync + 'a;
-
-/// What counts of the ratios that the truths have of one error: the largest, or the upper end around the first, below which
-/// that itself is not.
-fn counted(ratios: &[f64], drawn: Option<&UpperEnd<'_>>) -> f64 {
-    match (drawn, ratios) {
-        (Some(upper_end), [first, draws @ ..]) => upper_end(*first, draws.to_vec()).max(*first),
-        _ => ratios.iter().copied().fold(0.0, f64::max),
-    }
-}
-
 /// Consistency of a filter with several truths.
 #[derive(Debug, Clone)]
 pub struct FilterConsistency {
@@ -403,8 +317,7 @@ pub struct FilterConsistency {
     pub nees: f64,
     /// Where errors are largest against what is stated, at an outage's end or over the whole run (without outages: at any time).
     pub largest: Departure,
-    /// Smallest and largest ratio of any state and of all together, in the first truth where the others are its draws: what
-    /// `run` calls the filter by.
+    /// Smallest and largest ratio of any state and of all together: what `run` calls the filter by.
     pub range: [f64; 2],
     /// When the outages end (s from the start).
     pub end_s: Vec<f64>,
@@ -415,19 +328,19 @@ pub struct FilterConsistency {
 /// An error over what the filter states of it.
 #[derive(Debug, Clone, Copy)]
 pub struct Departure {
-    /// What counts of true RMSE over stated standard deviation in the truths.
+    /// Largest true RMSE over stated standard deviation in the truths.
     pub ratio: f64,
     /// The reported state.
     pub state: usize,
     /// The outage at whose end it is, counted from 0; none: over the whole run.
     pub outage: Option<usize>,
-    /// The truth whose ratio is nearest to what counts, counted from 0.
+    /// The truth of that ratio, counted from 0.
     pub truth: usize,
 }
 
 impl FilterConsistency {
     /// Of one filter under several truths.
-    fn of(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Self {
+    fn of(assessments: &[Assessment]) -> Self {
         let count = assessments.len() as f64;
         let mean_nees = |a: &Assessment| mean(a.reports.iter().map(|r| r.nees));
         let end_s: Vec<f64> = assessments[0]
@@ -444,24 +357,19 @@ impl FilterConsistency {
             }
         }
         rmse_end.iter_mut().flatten().for_each(|x| *x = x.sqrt());
-        let largest = Departure::largest(&departures(assessments, drawn));
+        let departures = departures(assessments);
         let nees = mean(assessments.iter().map(mean_nees));
-        let first = if drawn.is_some() {
-            &assessments[..1]
-        } else {
-            assessments
-        };
-        let nees_over_run = mean(first.iter().map(mean_nees));
-        let at_ends = first
+        let at_ends = assessments
             .iter()
             .flat_map(|a| a.outage_ends.iter().map(|end| end.nees));
-        let together = std::iter::once(nees_over_run)
+        let together = std::iter::once(nees)
             .chain(at_ends)
             .map(|nees| (nees / NEES_DOF as f64).sqrt());
+        let largest = Departure::largest(&departures);
         let places = if end_s.is_empty() {
-            over_run_of(first, None).to_vec()
+            over_run_of(assessments).to_vec()
         } else {
-            departures(first, None)
+            departures
         };
         let ratios = places.into_iter().map(|d| d.ratio).chain(together);
         let range = ratios.fold([f64::INFINITY, 0.0], |[low, high], r| {
@@ -495,82 +403,11 @@ impl Departure {
     }
 }
 
-/// What draws add to the first truth under a filter, as factors; they hardly depend on the filter.
-struct DrawFactors {
-    /// The upper end of each ratio, in the order of [`departures`].
-    ratios: Vec<f64>,
-    /// The same of the ratios over the whole run.
-    over_run: [f64; REPORTED],
-    /// The mean NEES of all.
-    nees: f64,
-    /// The root mean square of all at the ends of outages.
-    rmse_end: Vec<[f64; REPORTED]>,
-}
-
-impl DrawFactors {
-    /// Of a filter under the first truth and its draws, whose consistency is known.
-    fn of(
-        assessments: &[Assessment],
-        drawn: &UpperEnd<'_>,
-        consistency: &FilterConsistency,
-    ) -> Self {
-        let first = &assessments[..1];
-        let (all, alone) = (
-            departures(assessments, Some(drawn)),
-            departures(first, None),
-        );
-        let over_run = over_run_of(assessments, Some(drawn)).map(|d| d.ratio);
-        let alone_over_run = over_run_of(first, None).map(|d| d.ratio);
-        let alone_consistency = FilterConsistency::of(first, None);
-        let over = |all: &[f64; REPORTED], alone: &[f64; REPORTED]| {
-            std::array::from_fn(|i| all[i] / alone[i])
-        };
-        let rmse_end = consistency.rmse_end.iter().zip(&alone_consistency.rmse_end);
-        Self {
-            ratios: all
-                .iter()
-                .zip(&alone)
-                .map(|(all, alone)| all.ratio / alone.ratio)
-                .collect(),
-            over_run: over(&over_run, &alone_over_run),
-            nees: consistency.nees / alone_consistency.nees,
-            rmse_end: rmse_end.map(|(all, alone)| over(all, alone)).collect(),
-        }
-    }
-
-    /// The consistency of another filter, by the first truth.
-    fn consistency(&self, first: &[Assessment]) -> FilterConsistency {
-        let mut consistency = FilterConsistency::of(first, None);
-        let mut departures = departures(first, None);
-        multiply(departures.iter_mut().map(|d| &mut d.ratio), &self.ratios);
-        consistency.largest = Departure::largest(&departures);
-        consistency.nees *= self.nees;
-        let ends = consistency.rmse_end.iter_mut().flatten();
-        multiply(ends, self.rmse_end.as_flattened());
-        consistency
-    }
-
-    /// Takes the errors of the first truth to the upper ends of their intervals.
-    fn enlarge(&self, first: &mut Assessment) {
-        let ends = first.outage_ends.iter_mut().flat_map(|end| &mut end.rmse);
-        multiply(ends, &self.ratios);
-        for report in &mut first.reports {
-            multiply(&mut report.rmse, &self.over_run);
-        }
-    }
-}
-
-fn multiply<'a>(all: impl IntoIterator<Item = &'a mut f64>, factors: &[f64]) {
-    all.into_iter()
-        .zip(factors)
-        .for_each(|(x, factor)| *x *= factor);
-}
-
 /// Every state at every place where a filter is judged: at the ends of outages and then over the whole run; without outages
 /// wherever it reports.
-fn departures(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Vec<Departure> {
+fn departures(assessments: &[Assessment]) -> Vec<Departure> {
     let at = |outage: Option<usize>, instants: fn(&Assessment) -> &[Consistency], k: usize| {
-        states(assessments, drawn, outage, &|a| instants(a)[k].ratio())
+        states(assessments, outage, &|a| instants(a)[k].ratio())
     };
     match assessments[0].outage_ends.len() {
         0 => (0..assessments[0].reports.len())
@@ -578,33 +415,32 @@ fn departures(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Vec<D
             .collect(),
         ends => {
             let at_ends = (0..ends).flat_map(|k| at(Some(k), |a| &a.outage_ends, k));
-            at_ends.chain(over_run_of(assessments, drawn)).collect()
+            at_ends.chain(over_run_of(assessments)).collect()
         }
     }
 }
 
-fn over_run_of(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> [Departure; REPORTED] {
-    states(assessments, drawn, None, &Assessment::ratio_over_run)
+fn over_run_of(assessments: &[Assessment]) -> [Departure; REPORTED] {
+    states(assessments, None, &Assessment::ratio_over_run)
 }
 
 /// Every state at one place.
 fn states(
     assessments: &[Assessment],
-    drawn: Option<&UpperEnd<'_>>,
     outage: Option<usize>,
     ratios: &dyn Fn(&Assessment) -> [f64; REPORTED],
 ) -> [Departure; REPORTED] {
     let of_truths: Vec<[f64; REPORTED]> = assessments.iter().map(ratios).collect();
     std::array::from_fn(|state| {
-        let ratios: Vec<f64> = of_truths.iter().map(|of_truth| of_truth[state]).collect();
-        let ratio = counted(&ratios, drawn);
-        let distance = |truth: &usize| (ratios[*truth] - ratio).abs();
-        let truth = (0..ratios.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let ratios = of_truths.iter().map(|of_truth| of_truth[state]);
+        let largest = ratios
+            .enumerate()
+            .fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
         Departure {
-            ratio,
+            ratio: largest.1,
             state,
             outage,
-            truth: truth.unwrap_or(0),
+            truth: largest.0,
         }
     })
 }
