@@ -294,7 +294,7 @@ pub fn target(design: &Design) -> Result<Target, Failure> {
         levels,
         ..Curve::default()
     };
-    let fit = fit(&curve, &design.spec, rate_hz, Weighting::Edof)?;
+    let fit = fit(&curve, &design.spec, rate_hz, design.weighting)?;
     Ok(Target { curve, fit })
 }
 

@@ -93,7 +93,8 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
         let name = format!("curve {number}");
         let of_curve = |message| refused(name.clone(), message);
         let (tau, wv, edof) = (entry.tau_s.len(), entry.wv.len(), entry.edof.len());
-        if tau != wv || tau != edof {
+        let has_bias = [0, tau].contains(&entry.log_bias.len());
+        if tau != wv || tau != edof || !has_bias {
             return Err(of_curve(format!(
                 "{tau} scales, {wv} wavelet variances and {edof} degrees of freedom"
             )));
@@ -116,6 +117,7 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
         }
         let level = |tau_s: &f64| (tau_s * rate_hz).log2().round() as u32;
         curve.classical = entry.classical_tau_s.iter().map(level).collect();
+        curve.log_bias.clone_from(&entry.log_bias);
         Ok(NamedCurve {
             sensor: Some(entry.sensor),
             axis,

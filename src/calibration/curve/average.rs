@@ -9,6 +9,7 @@ use crate::wavelet::{
     interval,
 };
 use rayon::prelude::*;
+use statrs::function::gamma::digamma;
 use std::fmt;
 use std::str::FromStr;
 
@@ -277,10 +278,6 @@ pub fn average(
     let mut curve = Curve {
         quantization,
         differing,
-        bias: match estimator.is_robust() {
-            true => tuning.bias() * kept_of_all,
-            false => 0.0,
-        },
         ..Curve::default()
     };
     for level in 1..=levels as u32 {
@@ -316,9 +313,21 @@ pub fn average(
             .map(|t| (t.samples / total).powi(2) / t.edof)
             .sum();
         curve.edof.push(1.0 / inverse);
+        let bias: f64 = kept
+            .iter()
+            .map(|t| t.samples / total * t.bias(tuning))
+            .sum();
+        // E ln(chi²/n) = psi(n/2) − ln(n/2). Where it matters a variance has about twice the degrees of freedom of eta3.
+        curve
+            .log_bias
+            .push(bias.ln_1p() + digamma(1.0 / inverse) + inverse.ln());
     }
     Ok(curve)
 }
+
+/// Largest relative bias of a robust variance, beyond which its expansion fails: the most that was measured
+/// (docs/limits.md: 21 % with two lengths of the scale in the record).
+pub(crate) const LARGEST_BIAS: f64 = 0.2;
 
 /// The terms without so many at either end. Scale by scale: a recording that is abnormal at long scales still serves at short
 /// ones.
@@ -351,6 +360,14 @@ impl Term {
             edof: replicate.edof(estimator, level, tuning),
             is_robust,
             is_without_root: is_robust && replicate.robust[i].status == Status::NoRoot,
+        }
+    }
+
+    /// Relative bias of the variance of few coefficients.
+    fn bias(&self, tuning: &Tuning) -> f64 {
+        match self.is_robust {
+            true => (tuning.bias() / self.edof).min(LARGEST_BIAS),
+            false => 0.0,
         }
     }
 }

@@ -8,6 +8,6 @@ pub use average::{
     CalibrationError, Cause, Estimator, Group, Pool, Replicate, Scope, Trim, average, grouped,
     median, replicates, trend,
 };
-pub(crate) use average::{MAD_TO_DEVIATION, falling_root, p_value};
+pub(crate) use average::{LARGEST_BIAS, MAD_TO_DEVIATION, falling_root, p_value};
 pub use sampling::implied;
 pub use stationarity::{Beginning, WarmUp, warm_up};

@@ -6,7 +6,6 @@ use crate::model::ModelSpec;
 use crate::noise::{Composite, Kind, ParameterError, ParameterRef, Process};
 use crate::wavelet::Curve;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use statrs::function::gamma::digamma;
 use std::fmt::Display;
 
 /// Fits a model to a curve. The rate (Hz) is what a GM is sampled at.
@@ -39,26 +38,13 @@ pub fn fit(
     }
 }
 
-/// Largest relative bias of a robust variance, beyond which its expansion fails: the most that was measured
-/// (docs/limits.md: 21 % with two lengths of the scale in the record).
-pub(crate) const LARGEST_BIAS: f64 = 0.2;
-
-/// The curve whose logarithm is on average that of the model's: without the bias of robust variances of few coefficients, and
-/// without that of a logarithm, E ln(chi²/n) = psi(n/2) − ln(n/2). At the scales where it matters a variance has about twice
-/// the degrees of freedom that eta3 says.
+/// The curve whose logarithm is on average that of the model's.
 fn centred(curve: &Curve) -> Curve {
-    let at_level = |((wv, edof), level): ((&f64, &f64), &u32)| {
-        let bias = match curve.response(*level) {
-            Some(_) => (curve.bias / edof).min(LARGEST_BIAS),
-            None => 0.0,
-        };
-        wv / (1.0 + bias) / (digamma(*edof) - edof.ln()).exp()
-    };
-    let scales = curve.wv.iter().zip(&curve.edof).zip(&curve.levels);
-    Curve {
-        wv: scales.map(at_level).collect(),
-        ..curve.clone()
+    let mut centred = curve.clone();
+    for (wv, bias) in centred.wv.iter_mut().zip(&curve.log_bias) {
+        *wv *= (-bias).exp();
     }
+    centred
 }
 
 /// Fits with the variance of ln nu at which the scales are as far from the model as their number says, where chance does not
@@ -641,7 +627,7 @@ mod tests {
             let truth = Process::new(kind, shape, 0.3, 100.0).unwrap();
             let curve = Curve {
                 wv: (1..=14).map(|level| truth.haar_wv(level)).collect(),
-                edof: vec![1e9; 14],
+                edof: vec![50.0; 14],
                 levels: (1..=14).collect(),
                 ..Curve::default()
             };

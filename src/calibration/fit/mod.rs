@@ -6,7 +6,7 @@ mod search;
 
 pub(crate) use avlr::avlr;
 pub use least_squares::{Fit, Weighting, fit};
-pub(crate) use least_squares::{LARGEST_BIAS, correlated, refit, score, too_few_scales};
+pub(crate) use least_squares::{correlated, refit, score, too_few_scales};
 pub(crate) use search::Range;
 pub use search::Termination;
 

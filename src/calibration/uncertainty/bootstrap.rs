@@ -14,8 +14,8 @@ use super::intervals::{intervals, practical_intervals};
 use super::spread::{LEVEL as ALIKE_LEVEL, Spread, alike_p_value};
 use super::varying::{parameter_spreads, simpler};
 use crate::curve::sampling::{SamplingLaw, implied};
-use crate::curve::{Estimator, Group, Replicate, average, median, p_value};
-use crate::fit::{Fit, LARGEST_BIAS, Weighting, fit};
+use crate::curve::{Estimator, Group, LARGEST_BIAS, Replicate, average, median, p_value};
+use crate::fit::{Fit, Weighting, fit};
 use crate::model::ModelSpec;
 use crate::outcome::{
     Advance, Bootstrap, Goodness, Indistinct, Inference, LevelSpread, Outcome, Settings, tau_s,
@@ -126,7 +126,9 @@ impl<'a> CurveSampler<'a> {
         scattering: Scattering,
     ) -> Option<Curve> {
         if scattering == Scattering::BetweenRecordings {
-            return self.curve(between.to_vec());
+            let log_bias = Vec::new();
+            let curve = self.curve(between.to_vec());
+            return curve.map(|curve| Curve { log_bias, ..curve });
         }
         let of_recording = |(edof, between): (&Vec<f64>, &Vec<f64>)| {
             let within = self.law.draw(edof, &mut generator).into_iter();
