@@ -44,6 +44,11 @@
 //! below the command line reads a clock, the environment, a terminal or a source of randomness: generators and seeds are
 //! arguments.
 
+#![cfg_attr(
+    not(feature = "cli"),
+    allow(dead_code, unused_imports, reason = "the program uses them")
+)]
+
 #[doc(inline)]
 pub use {
     nav_sim_calibration as calibration, nav_sim_document as document,
@@ -87,4 +92,5 @@ pub mod fuzz;
     rustdoc::invalid_html_tags,
     reason = "help texts have sections of files and names to be filled in"
 )]
+#[cfg(feature = "cli")]
 pub mod cli;

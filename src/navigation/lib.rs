@@ -5,7 +5,7 @@
 //! order: one names only what stands above it.
 
 #[allow(unused_imports, reason = "sources are named in the documentation")]
-pub(crate) use nav_sim_signal::{bibliography, imu, noise, rng, units, wavelet};
+pub(crate) use nav_sim_signal::{bibliography, imu, minimise, noise, rng, units, wavelet};
 
 // L0
 pub mod lanes;

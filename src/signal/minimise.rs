@@ -1,17 +1,27 @@
 //! Minimisation within bounds: least squares by active sets, and damped Newton steps
 //! ([Levenberg-Marquardt](crate::bibliography::More78)).
 
-use argmin::core::{
-    Error, Executor, IterState, KV, Problem, Solver, State, TerminationReason, TerminationStatus,
-};
+use argmin::core::{Error, Executor, IterState, KV, Problem, Solver, State, TerminationReason};
 
 /// A step this small (natural logarithms, or numbers of the order of 1) is the last.
 const SMALL_STEP: f64 = 1e-11;
 /// No variable moves further in one step.
-const LARGE_STEP: f64 = 2.0;
-/// A damping at which no step helps.
-const HOPELESS: f64 = 1e12;
+const LARGE_STEP: f64 = 1.5;
+/// Factors on the damping, after a step that does not gain what it should and after one that does.
+const MORE: f64 = 5.0;
+const LESS: f64 = 0.2;
 const MOST_ITERATIONS: u64 = 300;
+
+/// How far a descent goes.
+#[derive(Debug, Clone, Copy)]
+pub struct Descent<'a> {
+    /// Smallest and largest value of each variable.
+    pub ranges: &'a [(f64, f64)],
+    /// Damping of the first step, in units of the curvature.
+    pub damping: f64,
+    /// A step that should gain less, or gains less, is the last; by the cost.
+    pub enough: fn(f64) -> f64,
+}
 
 /// Local minimum to which a start led.
 #[derive(Debug, Clone)]
@@ -24,49 +34,47 @@ pub struct Minimum<V> {
     pub has_converged: bool,
 }
 
-/// Descends from a start to a local minimum of a cost within `ranges`. `quadratic`: half the gradient of the cost, and half
-/// its second derivatives or Gauss and Newton's approximation of them.
-pub fn descend<V>(
-    start: &[f64],
-    ranges: &[(f64, f64)],
-    evaluate: impl Fn(&[f64]) -> V,
-    cost: impl Fn(&V) -> f64,
-    quadratic: impl Fn(&[f64], &V) -> (Vec<f64>, Matrix),
-) -> Minimum<V> {
-    let solver = DampedNewton {
-        ranges,
-        cost,
-        quadratic,
-        damping: 1e-3,
-        growth: 2.0,
-        at: start.to_vec(),
-        value: evaluate(start),
-    };
-    let run = Executor::new(evaluate, solver)
-        .configure(|state: Iterate| state.param(start.to_vec()).max_iters(MOST_ITERATIONS))
-        .timer(false)
-        .run()
-        .expect("no step fails");
-    let has_converged = matches!(
-        run.state.get_termination_reason(),
-        Some(TerminationReason::SolverConverged | TerminationReason::TargetCostReached)
-    );
-    Minimum {
-        at: run.solver.at,
-        value: run.solver.value,
-        has_converged,
+impl Descent<'_> {
+    /// Descends from a start to a local minimum of a cost. `quadratic`: half the gradient of the cost, and half its second
+    /// derivatives or Gauss and Newton's approximation of them.
+    pub fn minimum<V>(
+        self,
+        start: &[f64],
+        evaluate: impl Fn(&[f64]) -> V,
+        cost: impl Fn(&V) -> f64,
+        quadratic: impl Fn(&[f64], &V) -> (Vec<f64>, Matrix),
+    ) -> Minimum<V> {
+        let solver = DampedNewton {
+            descent: self,
+            cost,
+            quadratic,
+            at: start.to_vec(),
+            value: evaluate(start),
+            model: None,
+        };
+        let run = Executor::new(evaluate, solver)
+            .configure(|state: Iterate| state.param(start.to_vec()).max_iters(MOST_ITERATIONS))
+            .timer(false)
+            .run()
+            .expect("no step fails");
+        let reason = run.state.get_termination_reason();
+        Minimum {
+            at: run.solver.at,
+            value: run.solver.value,
+            has_converged: reason == Some(&TerminationReason::SolverConverged),
+        }
     }
 }
 
 /// Damped Newton steps, whose iterations argmin drives.
 struct DampedNewton<'a, V, C, Q> {
-    ranges: &'a [(f64, f64)],
+    descent: Descent<'a>,
     cost: C,
     quadratic: Q,
-    damping: f64,
-    growth: f64,
     at: Vec<f64>,
     value: V,
+    /// Gradient and curvature there, after a step that was refused.
+    model: Option<(Vec<f64>, Matrix)>,
 }
 
 type Iterate = IterState<Vec<f64>, (), (), (), (), f64>;
@@ -81,90 +89,104 @@ where
         "damped Newton"
     }
 
-    fn init(&mut self, _: &mut Problem<E>, state: Iterate) -> Result<(Iterate, Option<KV>), Error> {
-        Ok((state.cost((self.cost)(&self.value)), None))
-    }
-
     fn next_iter(
         &mut self,
         problem: &mut Problem<E>,
         state: Iterate,
     ) -> Result<(Iterate, Option<KV>), Error> {
         let before = (self.cost)(&self.value);
-        let (gradient, curvature) = (self.quadratic)(&self.at, &self.value);
-        let (step, expected) =
-            damped_step(&self.at, self.ranges, &gradient, &curvature, self.damping);
-        let there: Vec<f64> = self.at.iter().zip(&step).map(|(x, s)| x + s).collect();
-        let next = problem.problem("evaluations", |evaluate| Ok(evaluate(&there)))?;
-        let after = (self.cost)(&next);
-        if after < before {
-            self.damping = (self.damping * 0.2).max(1e-12);
-            self.growth = 2.0;
-            (self.at, self.value) = (there, next);
-        } else {
-            // Doubling the factor with each refusal: a start far off needs few tries to become cautious
-            // enough.
-            self.damping *= self.growth;
-            self.growth *= 2.0;
+        let model = self.model.take();
+        let model = model.unwrap_or_else(|| (self.quadratic)(&self.at, &self.value));
+        let (step, expected) = loop {
+            let found = self.descent.step(&self.at, &model);
+            if !found.0.iter().any(|s| s.abs() > LARGE_STEP) {
+                break found;
+            }
+            self.descent.damping *= MORE;
+        };
+        let enough = (self.descent.enough)(before);
+        // A gain that is not a number is none.
+        let mut goes_on = expected > enough && step.iter().any(|s| s.abs() >= SMALL_STEP);
+        if goes_on {
+            let there: Vec<f64> = self.at.iter().zip(&step).map(|(x, s)| x + s).collect();
+            let next = problem.problem("evaluations", |evaluate| Ok(evaluate(&there)))?;
+            let gain = before - (self.cost)(&next);
+            if gain > 0.6 * expected {
+                self.descent.damping *= LESS;
+            }
+            if gain > 0.1 * expected {
+                (self.at, self.value) = (there, next);
+                goes_on = gain >= enough;
+            } else {
+                self.descent.damping *= MORE;
+                self.model = Some(model);
+            }
         }
-        let state = state.param(self.at.clone()).cost((self.cost)(&self.value));
-        let is_small = step.iter().all(|s| s.abs() < SMALL_STEP);
-        // No decrease that the cost could show.
-        let is_flat = expected <= 1e-16 * before;
-        let is_done = is_small || is_flat || self.damping > HOPELESS;
-        Ok(match is_done {
-            true => (
-                state.terminate_with(TerminationReason::SolverConverged),
-                None,
-            ),
-            false => (state, None),
-        })
-    }
-
-    fn terminate(&mut self, state: &Iterate) -> TerminationStatus {
-        match state.get_cost() <= f64::MIN_POSITIVE {
-            true => TerminationStatus::Terminated(TerminationReason::TargetCostReached),
-            false => TerminationStatus::NotTerminated,
-        }
+        let state = match goes_on {
+            true => state,
+            false => state.terminate_with(TerminationReason::SolverConverged),
+        };
+        Ok((state, None))
     }
 }
 
-/// The damped step within the ranges, and the decrease the quadratic model expects of it.
-fn damped_step(
-    at: &[f64],
-    ranges: &[(f64, f64)],
-    gradient: &[f64],
-    curvature: &Matrix,
-    damping: f64,
-) -> (Vec<f64>, f64) {
-    let n = at.len();
-    let mut problem = Bounded::new(n);
-    problem.gram = *curvature;
-    let largest = (0..n)
-        .map(|i| curvature[i][i])
-        .fold(f64::MIN_POSITIVE, f64::max);
-    // Damped along the diagonal (Marquardt), so that the step does not depend on the units of the variables.
-    for i in 0..n {
-        // A variable without effect has no slope: it stays where it is.
-        problem.gram[i][i] += damping * (curvature[i][i] + 1e-12 * largest);
-    }
-    // Shifted so that the start is 0, and scaled to a unit diagonal.
-    let scale: Vec<f64> = (0..n).map(|i| problem.gram[i][i].sqrt()).collect();
-    for i in 0..n {
-        for j in 0..n {
-            problem.gram[i][j] /= scale[i] * scale[j];
+impl Descent<'_> {
+    /// The damped step within the ranges, and the decrease that the quadratic model expects of it.
+    fn step(&self, at: &[f64], (gradient, curvature): &(Vec<f64>, Matrix)) -> (Vec<f64>, f64) {
+        let n = at.len();
+        let mut problem = Bounded::new(n);
+        // Shifted so that the start is 0, and scaled to a unit diagonal.
+        let scale: Vec<f64> = (0..n)
+            .map(|i| (curvature[i][i] + self.damping).sqrt())
+            .collect();
+        for i in 0..n {
+            for j in 0..n {
+                let damping = if i == j { self.damping } else { 0.0 };
+                problem.gram[i][j] = (curvature[i][j] + damping) / (scale[i] * scale[j]);
+            }
+            let (low, high) = self.ranges[i];
+            problem.right[i] = -gradient[i] / scale[i];
+            problem.lower[i] = (low - at[i]) * scale[i];
+            problem.upper[i] = (high - at[i]) * scale[i];
         }
-        let (low, high) = ranges[i];
-        problem.right[i] = -gradient[i] / scale[i];
-        problem.lower[i] = (low - at[i]).max(-LARGE_STEP) * scale[i];
-        problem.upper[i] = (high - at[i]).min(LARGE_STEP) * scale[i];
+        // The bounds are part of the quadratic problem: cut off afterwards, the step of the other variables would be
+        // wrong.
+        let scaled = problem.minimise();
+        let step: Vec<f64> = (0..n).map(|i| scaled[i] / scale[i]).collect();
+        let slope = |i: usize| {
+            let bent: f64 = (0..n).map(|j| curvature[i][j] * step[j]).sum();
+            -(2.0 * gradient[i] + bent) * step[i]
+        };
+        let expected = (0..n).map(slope).sum();
+        (step, expected)
     }
-    // The bounds are part of the quadratic problem: cut off afterwards, the step of the other variables would be
-    // wrong.
-    let scaled = problem.minimise();
-    let step = (0..n).map(|i| scaled[i] / scale[i]).collect();
-    // Gradient and curvature are halves: the cost falls by 2g·s − s·Hs, which is g·s where Hs = g, g downhill.
-    (step, (0..n).map(|i| scaled[i] * problem.right[i]).sum())
+}
+
+/// Where a function of one variable is least between two points, by golden sections.
+pub fn golden_section(mut low: f64, mut high: f64, tolerance: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    while high - low > tolerance {
+        let by = golden * (high - low);
+        if f(high - by) <= f(low + by) {
+            high = low + by
+        } else {
+            low = high - by
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// Where a condition on a positive number ends to hold, to a relative tolerance.
+pub fn bisection(mut low: f64, mut high: f64, tolerance: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    while high - low > tolerance * high {
+        let middle = 0.5 * (low + high);
+        if holds(middle) {
+            low = middle
+        } else {
+            high = middle
+        }
+    }
+    0.5 * (low + high)
 }
 
 // Least squares with bounds, from the normal equations: minimises ½·xᵀGx − rᵀx over lower ≤ x ≤ upper.

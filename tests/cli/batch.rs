@@ -185,13 +185,13 @@ fn killed_workers_leave_no_trace() {
     let place = place();
     let dir = place.path();
     let start = Instant::now();
-    ended(dir, "batch study.toml -o whole -j 1 --set runs=400", 0);
+    ended(dir, "batch study.toml -o whole -j 1 --set runs=150", 0);
     let undisturbed = start.elapsed();
     let mut random = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(1);
     let (mut kills, mut amid) = (0, 0);
     while kills < 20 || amid < 3 {
         let mut workers =
-            [0, 1].map(|_| spawn(dir, "batch study.toml -o killed -j 1 --set runs=400"));
+            [0, 1].map(|_| spawn(dir, "batch study.toml -o killed -j 1 --set runs=150"));
         std::thread::sleep(undisturbed.mul_f64(random.random_range(0.0..0.6)));
         for worker in &mut workers {
             worker.kill().unwrap();
@@ -208,7 +208,7 @@ fn killed_workers_leave_no_trace() {
         }
         assert!(kills < 200, "no worker gets to a cell");
     }
-    ended(dir, "batch study.toml -o killed --set runs=400", 0);
+    ended(dir, "batch study.toml -o killed --set runs=150", 0);
     assert_eq!(results(&dir.join("killed")), results(&dir.join("whole")));
 }
 

@@ -242,6 +242,7 @@ def pattern(text):
 
 RENAMED = [(pattern(old), new) for old, new in MAP["keys"].items()]
 DROPPED = [pattern(old) for old in MAP["dropped"]]
+CHANGED = [(pattern(path), tolerance) for path, tolerance in MAP["changed_minimiser"].items()]
 
 
 def path_now(path):
@@ -270,10 +271,9 @@ def scales(values):
 
 
 def after_minimiser(path, old, new, stored, tolerance):
-    """An objective is no higher by 1e-9, a parameter is within 2 % of half its interval, all else within the tolerance."""
-    key = path.rsplit("/", 1)[-1]
-    if key == "objective":
-        return new <= old + 1e-9 * abs(old)
+    """An objective is no higher, a parameter is within 2 % of half its interval, all else within the tolerance."""
+    if path.endswith("/objective"):
+        return new <= old + tolerance * abs(old)
     low, high = (stored.get(f"{path}_ci95/{i}") for i in (0, 1))
     if low is not None and high is not None and abs(new - old) <= 0.02 * (high - low) / 2:
         return True
@@ -303,8 +303,9 @@ def differences(name, stored, now, tolerance):
             continue
         def close(a, b):
             strict = abs(a - b) <= tolerance * max(abs(a), abs(b), largest.get(path.rsplit("/", 1)[0], 0.0))
-            is_relaxed = name in MAP["changed_minimiser"] or (tolerance > 1e-12 and FITTED.match(name))
-            return strict or (is_relaxed and after_minimiser(path, a, b, stored, MAP["changed_minimiser"].get(name, 1e-3)))
+            changed = next((wider for old, wider in CHANGED if old.fullmatch(path)), None)
+            is_relaxed = changed or (tolerance > 1e-12 and FITTED.match(name))
+            return strict or (is_relaxed and after_minimiser(path, a, b, stored, changed or 1e-3))
         if place not in now:
             lines.append(f"{place}: {old} -> missing")
         elif not is_equal(old, now[place], close):

@@ -7,7 +7,7 @@
 
 use super::least_squares::Weighting;
 use crate::curve::sampling::Response;
-use crate::minimise::{self, Bounded, MOST, Matrix, Vector, cholesky_solve};
+use crate::minimise::{Bounded, Descent, MOST, Matrix, Vector, cholesky_solve};
 use crate::noise::Kind;
 use crate::wavelet::{Curve, QuantizationResponse};
 use rayon::prelude::*;
@@ -690,9 +690,13 @@ pub(crate) struct End {
 /// Descends from a start to the local minimum.
 fn descend(objective: &Objective, start: &[f64]) -> End {
     let ranges: Vec<(f64, f64)> = objective.shaped().map(|(_, r)| (r.low, r.high)).collect();
-    let found = minimise::descend(
+    let descent = Descent {
+        ranges: &ranges,
+        damping: 1e-6,
+        enough: |cost| 1e-15 * cost,
+    };
+    let found = descent.minimum(
         start,
-        &ranges,
         |u| objective.solve(u),
         Solution::cost,
         |u, at| {

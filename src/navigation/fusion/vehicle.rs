@@ -372,8 +372,8 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
 #[cfg(test)]
 mod standstill_tests {
     use super::*;
+    use crate::rng::Generator;
     use rand::SeedableRng;
-    use rand::rngs::StdRng;
     use rand_distr::{Distribution, StandardNormal};
 
     const RATE_HZ: f64 = 100.0;
@@ -385,7 +385,7 @@ mod standstill_tests {
         seed: u64,
         motion: impl Fn(f64) -> [DVec3; 2],
     ) -> Vec<ImuIncrement> {
-        let mut source = StdRng::seed_from_u64(seed);
+        let mut source = Generator::seed_from_u64(seed);
         let mut noise = |sigma: f64| {
             DVec3::from_array(std::array::from_fn(|_| {
                 let normal: f64 = StandardNormal.sample(&mut source);

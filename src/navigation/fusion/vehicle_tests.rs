@@ -8,6 +8,7 @@ use super::{
 };
 use crate::ekf::Belief;
 use crate::imu::ImuIncrement;
+use crate::rng::Generator;
 use crate::scenario::aiding_tests::{OUTAGE, consumer, scenario, town};
 use crate::sensors::aiding::{AidingSettings, NhcSettings, OdometerSettings, ZuptSettings};
 use crate::sensors::imu::Truth;
@@ -17,7 +18,6 @@ use crate::simulation::{Plan, Recording, record};
 use crate::trajectory::Trajectory;
 use glam::{DQuat, DVec3};
 use rand::SeedableRng;
-use rand::rngs::StdRng;
 use rand_distr::{Distribution, StandardNormal};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -71,7 +71,7 @@ fn recorded(
 
 /// Forward speed (m/s) of a drive at ten samples a second, times a scale, with 0.05 m/s of white noise.
 fn wheel(trajectory: &Trajectory, scale: f64, seed: u64) -> Vec<WheelSpeed> {
-    let mut source = StdRng::seed_from_u64(seed);
+    let mut source = Generator::seed_from_u64(seed);
     let mut speed = |k: u32| {
         let t_s = 0.1 * f64::from(k);
         let state = trajectory.state(t_s);
@@ -166,7 +166,7 @@ fn ends(aiding: &AidingSettings, runs: u64) -> Ends {
             gnss: &recording.gnss,
             aids: &[],
         };
-        let mut source = StdRng::seed_from_u64(run);
+        let mut source = Generator::seed_from_u64(run);
         let mut noise = || {
             let normal: f64 = StandardNormal.sample(&mut source);
             0.1 * normal

@@ -1,5 +1,6 @@
 //! Estimates from a finite number of runs, with their uncertainty.
 
+use crate::minimise::bisection;
 use crate::simulation::{REPORTED, REPORTED_NAMES};
 use nalgebra::{Complex, DMatrix};
 use serde::de::Error as _;
@@ -387,15 +388,7 @@ impl QuadraticForm {
             (low, high) = (high, 2.0 * high);
         }
         // Bisection of a monotone slope; the place of the line need not be exact, only its neighbourhood.
-        for _ in 0..100 {
-            let middle = 0.5 * (low + high);
-            if slope(middle) < 0.0 {
-                low = middle
-            } else {
-                high = middle
-            }
-        }
-        let p = 0.5 * (low + high);
+        let p = bisection(low, high, 1e-15, |p| slope(p) < 0.0);
         let curvature = self.sum(|w, d| {
             let base = 1.0 + 2.0 * w * p;
             2.0 * w * w / (base * base) + 4.0 * w * w * d * d / (base * base * base)
@@ -415,18 +408,7 @@ impl QuadraticForm {
             (low, high) = (high, 2.0 * high);
         }
         // Bisection, since near 0 and 1 the distribution function has only its rounding to give to a secant.
-        while high - low > 1e-12 * high {
-            let middle = 0.5 * (low + high);
-            if middle <= low || middle >= high {
-                break;
-            }
-            if self.cdf(middle) < probability {
-                low = middle
-            } else {
-                high = middle
-            }
-        }
-        0.5 * (low + high)
+        bisection(low, high, 1e-12, |x| self.cdf(x) < probability)
     }
 
     /// E √Q = π^(−1/2) ∫ (1 − φ(u²)) du/u², with u = e^y by the trapezoidal rule, whose error is e^(−2π²), 3e-9, at most:

@@ -26,6 +26,7 @@
 
 use super::continuous::{walk_density, white_density};
 use super::{Composite, Kind, Process};
+use crate::minimise::golden_section;
 use crate::units::Refused;
 
 /// Allan deviation over B of pure flicker noise: √(2 ln 2/π) = 0.664.
@@ -499,17 +500,8 @@ fn least(low: f64, high: f64, steps: u32, f: impl Fn(f64) -> f64) -> (f64, f64) 
         .map(|i| (i, f(grid(i))))
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .map_or(0, |(i, _)| i);
-    let (mut a, mut b) = (grid(best.saturating_sub(1)), grid((best + 1).min(steps)));
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    while b - a > 1e-9 * (1.0 + a.abs()) {
-        let (left, right) = (b - golden * (b - a), a + golden * (b - a));
-        if f(left) <= f(right) {
-            b = right
-        } else {
-            a = left
-        }
-    }
-    let middle = 0.5 * (a + b);
+    let (low, high) = (grid(best.saturating_sub(1)), grid((best + 1).min(steps)));
+    let middle = golden_section(low, high, 1e-9 * (1.0 + low.abs()), &f);
     // The end of the interval may be the best and golden sections only come near it.
     [grid(best), middle]
         .map(|x| (x, f(x)))

@@ -5,7 +5,7 @@
 //! integral is bounded. So is a drift: the filter has a state for its slope. The reduction is a pure function of model, interval and window.
 
 use super::{Composite, Kind, ParameterError, Process};
-use nalgebra::{Matrix3, Vector3};
+use crate::minimise::{Descent, MOST, Matrix};
 
 /// Longest time scale that matters to a filter whose longest outage is given (s): eight times the outage,
 /// at least 800 s. A window that ends with the outage makes the filter trust itself too much.
@@ -116,7 +116,7 @@ struct Fit {
 }
 
 impl Fit {
-    /// Best start of a grid over the correlation time, then Levenberg-Marquardt.
+    /// Best start of a grid over the correlation time, then a descent.
     fn solve(&self) -> [f64; 3] {
         let (first, last) = (
             f64::from(self.levels[0]),
@@ -160,7 +160,7 @@ impl Fit {
         [x.max(1e-9 / a_max).ln(), y.max(1e-9 / b_max).ln(), ln_kappa]
     }
 
-    fn residuals(&self, x: &[f64; 3]) -> Vec<f64> {
+    fn residuals(&self, x: &[f64]) -> Vec<f64> {
         let (white, variance, kappa) = (x[0].exp(), x[1].exp(), x[2].exp());
         let model = |l| {
             white * Kind::White.haar_shape(0.0, l).0
@@ -173,56 +173,42 @@ impl Fit {
             .collect()
     }
 
-    fn cost(&self, x: &[f64; 3]) -> f64 {
+    fn cost(&self, x: &[f64]) -> f64 {
         self.residuals(x).iter().map(|r| r * r).sum()
     }
 
-    /// Levenberg-Marquardt with the analytic Jacobian, to a stationary point or 200 steps.
-    fn polish(&self, mut x: [f64; 3]) -> [f64; 3] {
-        let (mut cost, mut damping) = (self.cost(&x), 1e-3);
-        for _ in 0..200 {
-            let (normal, gradient) = self.normal_equations(&x);
-            // Marquardt's scaling by the diagonal; the 1e-12 keeps the matrix regular where an amplitude has
-            // vanished and its row with it.
-            let damped =
-                normal + Matrix3::from_diagonal(&normal.diagonal().add_scalar(1e-12)) * damping;
-            let Some(step) = damped.lu().solve(&-gradient) else {
-                break;
-            };
-            // a parameter that the fit does not feel may wander: at most e² a step
-            let trial = std::array::from_fn(|i| x[i] + step[i].clamp(-2.0, 2.0));
-            let trial_cost = self.cost(&trial);
-            if trial_cost <= cost {
-                let done = step.amax() < 1e-10;
-                (x, cost, damping) = (trial, trial_cost, (damping * 0.2).max(1e-12));
-                if done {
-                    break;
-                }
-            } else {
-                damping *= 5.0;
-                if damping > 1e12 {
-                    break;
-                }
-            }
-        }
-        x
+    fn polish(&self, start: [f64; 3]) -> [f64; 3] {
+        let descent = Descent {
+            // The logarithms of all numbers there are.
+            ranges: &[(-700.0, 700.0); 3],
+            damping: 1e-3,
+            enough: |cost| 1e-15 * cost,
+        };
+        let found = descent.minimum(
+            &start,
+            |x| self.cost(x),
+            |cost| *cost,
+            |x, _| self.normal_equations(x),
+        );
+        std::array::from_fn(|i| found.at[i])
     }
 
-    fn normal_equations(&self, x: &[f64; 3]) -> (Matrix3<f64>, Vector3<f64>) {
+    /// Half the gradient of the cost and half of Gauss and Newton's second derivatives.
+    fn normal_equations(&self, x: &[f64]) -> (Vec<f64>, Matrix) {
         let (white, variance, kappa) = (x[0].exp(), x[1].exp(), x[2].exp());
-        let (mut normal, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
+        let (mut normal, mut gradient) = ([[0.0; MOST]; MOST], vec![0.0; 3]);
         for (level, target) in self.levels.iter().zip(&self.target) {
             let (shape, slope) = Kind::GaussMarkov.haar_shape(kappa, *level);
-            let (a, b) = (
-                white * Kind::White.haar_shape(0.0, *level).0,
-                variance * shape,
-            );
+            let a = white * Kind::White.haar_shape(0.0, *level).0;
+            let b = variance * shape;
             // d ln(a + b) with respect to ln sigma2, ln variance and ln kappa.
-            let row = Vector3::new(a, b, variance * slope * kappa) / (a + b);
-            normal += row * row.transpose();
-            gradient += row * ((a + b) / target).ln();
+            let row = [a, b, variance * slope * kappa].map(|part| part / (a + b));
+            for i in 0..3 {
+                (0..3).for_each(|j| normal[i][j] += row[i] * row[j]);
+                gradient[i] += row[i] * ((a + b) / target).ln();
+            }
         }
-        (normal, gradient)
+        (gradient, normal)
     }
 }
 

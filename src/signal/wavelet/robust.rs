@@ -11,6 +11,7 @@
 use super::WaveletError;
 use super::haar::{Compensated, Pyramid, array, pairwise};
 use super::interval::edof_eta3;
+use crate::minimise::golden_section;
 use multiversion::multiversion;
 use statrs::function::erf::erf;
 use std::f64::consts::{PI, SQRT_2};
@@ -262,18 +263,9 @@ impl Equation<'_> {
 
     /// The largest g within a step of the march around s, by golden section.
     fn summit(&self, s: f64) -> (f64, f64) {
-        const GOLDEN: f64 = 0.618_033_988_749_894_9;
-        let (mut low, mut high) = (s.ln() - STEP.ln(), s.ln() + STEP.ln());
         // g is flat at its maximum: 1e-7 of ln s is 1e-14 of g, and a comparison of two g tells no more.
-        while high - low > 1e-7 {
-            let (left, right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
-            if self.at(left.exp()).0 > self.at(right.exp()).0 {
-                high = right;
-            } else {
-                low = left;
-            }
-        }
-        let top = (0.5 * (low + high)).exp();
+        let (u, step) = (s.ln(), STEP.ln());
+        let top = golden_section(u - step, u + step, 1e-7, |u| -self.at(u.exp()).0).exp();
         (top, self.at(top).0)
     }
 }

@@ -12,6 +12,7 @@ use crate::earth::GravityModel;
 use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings};
 use crate::imu::{Axis, Channel};
 use crate::linalg::mean;
+use crate::minimise::{Descent, MOST, Minimum};
 use crate::noise::{Model, Process, reduction};
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::defects::ImuSettings;
@@ -25,7 +26,6 @@ use crate::trajectory::profile::{
     Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
 };
 use crate::units::DEG;
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// White noise, drive, correlation time: of the accelerometers front and right, down, of the gyroscopes front and right,
@@ -156,16 +156,13 @@ impl Search<'_> {
             ln
         };
         let value = |free: &[f64]| self.value(&factors(free));
-        let descent = Damped {
-            value: &value,
-            bounds: (-MAX_LN, MAX_LN),
-            iterations: ITERATIONS,
-            enough: ENOUGH,
-        };
-        let start = self.free.iter().map(|i| START[*i]).collect();
-        descent
-            .minimum(start)
-            .map_or([0.0; FACTORS], |found| factors(&found))
+        let start: Vec<f64> = self.free.iter().map(|i| START[*i]).collect();
+        let found = minimum(value, &start, (-MAX_LN, MAX_LN), |_| ENOUGH);
+        if found.value.cost.is_finite() {
+            factors(&found.at)
+        } else {
+            [0.0; FACTORS]
+        }
     }
 }
 
@@ -173,7 +170,6 @@ impl Search<'_> {
 const START: Factors = [0.3, -0.3, 1.0, 0.3, -0.3, 1.0, 0.3, 0.0, 0.4, 0.3, 0.0, 0.4];
 /// Cost of a factor e: what the fixes do not tell stays near the wavelet reduction.
 const RIDGE: f64 = 5e-4;
-const ITERATIONS: usize = 40;
 /// Largest logarithm of a factor.
 const MAX_LN: f64 = 6.0;
 /// A step that gains less is the last: 2e-3 of divergence is 1 % in each of nine standard deviations.
@@ -414,20 +410,10 @@ fn path(duration_s: f64) -> Option<Trajectory> {
     .ok()
 }
 
-// Descent by damped Gauss-Newton steps ([Levenberg-Marquardt](crate::bibliography::More78)) with forward differences,
-// of a cost that says what it is made of.
+// Descent by damped Gauss-Newton steps with forward differences, of a cost that says what it is made of.
 
 /// Step of the forward differences, for variables that are logarithms of factors.
 const DIFFERENCE: f64 = 0.02;
-/// Longest step of a variable.
-const MAX_STEP: f64 = 1.5;
-/// Damping of the first step: where the cost falls by a tenth for a factor e, it still moves by as much.
-const DAMPING: f64 = 0.1;
-/// Factors on the damping, after a step that does not gain what it should and after one that does.
-const MORE: f64 = 5.0;
-const LESS: f64 = 0.2;
-/// How often a step is damped further.
-const TRIALS: usize = 8;
 
 /// A value of the cost.
 pub(super) struct Value {
@@ -453,100 +439,46 @@ pub(super) struct Part {
     pub curvature: f64,
 }
 
-/// What is minimised, and how far.
-pub(super) struct Damped<'a> {
-    pub value: &'a (dyn Fn(&[f64]) -> Value + Sync),
-    /// Smallest and largest value of every variable.
-    pub bounds: (f64, f64),
-    pub iterations: usize,
-    /// A step that gains less is the last.
-    pub enough: f64,
-}
-
-impl Damped<'_> {
-    /// The variables of a minimum near `start`; the same on any number of threads. None where the cost of the
-    /// start is not finite.
-    pub(super) fn minimum(&self, start: Vec<f64>) -> Option<Vec<f64>> {
-        let mut x = DVector::from_vec(start);
-        let mut value = (self.value)(x.as_slice());
-        let mut damping = DAMPING;
-        if !value.cost.is_finite() {
-            return None;
-        }
-        for _ in 0..self.iterations {
-            let Some((next, next_value)) = self.descend(&x, &value, &mut damping) else {
-                break;
-            };
-            let gain = value.cost - next_value.cost;
-            (x, value) = (next, next_value);
-            if gain < self.enough {
-                break;
-            }
-        }
-        Some(x.as_slice().to_vec())
-    }
-
-    /// Quadratic model of the cost near a point: its gradient and Gauss and Newton's Hessian Σ c ∂f ∂fᵀ of its parts f.
-    fn quadratic(&self, x: &DVector<f64>, here: &Value) -> Option<(DVector<f64>, DMatrix<f64>)> {
+/// Minimum of a cost near `start`, the same on any number of threads; the start where its cost is not finite.
+pub(super) fn minimum(
+    value: impl Fn(&[f64]) -> Value + Sync,
+    start: &[f64],
+    bounds: (f64, f64),
+    enough: fn(f64) -> f64,
+) -> Minimum<Value> {
+    // Half the gradient, and half of Gauss and Newton's Hessian Σ c ∂f ∂fᵀ of the parts f.
+    let quadratic = |x: &[f64], here: &Value| {
         let beside = |i: usize| {
-            let mut beside = x.clone();
+            let mut beside = x.to_vec();
             beside[i] += DIFFERENCE;
-            (self.value)(beside.as_slice())
+            value(&beside)
         };
-        // One-sided: half the evaluations of central differences, each of which is a pass along the whole
-        // track.
+        // One-sided: half the evaluations of central differences, each of which is a pass along the whole track.
         let beside: Vec<Value> = (0..x.len()).into_par_iter().map(beside).collect();
-        if beside.iter().any(|value| !value.cost.is_finite()) {
-            return None;
-        }
-        let slope = |i: usize, k: usize| {
-            let (here, there) = (here.parts[i], beside[k].parts[i]);
-            here.curvature.sqrt() * (there.value - here.value) / DIFFERENCE
+        let slope = |(here, there): (&Part, &Part)| {
+            (0.5 * here.curvature).sqrt() * (there.value - here.value) / DIFFERENCE
         };
-        let jacobian = DMatrix::from_fn(here.parts.len(), x.len(), slope);
-        let hessian = jacobian.tr_mul(&jacobian);
-        // A forward difference is the slope half a step further on: the Hessian, which is known, takes it back.
-        let gradient = DVector::from_fn(x.len(), |i, _| {
-            (beside[i].cost - here.cost) / DIFFERENCE - 0.5 * DIFFERENCE * hessian[(i, i)]
-        });
-        Some((gradient, hessian))
-    }
-
-    /// The step that gains, damped until it does and is short; none where it has nothing to gain.
-    fn descend(
-        &self,
-        x: &DVector<f64>,
-        value: &Value,
-        damping: &mut f64,
-    ) -> Option<(DVector<f64>, Value)> {
-        let (gradient, hessian) = self.quadratic(x, value)?;
-        for _ in 0..TRIALS {
-            let step = loop {
-                let damped = &hessian + DMatrix::identity(x.len(), x.len()) * *damping;
-                let step = -damped.cholesky()?.solve(&gradient);
-                if step.amax() <= MAX_STEP {
-                    break step;
-                }
-                *damping *= MORE;
-            };
-            // by how much the cost should fall
-            let expected = -(gradient.dot(&step) + 0.5 * step.dot(&(&hessian * &step)));
-            if expected < self.enough {
-                return None;
+        let slopes = |there: &Value| here.parts.iter().zip(&there.parts).map(slope).collect();
+        let jacobian: Vec<Vec<f64>> = beside.iter().map(slopes).collect();
+        let mut hessian = [[0.0; MOST]; MOST];
+        for (i, a) in jacobian.iter().enumerate() {
+            for (j, b) in jacobian.iter().enumerate() {
+                hessian[i][j] = a.iter().zip(b).map(|(a, b)| a * b).sum();
             }
-            let next = (x + step).map(|x| x.clamp(self.bounds.0, self.bounds.1));
-            let next_value = (self.value)(next.as_slice());
-            let share = (value.cost - next_value.cost) / expected;
-            if share > 0.6 {
-                *damping *= LESS;
-            }
-            if share > 0.1 {
-                return Some((next, next_value));
-            }
-            *damping *= MORE;
         }
-        None
-    }
+        // A forward difference is the slope half a step further on: the Hessian, which is known, takes it back.
+        let slope = |(i, there): (usize, &Value)| {
+            0.5 * ((there.cost - here.cost) / DIFFERENCE - DIFFERENCE * hessian[i][i])
+        };
+        (beside.iter().enumerate().map(slope).collect(), hessian)
+    };
+    let descent = Descent {
+        ranges: &vec![bounds; start.len()],
+        // Half of 0.1: where the cost falls by a tenth for a factor e, the first step moves by as much.
+        damping: 0.05,
+        enough,
+    };
+    descent.minimum(start, &value, |value| value.cost, quadratic)
 }
 
 #[cfg(test)]
@@ -569,18 +501,12 @@ mod damped_tests {
                     .into(),
             }
         };
-        let damped = |bounds| Damped {
-            value: &valley,
-            bounds,
-            iterations: 60,
-            enough: 1e-9,
-        };
-        let found = damped((-3.0, 3.0)).minimum(vec![-1.0, 0.0]).unwrap();
+        let found = minimum(valley, &[-1.0, 0.0], (-3.0, 3.0), |_| 1e-9).at;
         assert!(
             (found[0] - 1.0).abs() < 0.02 && (found[1] - 1.0).abs() < 0.04,
             "{found:?}"
         );
-        let found = damped((1.5, 3.0)).minimum(vec![2.0, 2.0]).unwrap();
+        let found = minimum(valley, &[2.0, 2.0], (1.5, 3.0), |_| 1e-9).at;
         assert!(
             (found[0] - 1.5).abs() < 1e-9 && (found[1] - 2.25).abs() < 0.02,
             "{found:?}"
@@ -589,12 +515,7 @@ mod damped_tests {
             cost: f64::NAN,
             parts: Vec::new(),
         };
-        let nowhere = Damped {
-            value: &nan,
-            bounds: (0.0, 1.0),
-            iterations: 1,
-            enough: 0.0,
-        };
-        assert_eq!(nowhere.minimum(vec![0.5]), None);
+        let nowhere = minimum(nan, &[0.5], (0.0, 1.0), |_| 0.0);
+        assert!(nowhere.at == [0.5] && !nowhere.value.cost.is_finite());
     }
 }

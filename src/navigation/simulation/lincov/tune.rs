@@ -6,7 +6,7 @@
 //! on all of them makes the filter exactly consistent.
 
 use super::pass::{Assessment, Consistency, FilterPass};
-use super::reduce::{Damped, ENDS, Part, Value, divergence};
+use super::reduce::{ENDS, Part, Value, divergence, minimum};
 use super::track::Track;
 use super::truth::TrueErrors;
 use crate::ekf::{Belief, BeliefError};
@@ -47,7 +47,6 @@ pub struct Task<'a> {
     pub aim: Aim,
 }
 
-const ITERATIONS: usize = 60;
 /// A step that gains less divergence is the last.
 const ENOUGH: f64 = 1e-6;
 /// Divergence that a standard deviation wrong by 7 % makes.
@@ -97,24 +96,16 @@ impl Task<'_> {
     fn search(&self, factors: &[Factor]) -> Result<Vec<Factor>, BeliefError> {
         let track = self.track.coarse();
         let value = |ln: &[f64]| self.value(&set(factors, ln), &track).with_ridge(RIDGE, ln);
-        let descent = Damped {
-            value: &value,
-            bounds: (0.0, MAX_LN),
-            iterations: ITERATIONS,
-            enough: ENOUGH,
-        };
+        let minimum = |start: &[f64]| minimum(value, start, (0.0, MAX_LN), |_| ENOUGH);
         // From the model as it is, which keeps factors small; and from one factor on all that makes it consistent, since between
         // the two the valley may be flat. The second counts where it is better by what can be seen.
         let unchanged = vec![0.0; factors.len()];
         let at = |ln: &[f64]| self.consistency(self.filter, &set(factors, ln));
         let exact = |ln: &[f64]| self.exact(ln, &at);
         let alike = exact(&unchanged)?;
-        let near = descent.minimum(unchanged.clone()).unwrap_or(unchanged);
-        let best = match descent.minimum(alike) {
-            Some(far) if value(&far).cost < value(&near).cost - VISIBLE => far,
-            _ => near,
-        };
-        let mut best = exact(&best)?;
+        let (near, far) = (minimum(&unchanged), minimum(&alike));
+        let is_better = far.value.cost < near.value.cost - VISIBLE;
+        let mut best = exact(&if is_better { far } else { near }.at)?;
         if self.aim == Aim::Worst {
             self.lower_alone(&mut best, &at)?;
         }
