@@ -22,7 +22,7 @@ use std::path::PathBuf;
 Examples:
   nav-sim wv calib_data/formats/own.csv
   nav-sim wv calib_data/formats/euroc.csv --axes gyro --intervals large-sample
-  nav-sim wv calib_data/formats/compressed.csv.gz --format json -o curves.json")]
+  nav-sim wv calib_data/formats/compressed.csv.gz --format json -o static.wv.json")]
 pub struct Wv {
     /// Recordings, or directories of recordings
     #[arg(id = "recording", required = true, value_name = "FILE")]
@@ -74,7 +74,7 @@ impl Command for Wv {
             schema_version: 1,
             rate_hz: report.files[0].rate_hz,
             efficiency: tuning.efficiency(),
-            edof_method: self.intervals.name(),
+            edof_method: self.intervals.name().to_owned(),
             confidence: CONFIDENCE,
             signals: signals.concat(),
         })
@@ -289,11 +289,11 @@ mod tests {
         let tau_s: Vec<f64> = (1..=14).map(|j| f64::from(j).exp2() / 100.0).collect();
         let wv: Vec<f64> = tau_s.iter().map(|tau| 1.0 / tau).collect();
         let edof: Vec<f64> = (1..=14).map(|j| 1e5 / f64::from(j).exp2()).collect();
-        let band = |factor: f64, status: &'static str| Band {
+        let band = |factor: f64, status: &str| Band {
             wv: wv.iter().map(|x| x * factor).collect(),
             ci_low: wv.clone(),
             ci_high: wv.clone(),
-            status: vec![status; 14],
+            status: vec![status.to_owned(); 14],
         };
         let signal = |k: usize| SignalCurves {
             file: format!("rec/run{k}.csv"),
@@ -309,7 +309,7 @@ mod tests {
             schema_version: 1,
             rate_hz: 100.0,
             efficiency: 0.6,
-            edof_method: "eta3",
+            edof_method: "eta3".to_owned(),
             confidence: CONFIDENCE,
             signals: (0..count).map(signal).collect(),
         }

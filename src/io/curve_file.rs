@@ -1,8 +1,9 @@
-//! Wavelet-variance curves to fit: CSV with columns `tau_samples,wv,edof`, or the JSON that `calibrate` writes.
+//! Wavelet-variance curves to fit: CSV with columns `tau_samples,wv,edof`, or the JSON that `calibrate` or `wv`
+//! writes (the classical curve of a signal is GMWM's, the robust one RGMWM's).
 
 use super::table::{Dictionary, Quantity, parse as parse_table};
 use super::{Failure, Place, source};
-use crate::report::{CurvesFile, FittedCurve};
+use crate::report::{CurvesFile, FittedCurve, SignalsFile};
 use nav_sim_signal::imu::{Axis, Sensor};
 use nav_sim_signal::wavelet::{Curve, QuantizationResponse, Tuning};
 use std::path::Path;
@@ -24,7 +25,7 @@ pub(crate) struct NamedCurve {
 
 /// What a curve file is.
 const LAYOUT: &str = "a curve is a CSV with the columns tau_samples,wv,edof (tau_samples = 2, 4, 8, …), or a .wv.json \
-                      written by calibrate";
+                      written by calibrate or wv";
 
 /// Reads the curves of a file.
 ///
@@ -73,12 +74,28 @@ fn csv(path: &str, text: &str) -> Result<NamedCurve, Failure> {
     })
 }
 
+/// What tells the file of `wv` from that of `calibrate`.
+#[derive(serde::Deserialize)]
+struct Signals {
+    signals: Option<serde::de::IgnoredAny>,
+}
+
 fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
     let syntax = |e: serde_json::Error| Failure::contents(path, e.line(), e.to_string());
+    let is_of_wv = serde_json::from_str::<Signals>(text)
+        .map_err(syntax)?
+        .signals
+        .is_some();
     let refused =
         |part: String, message: String| Failure::contents(path, Place::Part(part), message);
     let of_head = |message| refused("head".to_owned(), message);
-    let file: CurvesFile = serde_json::from_str(text).map_err(syntax)?;
+    let file = if is_of_wv {
+        let file: SignalsFile = serde_json::from_str(text).map_err(syntax)?;
+        quantization(Some(file.efficiency)).map_err(of_head)?;
+        CurvesFile::from(file)
+    } else {
+        serde_json::from_str(text).map_err(syntax)?
+    };
     let (version, rate_hz) = (file.schema_version, file.rate_hz);
     if version != 1 {
         let message = format!("schema_version = {version} is not 1, which this version reads");

@@ -62,9 +62,9 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, Failure> {
         read => read.map_err(|e| Failure::io(path, e))?,
     };
     if name.ends_with(".json") || text.trim_start().starts_with('{') {
-        // What this program says of its results has a version; of those only curves are to be read.
+        // What this program says of its results has a version; of those only curves have wavelet variances to be read.
         let has = |key: &str| text.contains(key);
-        return Ok(match has("\"schema_version\"") && !has("\"curves\"") {
+        return Ok(match has("\"schema_version\"") && !has("\"wv\"") {
             true => FileKind::Record,
             false => FileKind::Curve,
         });

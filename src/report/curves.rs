@@ -1,6 +1,6 @@
 //! Wavelet-variance curves as JSON: of signals (`wv`), and of fits (`<model>.wv.json`).
 
-use nav_sim_calibration::{Group, Outcome, Replicate, Settings, implied, tau_s};
+use nav_sim_calibration::{Estimator, Group, Outcome, Replicate, Settings, implied, tau_s};
 use nav_sim_document::{Mark, short_names};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::wavelet::interval;
@@ -12,7 +12,7 @@ use std::path::Path;
 pub(crate) const CONFIDENCE: f64 = 0.95;
 
 /// A wavelet variance with its intervals.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Band {
     /// Wavelet variance (units²).
     pub wv: Vec<f64>,
@@ -21,12 +21,12 @@ pub struct Band {
     /// Upper ends.
     pub ci_high: Vec<f64>,
     /// How each robust variance came about.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub status: Vec<&'static str>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub status: Vec<String>,
 }
 
 impl Band {
-    fn new(wv: Vec<f64>, edof: &[f64], status: Vec<&'static str>) -> Self {
+    fn new(wv: Vec<f64>, edof: &[f64], status: Vec<String>) -> Self {
         let (ci_low, ci_high) = wv
             .iter()
             .zip(edof)
@@ -42,7 +42,7 @@ impl Band {
 }
 
 /// The wavelet variances of one signal.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SignalCurves {
     /// Recording.
     pub file: String,
@@ -78,7 +78,7 @@ impl SignalCurves {
         let (values, status) = replicate
             .robust
             .iter()
-            .map(|r| (r.value, r.status.name()))
+            .map(|r| (r.value, r.status.name().to_owned()))
             .unzip();
         Self {
             file: replicate.name.clone(),
@@ -104,7 +104,7 @@ impl SignalCurves {
 }
 
 /// What `wv` prints.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SignalsFile {
     /// Layout version.
     pub schema_version: u32,
@@ -113,11 +113,43 @@ pub struct SignalsFile {
     /// Efficiency of the robust variance; its degrees of freedom are edof times this.
     pub efficiency: f64,
     /// Where the degrees of freedom are from: `eta3` or `large-sample`.
-    pub edof_method: &'static str,
+    pub edof_method: String,
     /// Confidence of the intervals.
     pub confidence: f64,
     /// One entry a signal.
     pub signals: Vec<SignalCurves>,
+}
+
+impl From<SignalsFile> for CurvesFile {
+    /// The classical variance of each signal as the curve of GMWM, the robust one as that of RGMWM.
+    fn from(file: SignalsFile) -> Self {
+        let curves = file.signals.iter().flat_map(|s| {
+            [
+                (Estimator::Gmwm, &s.classical),
+                (Estimator::Rgmwm, &s.robust),
+            ]
+            .map(|(estimator, band)| {
+                let efficiency = estimator.is_robust().then_some(file.efficiency);
+                let edof =
+                    |e: &f64| efficiency.map_or(*e, |share| interval::edof_robust(*e, share));
+                FittedCurve {
+                    efficiency,
+                    sensor: s.sensor,
+                    axis: s.axis.name().to_owned(),
+                    estimator: estimator.name().to_owned(),
+                    tau_s: s.tau_s.clone(),
+                    wv: band.wv.clone(),
+                    edof: s.edof.iter().map(edof).collect(),
+                    ..FittedCurve::default()
+                }
+            })
+        });
+        Self {
+            schema_version: file.schema_version,
+            rate_hz: file.rate_hz,
+            curves: curves.collect(),
+        }
+    }
 }
 
 /// The curves behind a model, and what the model makes of them.

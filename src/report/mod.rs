@@ -7,7 +7,7 @@ pub(crate) mod tables;
 pub(crate) mod trajectory;
 pub(crate) mod verdict;
 
-pub(crate) use curves::{CurvesFile, FittedCurve};
+pub(crate) use curves::{CurvesFile, FittedCurve, SignalsFile};
 pub use nav_sim_document::readable;
 pub(crate) use nav_sim_document::{seconds, six_digits};
 pub(crate) use tables::{gnss_csv, imu_csv, initial_toml};

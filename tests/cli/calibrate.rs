@@ -218,6 +218,79 @@ fn a_curve_written_is_a_curve_read() {
     assert_eq!(first["fits"][1]["axis"], "y");
 }
 
+/// The file of `wv` is a curve file: its classical curves are GMWM's, the robust ones RGMWM's.
+#[test]
+fn the_curves_of_wv_give_the_fits_of_their_recording() {
+    let dir = tempfile::tempdir().unwrap();
+    recordings(dir.path(), 2);
+    json(dir.path(), &["wv", "runs/run1.csv", "-o", "one.wv.json"]);
+    let direct = json(
+        dir.path(),
+        &[
+            "calibrate",
+            "runs/run1.csv",
+            "--estimator",
+            "all",
+            "--model",
+            "N1",
+            "-o",
+            "m.toml",
+        ],
+    );
+    let fits = json(
+        dir.path(),
+        &["calibrate", "--curve", "one.wv.json", "--model", "N1"],
+    );
+    let sorted = |out: &Value| {
+        let key = |f: &Value| (f["estimator"].to_string(), f["axis"].to_string());
+        let mut fits: Vec<_> = out["fits"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|f| (key(f), f["objective"].as_f64().unwrap()))
+            .collect();
+        fits.sort_by(|a, b| a.0.cmp(&b.0));
+        fits
+    };
+    let (direct, fits) = (sorted(&direct), sorted(&fits));
+    assert_eq!(direct.len(), 4);
+    for (a, b) in direct.iter().zip(&fits) {
+        assert!(a.0 == b.0 && (a.1 / b.1 - 1.0).abs() < 1e-9, "{a:?} {b:?}");
+    }
+    json(dir.path(), &["check", "one.wv.json"]);
+    let text = std::fs::read_to_string(dir.path().join("one.wv.json")).unwrap();
+    let edited: Value = serde_json::from_str(&text).unwrap();
+    let edited = Value::Object(
+        edited
+            .as_object()
+            .unwrap()
+            .clone()
+            .into_iter()
+            .chain([("efficiency".into(), 0.into())])
+            .collect(),
+    );
+    std::fs::write(dir.path().join("none.wv.json"), edited.to_string()).unwrap();
+    let stderr = refusal(
+        dir.path(),
+        &["calibrate", "--curve", "none.wv.json", "--model", "N1"],
+        2,
+    );
+    assert!(
+        stderr.contains("none.wv.json, head: efficiency = 0 is not a number above 0"),
+        "{stderr}"
+    );
+    json(dir.path(), &["wv", "runs", "-o", "two.wv.json"]);
+    let stderr = refusal(
+        dir.path(),
+        &["calibrate", "--curve", "two.wv.json", "--model", "N1"],
+        2,
+    );
+    assert!(
+        stderr.contains("two.wv.json: there are two curves of gyro.x for gmwm"),
+        "{stderr}"
+    );
+}
+
 #[test]
 fn a_table_of_exact_values_gives_back_its_parameters() {
     let dir = tempfile::tempdir().unwrap();

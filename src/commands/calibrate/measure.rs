@@ -317,7 +317,7 @@ pub(crate) type Curves = Vec<(Scope, Estimator, Curve)>;
 /// and a sensor are for those that do not say theirs.
 ///
 /// # Errors
-/// When the file cannot be read, or says nothing of its rate where none is given.
+/// When the file cannot be read, says nothing of rate or sensor where nothing is given, or has two curves for one model.
 pub(crate) fn read_curves(
     path: &Path,
     rate_hz: Option<f64>,
@@ -357,6 +357,19 @@ pub(crate) fn read_curves(
             sensor,
             axis: named.axis,
         };
+        if curves
+            .iter()
+            .any(|(s, e, _)| (*s, *e) == (scope, estimator))
+        {
+            return refused(
+                format!(
+                    "{}: there are two curves of {} for {estimator}",
+                    path(),
+                    scope.name()
+                ),
+                "calibrate the recordings themselves: it averages them",
+            );
+        }
         curves.push((scope, estimator, named.curve));
     }
     let estimators = Estimator::ALL

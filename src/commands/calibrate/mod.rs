@@ -70,7 +70,7 @@ pub struct Calibrate {
         conflicts_with = "curve"
     )]
     inputs: Vec<PathBuf>,
-    /// Fit a curve instead of recordings: CSV tau_samples,wv,edof, or a .wv.json of calibrate
+    /// Fit a curve instead of recordings: CSV tau_samples,wv,edof, or a .wv.json of calibrate or wv
     #[arg(long, value_name = "FILE", conflicts_with_all = OF_RECORDINGS)]
     curve: Option<PathBuf>,
     /// Which curve is fitted: an average over the replicates (awv; sr-awv, robust to outliers; dr-awv, robust to
