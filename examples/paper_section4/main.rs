@@ -2,10 +2,11 @@
 //! (influence functions, equations (9) to (13)).
 //!
 //!     cargo run --release --example paper_section4 -- [--sets 500] [--samples 524284] [--seed 1] [--weighting edof]
-//!         [--avlr] [--sensitivity] [-o paper_section4]
+//!         [--avlr] [--scaled] [--sensitivity] [-o paper_section4]
 //!
 //! Writes results.csv and figure2.svg, with `--sensitivity` sensitivity.csv. `--avlr` studies the cost of reading white noise
-//! and random walk off the slopes of the Allan deviation instead (Guerrier, Molinari, Stebler 2016).
+//! and random walk off the slopes of the Allan deviation instead (Guerrier, Molinari, Stebler 2016). `--scaled` makes the step
+//! as large beside the random walk of a shorter record as it is in the paper.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 use nav_sim::calibration::{Estimator, Trim, Weighting};
@@ -13,7 +14,7 @@ use nav_sim::document::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg}
 use nav_sim::io::contamination_file;
 use nav_sim::prelude::*;
 use nav_sim::signal::noise::Kind;
-use nav_sim::signal::noise::contamination::Contamination;
+use nav_sim::signal::noise::contamination::{Contamination, Operation};
 use nav_sim::signal::wavelet::{Tuning, default_levels};
 use rayon::prelude::*;
 use std::error::Error;
@@ -277,6 +278,14 @@ pub(crate) fn main() -> Result<(), Failure> {
     design.seed = number("--seed")?.unwrap_or(design.seed);
     if value("--weighting").is_some_and(|name| name == "model") {
         design.weighting = Weighting::Model;
+    }
+    if has("--scaled") {
+        let rules = design.scenarios.iter_mut().flat_map(|c| &mut c.rules);
+        for rule in rules {
+            if let Operation::Step { amplitude, .. } = &mut rule.operation {
+                *amplitude *= (samples as f64 / 524_284.0).sqrt();
+            }
+        }
     }
     let rows = study(
         &design,

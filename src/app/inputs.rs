@@ -41,11 +41,11 @@ pub(crate) fn trajectory(path: &Path, context: &Context<'_>) -> Result<Trajector
     Ok(trajectory)
 }
 
-/// A model; the axes that it does not name.
+/// A model for navigation; the axes that it does not name.
 pub(crate) fn model(path: &Path, context: &Context<'_>) -> Result<ModelFile> {
     let file = model_file::read(path)?;
     context.warn_each(file.doubts(path));
-    Ok(file)
+    Ok(file.for_navigation())
 }
 
 /// A noise model at the rate of the IMU.

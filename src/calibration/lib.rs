@@ -41,6 +41,8 @@ mod selection;
 mod diagnosis;
 // Numbers for people.
 mod format;
+// Slopes read off curves that their models do not describe.
+mod reading;
 // The whole calibration.
 mod pipeline;
 // Turn-on bias, from the means of recordings.
@@ -51,7 +53,7 @@ mod anticipated;
 pub use anticipated::Anticipated;
 pub use curve::{
     Beginning, CalibrationError, Cause, Estimator, Group, Pool, Replicate, Scope, Trim, WarmUp,
-    average, grouped, implied, median, replicates, trend, warm_up,
+    average, grouped, implied, log_bias, median, replicates, robust_bias, trend, warm_up,
 };
 pub use diagnosis::{
     Alarm, CommonCause, CommonFinding, Diagnosis, FEWEST_TO_COMPARE, Verdict, diagnose,

@@ -50,6 +50,8 @@ pub struct Outcome {
     pub axes_differ: Option<AxesDiffer>,
     /// Intervals of its parameters and goodness of fit, once [`infer`](crate::infer) was asked for them.
     pub inference: Option<Inference>,
+    /// White noise, quantization noise, flicker noise and random walk read off the curve, where the model does not describe it.
+    pub reading: Option<Box<Outcome>>,
 }
 
 impl Outcome {
@@ -58,6 +60,11 @@ impl Outcome {
         for channel in self.scope.channels() {
             model.axes[channel.index()] = self.fit.composite.clone();
         }
+    }
+
+    /// What stands for the noise in navigation: the model, or what is read off the curve where it does not describe that.
+    pub fn for_navigation(&self) -> &Self {
+        self.reading.as_deref().unwrap_or(self)
     }
 
     /// The fit to a curve that resembles this one.

@@ -3,8 +3,9 @@
 use crate::curve::{CalibrationError, Estimator, Group, average, implied};
 use crate::fit::{Fit, estimate};
 use crate::outcome::{Advance, Bootstrap, ModelChoice, Outcome, Settings};
+use crate::reading::reading;
 use crate::selection::choose;
-use crate::uncertainty::bootstrap::inference;
+use crate::uncertainty::bootstrap::{by_bootstrap, inference};
 use crate::uncertainty::spread::axes_differ;
 use crate::wavelet::Curve;
 use rayon::prelude::*;
@@ -82,7 +83,7 @@ pub fn fit_curve(
     while count_exceeded(&mut curve, &without_root, &fit, settings) {
         fit = fitted(&curve)?;
     }
-    Ok(Outcome {
+    let mut outcome = Outcome {
         scope: group.scope,
         replicates: group.replicates.len(),
         recordings: group.recordings(),
@@ -93,7 +94,10 @@ pub fn fit_curve(
         fit,
         axes_differ: axes_differ(&group.replicates, estimator, &settings.tuning),
         inference: None,
-    })
+        reading: None,
+    };
+    outcome.reading = reading(&outcome, settings.rate_hz).map(Box::new);
+    Ok(outcome)
 }
 
 /// Gives no weight to the scales outside the range of a fit.
@@ -142,6 +146,10 @@ pub fn infer_telling(
             return;
         };
         outcome.inference = Some(inference(group, outcome, settings, bootstrap, advance));
+        if let Some(reading) = &mut outcome.reading {
+            let own = by_bootstrap(group, reading, settings, bootstrap, &|_| {});
+            reading.inference = Some(own);
+        }
     });
 }
 
@@ -264,10 +272,11 @@ mod tests {
             (ranged.counted_levels().len(), ranged.departure().scales),
             (12, 12)
         );
+        // The weights of either fit settle to 1e-6, and the objective without lack of fit is not stationary where they do.
         assert_relative_eq!(
             ranged.fit.objective,
             shortened.fit.objective,
-            max_relative = 1e-9
+            max_relative = 1e-6
         );
         let values = |o: &Outcome| {
             o.fit

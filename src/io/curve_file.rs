@@ -4,8 +4,9 @@
 use super::table::{Dictionary, Quantity, parse as parse_table};
 use super::{Failure, Place, source};
 use crate::report::{CurvesFile, FittedCurve, SignalsFile};
+use nav_sim_calibration::{log_bias, robust_bias};
 use nav_sim_signal::imu::{Axis, Sensor};
-use nav_sim_signal::wavelet::{Curve, QuantizationResponse, Tuning};
+use nav_sim_signal::wavelet::{Curve, Tuning};
 use std::path::Path;
 
 /// A curve and what it is of.
@@ -91,7 +92,7 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
     let of_head = |message| refused("head".to_owned(), message);
     let file = if is_of_wv {
         let file: SignalsFile = serde_json::from_str(text).map_err(syntax)?;
-        quantization(Some(file.efficiency)).map_err(of_head)?;
+        tuning(file.efficiency).map_err(of_head)?;
         CurvesFile::from(file)
     } else {
         serde_json::from_str(text).map_err(syntax)?
@@ -110,7 +111,8 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
         let name = format!("curve {number}");
         let of_curve = |message| refused(name.clone(), message);
         let (tau, wv, edof) = (entry.tau_s.len(), entry.wv.len(), entry.edof.len());
-        if tau != wv || tau != edof {
+        let has_bias = [0, tau].contains(&entry.log_bias.len());
+        if tau != wv || tau != edof || !has_bias {
             return Err(of_curve(format!(
                 "{tau} scales, {wv} wavelet variances and {edof} degrees of freedom"
             )));
@@ -122,8 +124,11 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
                 entry.axis
             )));
         }
+        let robust = entry.efficiency.map(tuning).transpose().map_err(of_curve)?;
+        let level = |tau_s: &f64| (tau_s * rate_hz).log2().round() as u32;
         let mut curve = Curve {
-            quantization: quantization(entry.efficiency).map_err(of_curve)?,
+            quantization: robust.as_ref().map(|tuning| *tuning.quantization()),
+            classical: entry.classical_tau_s.iter().map(level).collect(),
             ..Curve::default()
         };
         for i in 0..tau {
@@ -131,8 +136,18 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
             push(&mut curve, point)
                 .map_err(|message| refused(format!("{name}, scale {}", i + 1), message))?;
         }
-        let level = |tau_s: &f64| (tau_s * rate_hz).log2().round() as u32;
-        curve.classical = entry.classical_tau_s.iter().map(level).collect();
+        // The variances of `wv` are measured; those of a table may be exact.
+        let measured = curve.levels.iter().zip(&curve.edof).map(|(level, edof)| {
+            let robust = robust.as_ref().filter(|_| !curve.classical.contains(level));
+            log_bias(
+                *edof,
+                robust.map_or(0.0, |tuning| robust_bias(*edof, tuning)),
+            )
+        });
+        curve.log_bias = match entry.log_bias.is_empty() {
+            true => measured.collect(),
+            false => entry.log_bias.clone(),
+        };
         Ok(NamedCurve {
             sensor: Some(entry.sensor),
             axis,
@@ -144,14 +159,11 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
     (1..).zip(&file.curves).map(named).collect()
 }
 
-/// How robust variances of an efficiency read quantization noise.
-fn quantization(efficiency: Option<f64>) -> Result<Option<QuantizationResponse>, String> {
-    let Some(efficiency) = efficiency else {
-        return Ok(None);
-    };
+/// The tuning of robust variances of an efficiency.
+fn tuning(efficiency: f64) -> Result<Tuning, String> {
     // The efficiency in a file is the true one, which the other convention puts a little beyond the range.
     match Tuning::new(efficiency.clamp(0.3, 0.99)) {
-        Ok(tuning) if efficiency > 0.0 && efficiency <= 1.0 => Ok(Some(*tuning.quantization())),
+        Ok(tuning) if efficiency > 0.0 && efficiency <= 1.0 => Ok(tuning),
         _ => Err(format!(
             "efficiency = {efficiency} is not a number above 0, up to 1"
         )),
@@ -236,9 +248,14 @@ mod tests {
                 levels: vec![1, 2],
                 wv: vec![2e-7, 1e-7],
                 edof: vec![10.0, 5.0],
+                log_bias: read[0].curve.log_bias.clone(),
                 ..Curve::default()
             }
         );
+        // psi(10) − ln 10 and psi(5) − ln 5 (tables).
+        for (found, exact) in read[0].curve.log_bias.iter().zip([-0.050833, -0.103320]) {
+            assert!((found - exact).abs() < 1e-6, "{found}");
+        }
     }
 
     #[test]

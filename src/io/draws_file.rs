@@ -104,10 +104,11 @@ fn values(composite: &Composite) -> Vec<f64> {
 }
 
 impl DrawsFile {
-    /// Of some outcomes; none where one of them has no draws.
+    /// Of what stands for some outcomes in navigation; none where one of them has no draws.
     #[must_use]
     pub fn of(outcomes: &[Outcome], rate_hz: f64) -> Option<Self> {
         let signals = |outcome: &Outcome| {
+            let outcome = outcome.for_navigation();
             let (inference, composite) = (outcome.inference.as_ref()?, &outcome.fit.composite);
             Some(SignalDraws {
                 signals: outcome.scope.name(),

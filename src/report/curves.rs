@@ -186,6 +186,9 @@ pub(crate) struct FittedCurve {
     /// Scales (s) at which it is the classical one all the same.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub classical_tau_s: Vec<f64>,
+    /// Expected ln of each variance over the true one, for a fit that is centred by it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub log_bias: Vec<f64>,
     /// Lower ends of the 95 % intervals.
     #[serde(default)]
     pub ci_low: Vec<f64>,
@@ -268,6 +271,7 @@ fn fitted(outcome: &Outcome, replicates: &[Replicate], settings: &Settings) -> F
             .iter()
             .map(|level| tau_s(*level, settings.rate_hz))
             .collect(),
+        log_bias: curve.log_bias.clone(),
         ci_low: band.ci_low,
         ci_high: band.ci_high,
         implied: implied(model, curve),

@@ -180,7 +180,8 @@ fn bad_data_are_told_in_a_line() {
 
 /// A curve of white noise with two blemishes: at 0.16 s half as much again, known to 1.4 %, and at 10 s four times as much, known
 /// by eight degrees of freedom. The 95 % band is farther from the model at 10 s, ln(4·8/17.5) = 0.60 against ln 1.5 = 0.41; but the
-/// normal score there is (1.587 − 1 + 0.028)/0.167 = 3.7, which is no scale that is missed. Terminal and page name the other one.
+/// normal score there is (1.587 − 1 + 0.028)/0.167 = 3.7, which is no scale that is missed. Terminal and page name the other one, by the weights
+/// that leave the model where most degrees of freedom are.
 #[test]
 fn terminal_and_page_name_the_same_scale() {
     let dir = tempfile::tempdir().unwrap();
@@ -196,7 +197,8 @@ fn terminal_and_page_name_the_same_scale() {
     }
     std::fs::write(dir.path().join("curve.csv"), text).unwrap();
     let fit =
-        "calibrate --curve curve.csv --axes gyro --model WN --rate-hz 100 -o m.toml".split(' ');
+        "calibrate --curve curve.csv --axes gyro --model WN --rate-hz 100 --weighting edof -o m.toml"
+            .split(' ');
     let output = nav_sim(dir.path()).args(fit).assert().success();
     let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
     let verdict = text.lines().next().unwrap().split_once(": ").unwrap().1;

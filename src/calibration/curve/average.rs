@@ -9,6 +9,7 @@ use crate::wavelet::{
     interval,
 };
 use rayon::prelude::*;
+use statrs::function::gamma::digamma;
 use std::fmt;
 use std::str::FromStr;
 
@@ -312,9 +313,30 @@ pub fn average(
             .map(|t| (t.samples / total).powi(2) / t.edof)
             .sum();
         curve.edof.push(1.0 / inverse);
+        let bias = |t: &Term| match t.is_robust {
+            true => t.samples / total * robust_bias(t.edof, tuning),
+            false => 0.0,
+        };
+        let bias: f64 = kept.iter().map(bias).sum();
+        curve.log_bias.push(log_bias(1.0 / inverse, bias));
     }
     Ok(curve)
 }
+
+/// Expected ln of a wavelet variance over the true one, of these degrees of freedom and relative bias.
+pub fn log_bias(edof: f64, bias: f64) -> f64 {
+    // E ln(chi²/n) = psi(n/2) − ln(n/2). Where it matters a variance has about twice the degrees of freedom of eta3.
+    bias.ln_1p() + digamma(edof) - edof.ln()
+}
+
+/// Relative bias of a robust variance of few coefficients.
+pub fn robust_bias(edof: f64, tuning: &Tuning) -> f64 {
+    (tuning.bias() / edof).min(LARGEST_BIAS)
+}
+
+/// Largest relative bias of a robust variance, beyond which its expansion fails: the most that was measured
+/// (docs/limits.md: 21 % with two lengths of the scale in the record).
+pub(crate) const LARGEST_BIAS: f64 = 0.2;
 
 /// The terms without so many at either end. Scale by scale: a recording that is abnormal at long scales still serves at short
 /// ones.

@@ -6,8 +6,8 @@ mod stationarity;
 
 pub use average::{
     CalibrationError, Cause, Estimator, Group, Pool, Replicate, Scope, Trim, average, grouped,
-    median, replicates, trend,
+    log_bias, median, replicates, robust_bias, trend,
 };
-pub(crate) use average::{MAD_TO_DEVIATION, falling_root, p_value};
+pub(crate) use average::{LARGEST_BIAS, MAD_TO_DEVIATION, falling_root, p_value};
 pub use sampling::implied;
 pub use stationarity::{Beginning, WarmUp, warm_up};

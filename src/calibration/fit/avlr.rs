@@ -80,6 +80,7 @@ pub(crate) fn avlr(curve: &Curve, spec: &ModelSpec) -> Result<Fit, CalibrationEr
         at_end: Vec::new(),
         minima: Vec::new(),
         weighted_for: Vec::new(),
+        lack_of_fit: 0.0,
         composite,
     })
 }

@@ -1,10 +1,11 @@
 //! Least squares: theta = argmin Σ Omega_j (nu_j − nu_j(theta))².
 
 use super::search::{Component, Effort, Found, Objective, Range, Termination, search};
-use crate::curve::{CalibrationError, Cause, implied};
+use crate::curve::{CalibrationError, Cause, falling_root, implied};
 use crate::model::ModelSpec;
-use crate::noise::{Composite, Kind, ParameterError, Process};
+use crate::noise::{Composite, Kind, ParameterError, ParameterRef, Process};
 use crate::wavelet::Curve;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::fmt::Display;
 
 /// Fits a model to a curve. The rate (Hz) is what a GM is sampled at.
@@ -20,17 +21,95 @@ pub fn fit(
     rate_hz: f64,
     weighting: Weighting,
 ) -> Result<Fit, CalibrationError> {
-    let observed = Weights {
-        weighting,
-        nu: curve.wv.clone(),
+    let observed = |curve: &Curve| {
+        let nu = curve.wv.clone();
+        let weights = Weights { weighting, nu };
+        fit_near(curve, spec, rate_hz, weights, Effort::WHOLE, &[])
     };
-    // The observed variances are the only ones there are before a model; what is low by chance weighs too
-    // much in this round.
-    let first = fit_near(curve, spec, rate_hz, observed, Effort::WHOLE, &[])?;
     match weighting {
-        Weighting::Model => settled(curve, spec, rate_hz, first),
-        Weighting::Edof => Ok(first),
+        Weighting::Model => {
+            let curve = centred(curve);
+            // The observed variances are the only ones there are before a model.
+            let first = observed(&curve)?;
+            let fit = settled(&curve, spec, rate_hz, first)?;
+            with_lack_of_fit(&curve, spec, rate_hz, fit)
+        }
+        Weighting::Edof => observed(curve),
     }
+}
+
+/// The curve whose logarithm is on average that of the model's.
+fn centred(curve: &Curve) -> Curve {
+    let mut centred = curve.clone();
+    for (wv, bias) in centred.wv.iter_mut().zip(&curve.log_bias) {
+        *wv *= (-bias).exp();
+    }
+    centred
+}
+
+/// Fits with the variance of ln nu at which the scales are as far from the model as their number says, where chance does not
+/// explain how far they are: no scale then draws the model away from the others because it is known best.
+fn with_lack_of_fit(
+    curve: &Curve,
+    spec: &ModelSpec,
+    rate_hz: f64,
+    mut fit: Fit,
+) -> Result<Fit, CalibrationError> {
+    // The level of the test of a model that is right.
+    let mut lack = lack_of_fit(curve, &fit, 0.975);
+    for _ in 0..MOST_ROUNDS {
+        let Some(variance) = lack else { break };
+        let wider = curve.widened(variance);
+        let weights = Weights {
+            weighting: Weighting::Model,
+            nu: expected(&wider, &fit),
+        };
+        let first = fit_near(&wider, spec, rate_hz, weights, Effort::WHOLE, &fit.minima)?;
+        let before = fit.lack_of_fit;
+        fit = Fit {
+            lack_of_fit: variance,
+            ..settled(&wider, spec, rate_hz, first)?
+        };
+        if (before / variance - 1.0).abs() < 1e-3 {
+            break;
+        }
+        lack = lack_of_fit(curve, &fit, 0.5);
+    }
+    Ok(match fit.lack_of_fit > 0.0 {
+        true => fit.at_own_weights(curve),
+        false => fit,
+    })
+}
+
+/// The variance b² with which Σ ln(nu_hat/nu)²/(2/eta + b²) is its degrees of freedom; none where the sum is below its quantile
+/// without b².
+fn lack_of_fit(curve: &Curve, fit: &Fit, quantile: f64) -> Option<f64> {
+    let nu = expected(curve, fit);
+    let scales = curve
+        .levels
+        .iter()
+        .zip(&curve.edof)
+        .zip(curve.wv.iter().zip(nu));
+    let counted: Vec<(f64, f64)> = scales
+        .filter(|((level, _), _)| !curve.ignored.contains(level))
+        .map(|((_, edof), (wv, nu))| ((wv / nu).ln().powi(2), 2.0 / edof + curve.differing))
+        .collect();
+    let freedom = counted.len().checked_sub(fit.free_parameters() + 1)? as f64 + 1.0;
+    let sum = |b2: f64| {
+        counted
+            .iter()
+            .map(|(square, own)| square / (own + b2))
+            .sum::<f64>()
+    };
+    let limit = ChiSquared::new(freedom).ok()?.inverse_cdf(quantile);
+    // No b² is larger than the largest square.
+    let largest = counted
+        .iter()
+        .map(|(square, _)| *square)
+        .fold(0.0, f64::max)
+        * counted.len() as f64
+        / freedom;
+    (sum(0.0) > limit).then(|| falling_root(|b2| sum(b2) - freedom, largest))
 }
 
 /// Largest number of repeated fits until the weights are those of the model itself.
@@ -125,6 +204,12 @@ fn reweighted(
 }
 
 impl Fit {
+    /// Number of parameters that the curve has determined: those of a process without amplitude took nothing from it.
+    pub(crate) fn free_parameters(&self) -> usize {
+        let free = |(of, _): &(ParameterRef, f64)| !self.zero.contains(&of.process);
+        self.composite.parameters().filter(free).count()
+    }
+
     /// The same with its own minimum as the only one known.
     fn within_its_basin(mut self) -> Self {
         self.minima.truncate(1);
@@ -163,28 +248,23 @@ pub(crate) fn refit(
     weighting: Weighting,
     like: &Fit,
 ) -> Result<Fit, CalibrationError> {
-    // The model of the curve that this one resembles is known better than one draw knows itself.
-    let nu = match weighting {
-        Weighting::Model => expected(curve, like),
-        Weighting::Edof => curve.wv.clone(),
+    let first = |curve: &Curve, nu: Vec<f64>| {
+        let weights = Weights { weighting, nu };
+        fit_near(curve, spec, rate_hz, weights, Effort::AGAIN, &like.minima)
     };
-    let weights = Weights { weighting, nu };
-    let first = fit_near(curve, spec, rate_hz, weights, Effort::AGAIN, &like.minima)?;
-    match weighting {
-        Weighting::Model => {
-            // The weights change little: the basin of the first round is that of the others.
-            let (_, last) = reweighted(
-                curve,
-                spec,
-                rate_hz,
-                first.within_its_basin(),
-                FEW_ROUNDS,
-                Effort::WITHIN,
-            )?;
-            Ok(last.at_own_weights(curve))
-        }
-        Weighting::Edof => Ok(first),
+    if weighting == Weighting::Edof {
+        return first(curve, curve.wv.clone());
     }
+    let plain = centred(curve);
+    let curve = plain.widened(like.lack_of_fit);
+    // The model of the curve that this one resembles is known better than one draw knows itself; the weights change little:
+    // the basin of the first round is that of the others.
+    let first = first(&curve, expected(&curve, like))?.within_its_basin();
+    let (_, last) = reweighted(&curve, spec, rate_hz, first, FEW_ROUNDS, Effort::WITHIN)?;
+    Ok(Fit {
+        lack_of_fit: like.lack_of_fit,
+        ..last.at_own_weights(&plain)
+    })
 }
 
 /// Weights of the scales of a curve.
@@ -319,6 +399,7 @@ fn assemble(objective: &Objective, found: &Found, rate_hz: f64) -> Result<Fit, C
         at_end: those(|t| t.amplitude > 0.0 && t.at_end),
         minima: minima(found),
         weighted_for: Vec::new(),
+        lack_of_fit: 0.0,
         residuals: solution
             .residuals
             .iter()
@@ -403,10 +484,10 @@ impl Term {
 /// Omega: the weights of the scales.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Weighting {
-    /// edof/(2 nu(theta)²), the inverse variance of nu_hat where the model holds, with edof limited by what recordings differ
-    /// by. The fit is repeated until the weights are those of its own result; a variance that is low by chance weighs no more
-    /// than others. A robust one that is high beyond chance weighs less with the fourth power of how high it is, so that a
-    /// step or a shock at some scales does not draw the model with it.
+    /// 1/(nu(theta)² (2/edof + b²)), the inverse variance of nu_hat where the model holds, times ln r/(r − 1), r = nu_hat/nu(theta):
+    /// so the minimum is that of Σ (ln r)²/(2/edof + b²). b² is what recordings differ by, and what the model lacks where
+    /// chance does not explain how far it is from the curve. The fit is repeated until the weights are those of its own result;
+    /// a variance that is low by chance weighs no more than others, and a scale far from the model does not draw it away.
     #[default]
     Model,
     /// edof/(2 nu_hat²), the convention of the literature: what is low by chance weighs most.
@@ -428,11 +509,20 @@ impl Weighting {
         let root = |((plain, nu), (wv, edof)): ((&f64, &f64), (&f64, &f64))| match self {
             _ if *plain == 0.0 => 0.0,
             Self::Edof => (0.5 * edof).sqrt() / nu,
-            // A classical variance has no protection of its own that its weight could keep.
-            Self::Model if curve.quantization.is_none() => *plain,
-            Self::Model => plain * trust(wv / nu, *edof),
+            Self::Model => plain * logarithmic(wv / nu).sqrt(),
         };
         scales.map(root).collect()
+    }
+}
+
+/// ln r/(r − 1), by which the gradient of a weighted square is that of the square of a logarithm.
+fn logarithmic(r: f64) -> f64 {
+    let off = r - 1.0;
+    // The quotient loses half its digits there; the series is off by off²/3.
+    if off.abs() < 1e-8 {
+        1.0 - 0.5 * off
+    } else {
+        r.ln() / off
     }
 }
 
@@ -448,20 +538,6 @@ fn inverse_deviations(curve: &Curve, nu: &[f64]) -> Vec<f64> {
         .zip(&curve.levels)
         .map(root)
         .collect()
-}
-
-/// Factor of √Omega where a variance is so many times that of the model: 1 up to one standard deviation above it, the inverse
-/// square from two on. On 120 contaminated sets of Minaretzis' Section IV this gave random walks as near as
-/// [`Weighting::Edof`] does, and on clean ones a median nearer to the truth (docs/mathematics.md).
-///
-/// Of fewer than four degrees of freedom two standard deviations are still chance, and the last scale of a recording is all
-/// that tells of its random walk: such a scale loses its weight from two to three.
-fn trust(ratio: f64, edof: f64) -> f64 {
-    const FEWEST: f64 = 4.0;
-    let begin = if edof < FEWEST { 2.0 } else { 1.0 };
-    let above = (score(ratio, edof) - begin).clamp(0.0, 1.0);
-    // Smooth at either end: the derivatives of a fit with respect to its curve rest on that of the weights.
-    ratio.powf(-2.0 * above * above * (3.0 - 2.0 * above))
 }
 
 /// The normal score of a chi-square over its degrees of freedom (Wilson and Hilferty): of few degrees the ratio less one over
@@ -501,6 +577,8 @@ pub struct Fit {
     pub(crate) minima: Vec<Vec<f64>>,
     /// The variances that the weights were made for.
     pub(crate) weighted_for: Vec<f64>,
+    /// Variance of ln nu that the model lacks at a scale, beyond chance; 0 where chance explains how far it is from the curve.
+    pub lack_of_fit: f64,
 }
 
 #[cfg(test)]
@@ -652,10 +730,9 @@ mod tests {
 #[cfg(test)]
 mod weighting_tests {
     use super::*;
-    use crate::wavelet::Tuning;
     use approx::assert_relative_eq;
 
-    /// Variances twice the model's but for the last scale, which does not count.
+    /// Two scales, of which the last does not count.
     fn curve(edof: f64) -> Curve {
         let (levels, ignored) = (vec![1, 2], vec![2]);
         Curve {
@@ -672,56 +749,56 @@ mod weighting_tests {
     fn weights_are_inverse_deviations_of_the_model() {
         let curve = curve(50.0);
         for (weighting, root) in [
-            (Weighting::Model, 1.0 / (3.0 * (0.04_f64 + 0.04).sqrt())),
-            (Weighting::Edof, 1.0 / (3.0 * 0.2)),
+            (Weighting::Model, 1.0 / (6.0 * (0.04_f64 + 0.04).sqrt())),
+            (Weighting::Edof, 1.0 / (6.0 * 0.2)),
         ] {
-            let roots = weighting.roots(&curve, &[3.0, 3.0]);
+            let roots = weighting.roots(&curve, &[6.0, 6.0]);
             assert_relative_eq!(roots[0], root, max_relative = 1e-9);
             assert_eq!(roots[1], 0.0, "{weighting:?}");
         }
     }
 
-    /// A robust variance counts less from one standard deviation above the model on (two of few degrees of freedom), and as
-    /// the inverse square of the ratio one further on. At s deviations it is (1 − v + s√v)³, v = 2/(9 eta).
+    /// The gradient of the weighted square, root²·(nu_hat − nu), is that of half the square of the logarithm over its variance,
+    /// ln(nu_hat/nu)/(2/edof + b²), per relative change of nu.
     #[test]
-    fn a_robust_scale_that_is_too_high_loses_its_weight() {
-        for (edof, begin) in [(50.0, 1.0), (3.0, 2.0)] {
-            let plain = curve(edof);
-            let quantization = Some(*Tuning::default().quantization());
-            let robust = Curve {
-                quantization,
-                ..plain.clone()
-            };
-            for (beyond, power) in [
-                (-3.0, 0.0),
-                (-0.01, 0.0),
-                (0.5, 1.0),
-                (1.0, 2.0),
-                (2.0, 2.0),
-            ] {
-                let v: f64 = 2.0 / (9.0 * edof);
-                let ratio = (1.0 - v + (begin + beyond) * v.sqrt()).powi(3);
-                let nu = [6.0 / ratio, 3.0];
-                let expected = inverse_deviations(&plain, &nu)[0] / ratio.powf(power);
-                assert_relative_eq!(
-                    Weighting::Model.roots(&robust, &nu)[0],
-                    expected,
-                    max_relative = 1e-9
-                );
-            }
-            let nu = [3.0, 3.0];
-            let deviation = 3.0 * (2.0 / edof + 0.04).sqrt();
+    fn a_weighted_square_descends_as_the_square_of_the_logarithm() {
+        let curve = curve(50.0);
+        for ratio in [1e-4_f64, 0.5, 1.0 - 1e-9, 1.0, 2.0, 1e4] {
+            let nu = 6.0 / ratio;
+            let root = Weighting::Model.roots(&curve, &[nu, 3.0])[0];
+            let expected = ratio.ln() / (2.0 / 50.0 + 0.04);
+            // 6 − nu is known to 1e-15 of 6
             assert_relative_eq!(
-                inverse_deviations(&plain, &nu)[0],
-                1.0 / deviation,
-                max_relative = 1e-12
+                root * root * (6.0 - nu) * nu,
+                expected,
+                max_relative = 1e-6,
+                epsilon = 1e-12
             );
-            for curve in [&plain, &robust] {
-                assert_eq!(
-                    Weighting::Edof.roots(curve, &nu),
-                    Weighting::Edof.roots(&plain, &nu)
-                );
-            }
         }
+    }
+
+    /// Of exact white noise, times 2 and a half in turn, the model is the geometric mean, and the variance that it lacks is that
+    /// of the logarithms with as many degrees of freedom as there are scales, less one.
+    #[test]
+    fn lack_of_fit_is_the_variance_of_the_logarithms() {
+        let levels: Vec<u32> = (1..=12).collect();
+        let off = |level: &u32| 0.5_f64.powi(*level as i32) * [0.5, 2.0][*level as usize % 2];
+        let curve = |off: &dyn Fn(&u32) -> f64| Curve {
+            wv: levels.iter().map(off).collect(),
+            edof: vec![1e9; 12],
+            levels: levels.clone(),
+            ..Curve::default()
+        };
+        let spec = "WN".parse().unwrap();
+        let white = |fit: &Fit| fit.composite.processes[0].values()[0];
+        let found = fit(&curve(&off), &spec, 1.0, Weighting::Model).unwrap();
+        assert_relative_eq!(white(&found), 1.0, max_relative = 1e-6);
+        let variance = 12.0 / 11.0 * 2.0_f64.ln().powi(2);
+        assert_relative_eq!(found.lack_of_fit, variance, max_relative = 1e-6);
+        // Off by what chance explains, it lacks nothing.
+        let near =
+            |level: &u32| off(level).powf(1e-5) * 0.5_f64.powf((1.0 - 1e-5) * f64::from(*level));
+        let found = fit(&curve(&near), &spec, 1.0, Weighting::Model).unwrap();
+        assert_eq!(found.lack_of_fit, 0.0);
     }
 }

@@ -14,14 +14,15 @@ use super::intervals::{intervals, practical_intervals};
 use super::spread::{LEVEL as ALIKE_LEVEL, Spread, alike_p_value};
 use super::varying::{parameter_spreads, simpler};
 use crate::curve::sampling::{SamplingLaw, implied};
-use crate::curve::{Estimator, Group, Replicate, average, median, p_value};
+use crate::curve::{Estimator, Group, LARGEST_BIAS, Replicate, average, median, p_value};
 use crate::fit::Fit;
-use crate::noise::ParameterRef;
 use crate::outcome::{
     Advance, Bootstrap, Goodness, Indistinct, Inference, LevelSpread, Outcome, Settings, tau_s,
 };
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Curve, RobustVariance, Status};
+use rand::RngExt;
+use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
 /// Sources of scatter in the draws.
@@ -32,10 +33,6 @@ pub enum Scattering {
     /// Recordings differ, each of them endless.
     BetweenRecordings,
 }
-
-/// Largest relative bias of a robust variance, beyond which its expansion fails: the most that was measured
-/// (docs/limits.md: 21 % with two lengths of the scale in the record).
-const LARGEST_BIAS: f64 = 0.2;
 
 /// Draws curves as a fitted model and the spread of the replicates would give them.
 pub(crate) struct CurveSampler<'a> {
@@ -128,7 +125,9 @@ impl<'a> CurveSampler<'a> {
         scattering: Scattering,
     ) -> Option<Curve> {
         if scattering == Scattering::BetweenRecordings {
-            return self.curve(between.to_vec());
+            let log_bias = Vec::new();
+            let curve = self.curve(between.to_vec());
+            return curve.map(|curve| Curve { log_bias, ..curve });
         }
         let of_recording = |(edof, between): (&Vec<f64>, &Vec<f64>)| {
             let within = self.law.draw(edof, &mut generator).into_iter();
@@ -227,16 +226,9 @@ pub(crate) fn like(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
 fn goodness(outcome: &Outcome, draws: &[Fit]) -> Goodness {
     let Outcome { fit, .. } = outcome;
     let objectives: Vec<f64> = draws.iter().map(|d| d.objective).collect();
-    // A parameter of a process without amplitude took nothing from the curve.
-    let free = |of: &ParameterRef| !fit.zero.contains(&of.process);
-    let parameters = fit
-        .composite
-        .parameters()
-        .filter(|(of, _)| free(of))
-        .count();
     Goodness {
         statistic: fit.objective,
-        dof: outcome.counted_levels().len().saturating_sub(parameters),
+        dof: (outcome.counted_levels().len()).saturating_sub(fit.free_parameters()),
         expected: median(&objectives),
         p_value: p_value(fit.objective, &objectives),
     }
@@ -273,7 +265,8 @@ pub(crate) fn inference(
     own
 }
 
-fn by_bootstrap(
+/// The draws of an outcome, and what they tell.
+pub(crate) fn by_bootstrap(
     group: &Group,
     outcome: &Outcome,
     settings: &Settings,
@@ -282,16 +275,30 @@ fn by_bootstrap(
 ) -> Inference {
     let name = group.scope.name();
     let sampler = CurveSampler::new(&name, &group.replicates, outcome, settings);
-    let draw = |run: usize| {
-        let curve = sampler.draw_as_recorded(sampler.generator(bootstrap.seed, "bootstrap", run));
-        let fit = curve.and_then(|curve| outcome.estimate_again(&curve, settings).ok());
-        advance(1);
-        fit
+    // The scatter that the model lacks at each scale belongs to its intervals, and not to the test of whether it lacks any.
+    let draw = |run: usize, lack_of_fit: f64| {
+        let generator = |scenario| sampler.generator(bootstrap.seed, scenario, run);
+        let mut curve = sampler.draw_as_recorded(generator("bootstrap"))?;
+        let mut misfit = generator("misfit");
+        for wv in curve.wv.iter_mut().filter(|_| lack_of_fit > 0.0) {
+            *wv *= (lack_of_fit.sqrt() * misfit.sample::<f64, _>(StandardNormal)).exp();
+        }
+        outcome.estimate_again(&curve, settings).ok()
     };
-    let fits: Vec<Fit> = (0..bootstrap.draws)
-        .into_par_iter()
-        .filter_map(draw)
+    let runs = || (0..bootstrap.draws).into_par_iter();
+    let mut fits: Vec<Fit> = runs()
+        .filter_map(|run| {
+            let fit = draw(run, 0.0);
+            advance(1);
+            fit
+        })
         .collect();
+    let goodness = (outcome.estimator != Estimator::Avlr).then(|| goodness(outcome, &fits));
+    if outcome.fit.lack_of_fit > 0.0 {
+        fits = runs()
+            .filter_map(|run| draw(run, outcome.fit.lack_of_fit))
+            .collect();
+    }
     let spread = sampler.spread.as_ref();
     let stretch = spread.map_or(1.0, Spread::student);
     let intervals = intervals(outcome, &fits, stretch);
@@ -309,7 +316,7 @@ fn by_bootstrap(
         drawn: fits.iter().map(|fit| fit.composite.clone()).collect(),
         stretch,
         intervals,
-        goodness: (outcome.estimator != Estimator::Avlr).then(|| goodness(outcome, &fits)),
+        goodness,
         spread: spread.map_or(Vec::new(), |s| {
             level_spreads(s, &outcome.curve.levels, settings.rate_hz)
         }),

@@ -309,13 +309,12 @@ impl Outcome {
     /// without noise.
     pub fn practical(&self, rate_hz: f64) -> Option<Practical> {
         let (horizon, policy) = (Horizon::default(), Policy::Matched);
-        let range_s = observed_s(self, rate_hz)?;
-        let model = &self.fit.composite;
+        let read = self.for_navigation();
+        let range_s = observed_s(read, rate_hz)?;
+        let model = &read.fit.composite;
         let parameters = AxisParameters::of(&[model], rate_hz, horizon, policy, range_s).ok()?;
-        let intervals = self
-            .inference
-            .as_ref()
-            .map_or(PracticalIntervals::default(), |i| i.practical);
+        let intervals = read.inference.as_ref();
+        let intervals = intervals.map_or(PracticalIntervals::default(), |i| i.practical);
         let walk_until_s = parameters
             .walk
             .departs_s(model, rate_hz, range_s, Practical::BESIDE);
@@ -406,6 +405,7 @@ mod tests {
                 curve,
                 fit,
                 inference: None,
+                reading: None,
             }
         };
         let outcome = fit_of(vec![ar1(10.0, 1.0), ar1(1000.0, 1.0)]);

@@ -10,7 +10,7 @@ use crate::report::{in_order, some};
 use nav_sim_calibration::{
     Beginning, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Miss, Outcome,
     ParameterInterval, ParameterSpread, Ranking, Settings, TurnOnFinding, TurnOnSpread,
-    Undetermined, Verdict, WIDEST, duration, model_of, percent, tau_s,
+    Undetermined, Verdict, WIDEST, duration, percent, tau_s,
 };
 use nav_sim_document::{
     Axis as ChartAxis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke,
@@ -464,6 +464,29 @@ fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
                 )
             }),
     );
+    if let Some(reading) = &outcome.reading {
+        let counted = reading.counted_levels();
+        let bands = bands(&counted).map(|[from, to]| {
+            let [from, to] = [from, to].map(|level| seconds(&level));
+            (
+                format!("{} to {}", duration(from), duration(to)),
+                format!("{from}s:{to}s"),
+            )
+        });
+        let (spec, all) = (&reading.spec, bands.collect::<Vec<_>>());
+        let words: Vec<&str> = all.iter().map(|(words, _)| &**words).collect();
+        notes.push(format!(
+            "N, K and B are read off the curve, as {spec} at {}",
+            words.join(" and ")
+        ));
+        if let [(_, range)] = &all[..]
+            && reading.departure().scales < outcome.departure().scales
+        {
+            notes.push(format!(
+                "the other scales spoil the fit: --scales {range} leaves them out"
+            ));
+        }
+    }
     for i in intervals(outcome)
         .iter()
         .filter(|i| !i.of.parameter.is_shape() && i.absent.is_none())
@@ -752,8 +775,31 @@ fn processes(outcome: &Outcome) -> Vec<Value> {
     all
 }
 
+/// First and last of each run of levels without a gap.
+fn bands(levels: &[u32]) -> impl Iterator<Item = [u32; 2]> {
+    let runs = levels.chunk_by(|a, b| a + 1 == *b);
+    runs.map(|run| [run[0], run[run.len() - 1]])
+}
+
 fn intervals(outcome: &Outcome) -> &[ParameterInterval] {
     outcome.inference.as_ref().map_or(&[], |i| &i.intervals)
+}
+
+/// The noise of a fit, with its intervals.
+fn put_into(file: &mut ModelFile, outcome: &Outcome) {
+    outcome.put_into(&mut file.model);
+    let labels = outcome.fit.composite.labels();
+    for channel in outcome.scope.channels() {
+        file.missing.retain(|c| *c != channel);
+        let known = intervals(outcome).iter().filter(|i| i.low.is_finite());
+        file.intervals.extend(known.map(|i| Interval {
+            channel,
+            process: labels[i.of.process].clone(),
+            parameter: i.of.parameter.name().to_owned(),
+            low: i.low,
+            high: i.high,
+        }));
+    }
 }
 
 /// The means of one sensor, by the model of one estimator.
@@ -908,8 +954,7 @@ impl Calibration {
     /// hexadecimal, of the file of curves that goes beside it.
     pub(super) fn model_file(&self, curves: &str) -> ModelFile {
         let (outcomes, rate_hz) = (&self.outcomes, self.settings.rate_hz);
-        let mut file = ModelFile::new(model_of(outcomes, rate_hz));
-        file.missing = Channel::ALL.to_vec();
+        let mut file = ModelFile::empty(rate_hz);
         let mut spread = Spread::default();
         for outcome in outcomes {
             let (composite, labels) = (&outcome.fit.composite, outcome.fit.composite.labels());
@@ -926,16 +971,12 @@ impl Calibration {
                     Variation::new(composite, &labels[of.process], of.parameter.name(), law).ok()
                 })
                 .collect();
+            put_into(&mut file, outcome);
+            if let Some(reading) = &outcome.reading {
+                let empty = || Box::new(ModelFile::empty(rate_hz));
+                put_into(file.reading.get_or_insert_with(empty), reading);
+            }
             for channel in outcome.scope.channels() {
-                file.missing.retain(|c| *c != channel);
-                let known = intervals(outcome).iter().filter(|i| i.low.is_finite());
-                file.intervals.extend(known.map(|i| Interval {
-                    channel,
-                    process: labels[i.of.process].clone(),
-                    parameter: i.of.parameter.name().to_owned(),
-                    low: i.low,
-                    high: i.high,
-                }));
                 spread.axes[channel.index()].clone_from(&laws);
             }
         }

@@ -176,6 +176,8 @@ impl Export {
         policy: Policy,
         horizon: Horizon,
     ) -> Result<Self, Failure> {
+        let misfit = file.misfit().map(|misfit| misfit.to_string());
+        let file = &file.clone().for_navigation();
         let rate_hz = file.model.rate_hz;
         let axes = |sensor: Sensor| -> Vec<(Axis, &Composite)> {
             file.present()
@@ -238,7 +240,7 @@ impl Export {
             rate_hz,
             policy,
             horizon,
-            misfit: file.misfit().map(|misfit| misfit.to_string()),
+            misfit,
             sensors,
         })
     }

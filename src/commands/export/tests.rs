@@ -663,3 +663,18 @@ fn names_of_models_forge_nothing() {
         assert!(!text.contains("NaN"), "{text}");
     }
 }
+
+/// Of a model that does not fit, the figures of its reading are exported.
+#[test]
+fn a_reading_is_exported_in_the_place_of_the_processes() {
+    let model = |n_a, n_g| {
+        let axis = |n| Composite::new(vec![white(n)]);
+        Model::pooled(RATE, &axis(n_a), &axis(n_g))
+    };
+    let mut read = file(model(3.0 * N_A, 2.0 * N_G));
+    read.reading = Some(Box::new(ModelFile::new(model(N_A, N_G))));
+    let [accel, gyro] = exported("kalibr", &read, Policy::Matched).unwrap().sensors;
+    for (found, exact) in [(accel, N_A), (gyro, N_G)] {
+        assert!((found.exported.density / exact - 1.0).abs() < 1e-9);
+    }
+}

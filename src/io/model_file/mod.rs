@@ -58,9 +58,31 @@ pub struct ModelFile {
     pub intervals: Vec<Interval>,
     /// How the model was made.
     pub provenance: Option<toml::Table>,
+    /// Processes read off the curves of the recordings, of the axes whose model does not describe these.
+    pub reading: Option<Box<Self>>,
 }
 
 impl ModelFile {
+    /// What stands for the noise in navigation: the processes, or the reading of axes that have one.
+    #[must_use]
+    pub fn for_navigation(mut self) -> Self {
+        let Some(reading) = self.reading.take() else {
+            return self;
+        };
+        for channel in reading.present() {
+            let axis = channel.index();
+            self.model.axes[axis] = reading.model.axes[axis].clone();
+            if let Some(spread) = &mut self.spread {
+                let labels = self.model.axes[axis].labels();
+                spread.axes[axis].retain(|law| labels.contains(&law.process));
+            }
+        }
+        self.intervals
+            .retain(|i| reading.missing.contains(&i.channel));
+        self.intervals.extend(reading.intervals);
+        self
+    }
+
     /// Axes that the file has.
     pub fn present(&self) -> impl Iterator<Item = Channel> {
         let is_present = |channel: &Channel| !self.missing.contains(channel);
@@ -93,6 +115,15 @@ impl ModelFile {
         }
     }
 
+    /// A file without axes.
+    pub(crate) fn empty(rate_hz: f64) -> Self {
+        let axes = Default::default();
+        Self {
+            missing: Channel::ALL.to_vec(),
+            ..Self::new(Model { rate_hz, axes })
+        }
+    }
+
     /// A model of all six axes and nothing beside.
     pub(crate) const fn new(model: Model) -> Self {
         Self {
@@ -102,6 +133,7 @@ impl ModelFile {
             spread: None,
             intervals: Vec::new(),
             provenance: None,
+            reading: None,
         }
     }
 }
@@ -199,6 +231,8 @@ struct Description {
 #[schemars(inline)]
 struct SensorTable {
     processes: Option<Vec<ProcessTable>>,
+    /// What navigates where the processes do not describe the recordings: read off their curve
+    reading: Option<Vec<ProcessTable>>,
     x: Option<AxisTable>,
     y: Option<AxisTable>,
     z: Option<AxisTable>,
@@ -210,6 +244,8 @@ struct SensorTable {
 #[schemars(inline)]
 struct AxisTable {
     processes: Vec<ProcessTable>,
+    /// What navigates where the processes do not describe the recordings: read off their curve
+    reading: Option<Vec<ProcessTable>>,
 }
 
 /// A process: its parameters by their names, and their intervals.
@@ -331,6 +367,8 @@ pub struct Misfit {
     pub p_value: Option<f64>,
     /// Wavelet variance of the data over that of the model where it is furthest from 1, and that scale (s).
     pub worst: Option<(f64, f64)>,
+    /// Whether a reading of the curve stands for it.
+    pub is_read: bool,
 }
 
 impl fmt::Display for Misfit {
@@ -341,7 +379,11 @@ impl fmt::Display for Misfit {
             .worst
             .map(|(ratio, tau_s)| format!("data/model {} at {}", readable(ratio), duration(tau_s)));
         let figures: Vec<String> = p.into_iter().chain(worst).collect();
-        write!(f, "does not fit its recordings ({})", figures.join(", "))
+        write!(f, "does not fit its recordings ({})", figures.join(", "))?;
+        match self.is_read {
+            true => write!(f, ": the reading of their curve stands for it"),
+            false => Ok(()),
+        }
     }
 }
 
@@ -362,6 +404,7 @@ impl ModelFile {
             is_missed.then(|| Misfit {
                 p_value,
                 worst: ratio.zip(number("worst_tau_s")),
+                is_read: self.reading.is_some(),
             })
         };
         let size = |m: &Misfit| m.worst.map_or(0.0, |(ratio, _)| ratio.ln().abs());
@@ -468,7 +511,8 @@ fn read_sensor(
 ) -> Result<(), Failure> {
     let name = sensor.name();
     let own = [&table.x, &table.y, &table.z];
-    if table.processes.is_none() && own.iter().all(|axis| axis.is_none()) {
+    let is_empty = own.iter().all(|axis| axis.is_none()) || table.reading.is_some();
+    if table.processes.is_none() && is_empty {
         return Err(source.missing(name, &["processes"]));
     }
     for (axis, own) in Axis::ALL.into_iter().zip(own) {
@@ -479,12 +523,45 @@ fn read_sensor(
                 let error = source.refused(&key, "is given both for all axes and for this one");
                 return Err(error.or_hint(format!("write either [{name}] or one table an axis")));
             }
-            (Some(all), None) => read_processes(source, name, all, channel, file)?,
-            (None, Some(own)) => read_processes(source, &key, &own.processes, channel, file)?,
+            (Some(all), None) => {
+                read_axis(source, name, all, table.reading.as_ref(), channel, file)?
+            }
+            (None, Some(own)) => read_axis(
+                source,
+                &key,
+                &own.processes,
+                own.reading.as_ref(),
+                channel,
+                file,
+            )?,
             (None, None) => file.missing.push(channel),
         }
     }
     Ok(())
+}
+
+fn read_axis(
+    source: &Source,
+    key: &str,
+    processes: &[ProcessTable],
+    reading: Option<&Vec<ProcessTable>>,
+    channel: Channel,
+    file: &mut ModelFile,
+) -> Result<(), Failure> {
+    read_processes(
+        source,
+        &format!("{key}.processes"),
+        processes,
+        channel,
+        file,
+    )?;
+    let Some(read) = reading else { return Ok(()) };
+    let rate_hz = file.model.rate_hz;
+    let reading = file
+        .reading
+        .get_or_insert_with(|| Box::new(ModelFile::empty(rate_hz)));
+    reading.missing.retain(|other| *other != channel);
+    read_processes(source, &format!("{key}.reading"), read, channel, reading)
 }
 
 fn read_processes(
@@ -495,7 +572,7 @@ fn read_processes(
     file: &mut ModelFile,
 ) -> Result<(), Failure> {
     let rate_hz = file.model.rate_hz;
-    let keys = (1..).map(|i| format!("{key}.processes[{i}]"));
+    let keys = (1..).map(|i| format!("{key}[{i}]"));
     let tables: Vec<_> = keys.zip(tables.iter().map(|table| &table.0)).collect();
     let processes = tables
         .iter()
@@ -670,8 +747,19 @@ fn processes(file: &ModelFile, channel: Channel) -> Option<String> {
     if file.missing.contains(&channel) {
         return None;
     }
+    let mut out = list(file, channel, "processes");
+    if let Some(reading) = &file.reading
+        && !reading.missing.contains(&channel)
+    {
+        out += "# read off the curve, which the processes do not describe: navigation and exports take it in their place\n";
+        out += &list(reading, channel, "reading");
+    }
+    Some(out)
+}
+
+fn list(file: &ModelFile, channel: Channel, key: &str) -> String {
     let noise = file.model.axis(channel);
-    let mut out = String::from("processes = [\n");
+    let mut out = format!("{key} = [\n");
     for (process, label) in noise.processes.iter().zip(noise.labels()) {
         let is_of_process = |i: &&Interval| i.channel == channel && i.process == label;
         let intervals: Vec<&Interval> = file.intervals.iter().filter(is_of_process).collect();
@@ -683,7 +771,7 @@ fn processes(file: &ModelFile, channel: Channel) -> Option<String> {
         );
     }
     out.push_str("]\n");
-    Some(out)
+    out
 }
 
 fn keys(process: &Process, intervals: &[&Interval]) -> String {

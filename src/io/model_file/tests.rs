@@ -349,3 +349,28 @@ fn turn_on_biases_are_one_or_three_standard_deviations() {
         assert!(message.ends_with(reason), "{message}");
     }
 }
+
+/// A reading of one axis is written beside its processes, reads back to the same bits, and stands for this axis alone.
+#[test]
+fn a_reading_stands_for_its_axis_in_navigation() {
+    let mut file = ModelFile::new(Model::pooled(100.0, &n2(), &n2()));
+    let mut reading = ModelFile::empty(100.0);
+    let read = Composite::new(vec![process("WN", &[4e-5]), process("RW", &[3e-11])]);
+    reading.model.axes[ACCEL_X.index()] = read.clone();
+    reading.missing.retain(|channel| *channel != ACCEL_X);
+    file.reading = Some(Box::new(reading));
+    let text = to_toml(&file);
+    assert_eq!(read_text(&text).unwrap(), file);
+    let navigated = file.for_navigation();
+    let of = |channel: Channel| navigated.model.axis(channel).clone();
+    let expected = |channel| {
+        if channel == ACCEL_X {
+            read.clone()
+        } else {
+            n2()
+        }
+    };
+    assert!(Channel::ALL.iter().all(|c| of(*c) == expected(*c)));
+    let alone = refusal("rate_hz = 100.0\n[accel]\nreading = [{ type = \"WN\", sigma2 = 1.0 }]\n");
+    assert!(alone.contains("processes"), "{alone}");
+}

@@ -199,6 +199,9 @@ pub struct Curve {
     /// Variance of ln nu, at all scales alike, by which the curve of other recordings would differ beyond the degrees of
     /// freedom; 0 where it is not known.
     pub differing: f64,
+    /// Expected ln of each variance over the true one: that of few coefficients is read high if it is robust, and its logarithm is
+    /// low. Empty: 0.
+    pub log_bias: Vec<f64>,
     /// Levels of a robust curve whose variance is the classical one, which reads quantization noise as it is.
     pub classical: Vec<u32>,
     /// Levels without weight in a fit.
@@ -210,6 +213,14 @@ impl Curve {
     pub const WV_RANGE: (f64, f64) = (1e-100, 1e100);
     /// Degrees of freedom that are accepted.
     pub const EDOF_RANGE: (f64, f64) = (1e-15, 1e15);
+
+    /// The same of recordings that differ by another variance of ln nu besides.
+    pub fn widened(&self, variance: f64) -> Self {
+        Self {
+            differing: self.differing + variance,
+            ..self.clone()
+        }
+    }
 
     /// Response to quantization noise at a level; none where it is read as it is.
     pub fn response(&self, level: u32) -> Option<&QuantizationResponse> {
