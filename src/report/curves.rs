@@ -186,7 +186,7 @@ pub(crate) struct FittedCurve {
     /// Scales (s) at which it is the classical one all the same.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub classical_tau_s: Vec<f64>,
-    /// Expected ln of each variance over the true one, for a fit that is centred by it.
+    /// Median ln of each variance over the true one, for a fit that is centred by it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub log_bias: Vec<f64>,
     /// Lower ends of the 95 % intervals.

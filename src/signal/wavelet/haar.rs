@@ -199,8 +199,8 @@ pub struct Curve {
     /// Variance of ln nu, at all scales alike, by which the curve of other recordings would differ beyond the degrees of
     /// freedom; 0 where it is not known.
     pub differing: f64,
-    /// Expected ln of each variance over the true one: that of few coefficients is read high if it is robust, and its logarithm is
-    /// low. Empty: 0.
+    /// Median ln of each variance over the true one: that of few coefficients is read high if it is robust, and is low in the median.
+    /// Empty: 0.
     pub log_bias: Vec<f64>,
     /// Levels of a robust curve whose variance is the classical one, which reads quantization noise as it is.
     pub classical: Vec<u32>,

@@ -6,13 +6,14 @@
 //! the errors it truly makes, in the sense of the Kullback-Leibler divergence, along a trajectory with its fixes and
 //! outages.
 
-use super::pass::{Assessment, Consistency, ErrorLaw, FilterPass, Judged, assess};
+use super::pass::{Assessment, Consistency, ErrorLaw, FilterPass, Judged};
 use super::track::{NAV, Track};
 use crate::earth::GravityModel;
-use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings};
+use crate::ekf::{Belief, FixUpdate, InitialSettings};
 use crate::imu::{Axis, Channel};
 use crate::linalg::mean;
 use crate::minimise::{Descent, MOST, Minimum};
+use crate::noise::practical::{Bias, Curve, Horizon, Policy};
 use crate::noise::{Model, Process, reduction};
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::defects::ImuSettings;
@@ -49,16 +50,10 @@ pub fn reduced_belief(model: &Model, wavelet: Belief, track: &Track, alike: Alik
         return wavelet;
     }
     let track = track.outline();
-    // The interval of fixes and the window matter to a reduction alone; here each process has a state.
-    let full = Belief::new(model, FilterStates::Full, 1.0, 1.0);
-    let best = full.map_or(Vec::new(), |full| {
-        horizontal_m(&assess(&track, &full, model)).collect()
-    });
     let search = Search {
         model,
         base: wavelet,
         track,
-        best,
         exact,
         alike,
         free,
@@ -88,8 +83,6 @@ struct Search<'a> {
     model: &'a Model,
     base: Belief,
     track: Track,
-    /// Horizontal RMSE (m) at the outage ends of the filter with a state for each process; empty where the model has no such filter.
-    best: Vec<f64>,
     /// Axes that are left as they are.
     exact: [bool; 6],
     alike: Alike,
@@ -128,24 +121,33 @@ impl Search<'_> {
         let belief = self.belief(ln);
         let law = FilterPass::new(&self.track, &belief).errors_as_expected(&belief, self.model);
         let assessment = law.assessment();
-        let steep: Vec<Steep> = steep(&assessment)
-            .into_iter()
-            .chain(self.lost(&assessment))
-            .collect();
-        let cost = divergence(&assessment, |_| 0.0) + steep.iter().map(Steep::cost).sum::<f64>();
+        let steep = steep(&assessment);
+        let cost = score(&assessment) + steep.iter().map(Steep::cost).sum::<f64>();
         let parts = shape(&law).chain(steep.iter().map(Steep::part)).collect();
         Value { cost, parts }.with_ridge(RIDGE, ln)
     }
 
-    /// What the horizontal position at the outage ends loses to the filter with all states counts where it is a fiftieth, steeply.
-    fn lost(&self, assessment: &Assessment) -> Vec<Steep> {
-        let weight = ENDS * LOST_WEIGHT / self.best.len().max(1) as f64;
-        let lost = |(own, best): (f64, &f64)| Steep {
-            x: (own / best).ln().max(0.0),
-            scale: LOST,
-            weight,
-        };
-        horizontal_m(assessment).zip(&self.best).map(lost).collect()
+    /// Factors to the pair of N and Gauss-Markov bias that is exported.
+    fn of_pair(&self) -> Option<Factors> {
+        let mut ln = [0.0; FACTORS];
+        for channel in Channel::ALL.into_iter().filter(|c| !self.exact[c.index()]) {
+            let (noise, rate_hz) = (self.model.axis(channel), self.model.rate_hz);
+            let curve = Curve::largest(&[noise], rate_hz, Horizon::default()).ok()?;
+            let pair = curve.pair(Policy::Matched, Bias::Markov);
+            let (s, i) = (channel.sensor as usize, channel.axis as usize);
+            let group = &self.base.groups[s][0];
+            let phi = (-1.0 / (pair.markov?.t_corr_s * rate_hz)).exp();
+            let innovation = pair.markov?.sigma.powi(2) * (1.0 - phi * phi);
+            let factors = [
+                pair.density.powi(2) * rate_hz / self.base.white[s][i],
+                innovation / group.innovation[i],
+                group.phi[i].ln() / phi.ln(),
+            ];
+            for (k, factor) in factors.into_iter().enumerate() {
+                ln[self.alike.first_factor(channel) + k] = factor.ln().clamp(-MAX_LN, MAX_LN);
+            }
+        }
+        ln.iter().all(|x| x.is_finite()).then_some(ln)
     }
 
     /// The factors that are free descend from where the search starts.
@@ -156,7 +158,13 @@ impl Search<'_> {
             ln
         };
         let value = |free: &[f64]| self.value(&factors(free));
-        let start: Vec<f64> = self.free.iter().map(|i| START[*i]).collect();
+        // The exported pair is nearer where the wavelet fit is far from what a filter can carry.
+        let cost = |ln: &Factors| self.value(ln).cost;
+        let start = match self.of_pair() {
+            Some(pair) if cost(&pair) < cost(&START) => pair,
+            _ => START,
+        };
+        let start: Vec<f64> = self.free.iter().map(|i| start[*i]).collect();
         let found = minimum(value, &start, (-MAX_LN, MAX_LN), |_| ENOUGH);
         if found.value.cost.is_finite() {
             factors(&found.at)
@@ -179,21 +187,27 @@ pub(super) const ENDS: f64 = 0.3;
 /// A ratio whose logarithm is this far from 0 begins to count for itself, with this weight.
 const OFF: f64 = 0.08;
 const OFF_WEIGHT: f64 = 0.4;
-/// The same for a horizontal position that is less accurate than that of the filter with all states.
-const LOST: f64 = 0.02;
-const LOST_WEIGHT: f64 = 0.4;
 /// Weight in the cost of the states whose ratio is off over the whole drive.
 const WAY: f64 = 0.3;
 /// The same for the mean NEES: the logarithm at which it begins to count, and its weight.
 const NEES_OFF: f64 = 0.03;
 const NEES_WEIGHT: f64 = 0.1;
 
-/// Horizontal RMSE at the outage ends (m).
-fn horizontal_m(assessment: &Assessment) -> impl Iterator<Item = f64> {
-    assessment
-        .outage_ends
-        .iter()
-        .map(|end| end.rmse[0].hypot(end.rmse[1]))
+/// Twice what the belief loses of the expected log density of the errors: at the outage ends the density itself, which rewards
+/// small errors that are stated as they are, and over the drive the divergence of what is stated from what is made.
+fn score(assessment: &Assessment) -> f64 {
+    let all = divergence(assessment, |_| 0.0);
+    let ends = &assessment.outage_ends;
+    match ends.is_empty() {
+        true => all,
+        false => {
+            all - ENDS
+                * mean(
+                    ends.iter()
+                        .map(|end| 2.0 * end.log_density + end.divergence),
+                )
+        }
+    }
 }
 
 /// A logarithm that costs its fourth power: `scale` off costs `weight`, half of that a sixteenth, twice as much sixteen times;
