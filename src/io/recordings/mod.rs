@@ -12,6 +12,7 @@ use super::table::{
 };
 use super::{Failure, Place, help, table};
 use crate::report::six_digits;
+use nav_sim_signal::facts::Marks;
 use nav_sim_signal::imu::{Channel, Recording, Sensor, Signal};
 use nav_sim_signal::units::STANDARD_GRAVITY;
 use rayon::prelude::*;
@@ -22,6 +23,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use timing::Timing;
 
+pub(crate) mod facts;
 pub(crate) mod timing;
 
 /// How recordings are read.
@@ -172,7 +174,9 @@ pub(crate) fn load(
         log: Some(&options.log),
         ..*dictionary
     };
-    let table = table::read(path, dictionary)?;
+    let mut table = table::read(path, dictionary)?;
+    let is_wanted = |channel| wanted.is_none_or(|wanted| wanted.contains(&channel));
+    table.warnings.extend(facts::misspelt(&table, is_wanted));
     let is_gyro = |c: &&Column| c.factor.is_none() && c.quantity.name.starts_with("gyro");
     if let Some(column) = table.columns.iter().find(is_gyro) {
         return Err(table.no_unit(column));
@@ -255,6 +259,7 @@ pub(crate) fn visit<T: Send>(
         }
     }
     same_rate(&report.files)?;
+    report.warnings.extend(facts::compare(&report.files)?);
     if looks.is_empty() {
         let path = paths
             .first()
@@ -437,6 +442,8 @@ pub struct FileReport {
     pub assumptions: Vec<String>,
     /// Doubts, in words.
     pub warnings: Vec<String>,
+    /// What tells its samples from those of others.
+    marks: Vec<Marks>,
 }
 
 /// The name of one of the recordings of a file.
@@ -520,7 +527,21 @@ pub(super) fn recordings(
     options: &ReadOptions,
 ) -> Result<(Vec<Recording>, FileReport), Failure> {
     let mut report = FileReport::new(&raw);
-    let timing = timing::timing(&mut raw, options, &mut report)?;
+    let repair = facts::repair(&mut raw, options, &mut report)?;
+    let own = |rate_hz: f64| rate_hz / repair.rows_per_sample;
+    raw.rate_hz = raw.rate_hz.map(|(rate_hz, of)| (own(rate_hz), of));
+    let options = &ReadOptions {
+        rate_hz: options.rate_hz.map(own),
+        ..options.clone()
+    };
+    let mut timing = timing::timing(&mut raw, options, &mut report)?;
+    if options.gaps == Gaps::Split {
+        timing.breaks.extend(&repair.breaks);
+        timing.breaks.sort_unstable();
+        timing.breaks.dedup();
+    }
+    repair.tell(timing.rate_hz, &mut report);
+    report.marks = facts::marks(&raw);
     raw.columns
         .sort_by_key(|c| channel_of(c).map(Channel::index));
     let factors = factors(&raw, timing.rate_hz)?;
@@ -551,7 +572,8 @@ pub(super) fn recordings(
     for recording in &recordings {
         let means = recording.signals.iter().map(|s| (s.channel, s.mean));
         let means: Vec<(Channel, f64)> = means.collect();
-        plausible(&means, &mut report)?;
+        plausible(&means, timing.rate_hz, &mut report)?;
+        facts::examine(recording, &mut report)?;
         let samples = recording.signals.first().map_or(0, |s| s.samples.len());
         report.samples.push(samples);
         if report.means.is_empty() {
@@ -663,15 +685,23 @@ pub(crate) fn gravity_factor(raw: &Table) -> Result<f64, Failure> {
     Err(raw.no_unit(first))
 }
 
-/// Mean of values times a factor, summed about the first of them so that a large offset costs no digits.
+/// Mean of the values that are there, times a factor, summed about the first of them so that a large offset costs no digits.
 fn mean(values: &[f64], factor: f64) -> f64 {
     /// Values whose sum is taken before it is added: rounding grows with their number.
     const BLOCK: usize = 4096;
-    let Some(first) = values.first().map(|first| first * factor) else {
+    let is_there = |v: &&f64| !v.is_nan();
+    let Some(first) = values.iter().find(is_there).map(|first| first * factor) else {
         return 0.0;
     };
-    let sum_of = |block: &[f64]| block.iter().map(|v| v * factor - first).sum::<f64>();
-    first + values.chunks(BLOCK).map(sum_of).sum::<f64>() / values.len() as f64
+    let present = |block: &[f64]| {
+        block
+            .iter()
+            .filter(is_there)
+            .map(|v| v * factor - first)
+            .sum::<f64>()
+    };
+    let count = values.iter().filter(is_there).count();
+    first + values.chunks(BLOCK).map(present).sum::<f64>() / count as f64
 }
 
 fn norm(vector: &[f64]) -> f64 {
@@ -679,7 +709,11 @@ fn norm(vector: &[f64]) -> f64 {
 }
 
 /// Static specific force is gravity, or nothing where the mean was removed before; rates are small.
-fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Failure> {
+fn plausible(
+    means: &[(Channel, f64)],
+    rate_hz: f64,
+    report: &mut FileReport,
+) -> Result<(), Failure> {
     let [accel, gyro] = Sensor::ALL.map(|sensor| -> Vec<f64> {
         let own = means.iter().filter(|(channel, _)| channel.sensor == sensor);
         own.map(|(_, mean)| *mean).collect()
@@ -695,7 +729,7 @@ fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Fa
             .or_option(help::COLUMN_NAMES));
     }
     if accel.len() == 3 {
-        check_gravity(&report.file, f)?;
+        check_gravity(&report.file, f, rate_hz)?;
     }
     if rate > 0.1 {
         let degrees = rate.to_degrees();
@@ -706,8 +740,17 @@ fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Fa
     Ok(())
 }
 
-pub(crate) fn check_gravity(path: &str, norm: f64) -> Result<(), Failure> {
+pub(crate) fn check_gravity(path: &str, norm: f64, rate_hz: f64) -> Result<(), Failure> {
     let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
+    if rate_hz > 1.2 && near(STANDARD_GRAVITY / rate_hz) {
+        let message = format!(
+            "static |f| is {norm:.4} m/s², 9.81 m/s² over {} Hz: increments named rates",
+            six_digits(rate_hz)
+        );
+        return Err(Failure::contents(path, Place::Within, message).or_hint(
+            "name the columns of increments dv_x_m_s, dv_y_m_s, dv_z_m_s, dtheta_x_rad, dtheta_y_rad, dtheta_z_rad",
+        ));
+    }
     if near(STANDARD_GRAVITY) || norm < NO_GRAVITY {
         return Ok(());
     }
