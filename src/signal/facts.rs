@@ -17,6 +17,9 @@ const BLOCK: usize = 256;
 /// Changes (in steps) from which on a step is fine: wherever the mean lies between two steps, neighbours are rarely equal.
 const FINE: f64 = 4.0;
 
+/// Median of |x| of a standard normal.
+const NORMAL: f64 = 0.674_489_75;
+
 /// True if `count` of `trials` is more than a chance of `p` explains: Chernoff's bound on the binomial tail.
 fn is_beyond(count: usize, trials: usize, p: f64) -> bool {
     let (n, q, p) = (
@@ -229,6 +232,9 @@ pub fn interpolated(axis: &[f64]) -> Option<f64> {
     let second = moving.map(|x| (x[2] - 2.0 * x[1] + x[0]).abs());
     let second: Vec<f64> = second.filter(|d| d.is_finite()).collect();
     let trials = second.len();
+    if trials < BLOCK {
+        return None;
+    }
     let others: Vec<f64> = second.into_iter().filter(|d| *d > rounding).collect();
     let near = others.iter().filter(|d| **d <= 8.0 * rounding).count();
     let on_line = trials - others.len();
@@ -242,15 +248,13 @@ pub fn interpolated(axis: &[f64]) -> Option<f64> {
 /// White noise of a column (units·√s), from the median change of its samples; none where steps hide it.
 #[must_use]
 pub fn white_noise(axis: &[f64], rate_hz: f64) -> Option<f64> {
-    /// Median of |x| of a standard normal.
-    const NORMAL: f64 = 0.674_489_75;
     let present: Vec<f64> = axis.iter().copied().filter(|x| !x.is_nan()).collect();
     let grain = grain(&present).filter(|grain| grain.changes >= FINE)?;
     Some(grain.changes * grain.step / (NORMAL * SQRT_2 * rate_hz.sqrt()))
 }
 
 /// Change of the mean from one second to the next from which on a unit moves (m/s² or rad/s): 0.3° of tilt, or turning with
-/// 0.25 °/s. No unit at rest comes near it: the white noise of the noisiest in the catalogue changes it by 0.005.
+/// 0.25 °/s. The white noise of the noisiest units in the catalogue changes it by a tenth.
 const fn motion(sensor: Sensor) -> f64 {
     match sensor {
         Sensor::Accel => 0.05,
@@ -258,8 +262,10 @@ const fn motion(sensor: Sensor) -> f64 {
     }
 }
 
-/// Seconds in which a unit moves, and all of them: a mean that changes by more than [`motion`] and than white noise explains, or
-/// four times the usual change from sample to sample.
+/// Seconds in which a unit moves, and all of them: its mean changes by more than a unit at rest, by more than its white noise
+/// explains, and by more than the steps of all seconds do (those of noise with stationary increments, walks too, are Gaussian of
+/// one size); or samples change by four times as much as usual. Where noise is not stationary because the level of a second
+/// differs more than χ² does, the unit moves most of the time, and the usual step tells nothing.
 #[must_use]
 pub fn moving(recording: &Recording) -> (usize, usize) {
     let width = recording.rate_hz.round() as usize;
@@ -267,21 +273,11 @@ pub fn moving(recording: &Recording) -> (usize, usize) {
     if width < 10 || seconds < 10 {
         return (0, seconds);
     }
-    // Gaussian tail of the means of all seconds and axes
-    let z = (2.0 * (12.0 * seconds as f64 / LEVEL).ln()).sqrt();
+    // Gaussian tail of the means of all seconds and axes, and 3.4 deviations of the median of the steps
+    let sampling = 1.0 + 4.0 / (seconds as f64).sqrt();
+    let z = (2.0 * (12.0 * seconds as f64 / LEVEL).ln()).sqrt() * sampling;
     let mut moves = vec![false; seconds];
     for signal in &recording.signals {
-        let windows: Vec<&[f64]> = signal.samples.chunks_exact(width).collect();
-        let mean = |window: &&[f64]| window.iter().sum::<f64>() / width as f64;
-        let square = |window: &&[f64]| {
-            let squares = window.windows(2).map(|x| (x[1] - x[0]).powi(2));
-            squares.sum::<f64>() / (width - 1) as f64
-        };
-        let means: Vec<f64> = windows.iter().map(mean).collect();
-        let squares: Vec<f64> = windows.iter().map(square).collect();
-        let mut sorted: Vec<f64> = squares.iter().copied().filter(|s| !s.is_nan()).collect();
-        sorted.sort_by(f64::total_cmp);
-        let at = |share: usize| sorted.get(sorted.len() / share).copied().unwrap_or(0.0);
         let present: Vec<f64> = signal
             .samples
             .iter()
@@ -289,12 +285,48 @@ pub fn moving(recording: &Recording) -> (usize, usize) {
             .filter(|x| !x.is_nan())
             .collect();
         let step = grain(&present).map_or(0.0, |grain| grain.step);
-        // white noise of the quietest tenth; χ² of ten samples has a tenth below 0.36 of its mean
-        let noise = z * (at(10) / (0.36 * width as f64)).sqrt();
-        let limit = motion(signal.channel.sensor).max(noise).max(1.5 * step);
-        let most = 16.0 * at(2).max(step * step);
+        let windows = || signal.samples.chunks_exact(width);
+        let means: Vec<f64> = windows()
+            .map(|x| x.iter().sum::<f64>() / width as f64)
+            .collect();
+        let square = |x: &[f64]| {
+            let squares = x.windows(2).map(|x| (x[1] - x[0]).powi(2));
+            squares.sum::<f64>() / (width - 1) as f64
+        };
+        let squares: Vec<f64> = windows().map(square).collect();
+        let steps: Vec<f64> = means.windows(2).map(|x| (x[1] - x[0]).abs()).collect();
+        let there = |all: &[f64]| {
+            all.iter()
+                .copied()
+                .filter(|x| !x.is_nan())
+                .collect::<Vec<_>>()
+        };
+        let (usual, own) = (there(&steps), there(&squares));
+        if usual.is_empty() || own.is_empty() {
+            continue;
+        }
+        let level = median(own.clone()).max(step * step);
+        let levels = own
+            .iter()
+            .map(|square| (square.max(step * step) / level).ln().abs());
+        // the squares of second differences of white noise are of half as many
+        let explained = 2.0 * NORMAL / (width as f64).sqrt() * sampling;
+        let is_stationary = median(levels.collect()) < explained;
+        let usual = if is_stationary {
+            median(usual) / NORMAL
+        } else {
+            0.0
+        };
+        // white noise by the quietest tenth: χ² of ten samples has a tenth below 0.36 of its mean
+        let mut quiet = own;
+        let tenth = quiet.len() / 10;
+        let quiet = *quiet.select_nth_unstable_by(tenth, f64::total_cmp).1;
+        let noise = (quiet / (0.36 * width as f64)).sqrt();
+        let limit = motion(signal.channel.sensor)
+            .max(z * noise.max(usual))
+            .max(1.5 * step);
         for k in 0..seconds {
-            moves[k] |= squares[k] > most || k > 0 && (means[k] - means[k - 1]).abs() > limit;
+            moves[k] |= squares[k] > 16.0 * level || k > 0 && steps[k - 1] > limit;
         }
     }
     (moves.iter().filter(|moves| **moves).count(), seconds)
@@ -322,7 +354,8 @@ pub fn marks(axes: &[&[f64]]) -> Marks {
     let hashes: Vec<u64> = (0..rows).map(of_row).collect();
     let one_in = (rows as u64 >> 12).next_power_of_two();
     let oldest = (0..WINDOW).fold(1_u64, |power, _| power.wrapping_mul(BASE));
-    let (mut rolling, mut changes, mut kept) = (0_u64, 0, HashSet::new());
+    let (mut rolling, mut changes) = (0_u64, 0);
+    let (mut kept, mut windows) = (HashSet::new(), 0);
     for k in 0..rows {
         rolling = rolling.wrapping_mul(BASE).wrapping_add(hashes[k]);
         changes += usize::from(k > 0 && hashes[k] != hashes[k - 1]);
@@ -332,8 +365,13 @@ pub fn marks(axes: &[&[f64]]) -> Marks {
         }
         let mark = mix(mix(rolling));
         if k + 1 >= WINDOW && changes >= 16 && mark % one_in == 0 {
+            windows += 1;
             kept.insert(mark);
         }
+    }
+    // what comes again in one recording tells nothing of two
+    if 2 * kept.len() < windows {
+        kept.clear();
     }
     Marks {
         one_in,
