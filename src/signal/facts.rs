@@ -58,7 +58,8 @@ pub fn grain(axis: &[f64]) -> Option<Grain> {
 /// Chance that all axes have the value of the row before. An axis explains its own share of such rows, but no more than its
 /// step does: differences of a rounded Gaussian are zero 0.27 times in so many steps as their median has; ten leaves room for
 /// numbers of so many digits, whose steps differ by ten.
-fn chance(axes: &[&[f64]]) -> f64 {
+/// Rows that are `held` are none of chance.
+fn chance(axes: &[&[f64]], held: f64) -> f64 {
     let most: Vec<f64> = axes
         .iter()
         .map(|axis| grain(axis).map_or(1.0, |grain| 10.0 / grain.changes))
@@ -69,7 +70,8 @@ fn chance(axes: &[&[f64]]) -> f64 {
     let all = blocks.map(|block| {
         let share = |axis: &&[f64]| {
             let equal = block.clone().filter(|k| axis[*k] == axis[k + 1]);
-            equal.count() as f64 / block.len() as f64
+            let share = equal.count() as f64 / block.len() as f64;
+            ((share - held) / (1.0 - held)).max(0.0)
         };
         let shares = axes
             .iter()
@@ -87,7 +89,8 @@ pub fn copies(stamps: &[f64], columns: &[&[f64]]) -> Vec<usize> {
     let stands: Vec<usize> = stands.collect();
     let is_copy = |k: &usize| columns.iter().all(|x| x[*k] == x[k - 1]);
     let copies: Vec<usize> = stands.iter().copied().filter(is_copy).collect();
-    let is_beyond = !copies.is_empty() && is_beyond(copies.len(), stands.len(), chance(columns));
+    let is_beyond =
+        !copies.is_empty() && is_beyond(copies.len(), stands.len(), chance(columns, 0.0));
     copies.into_iter().filter(|_| is_beyond).collect()
 }
 
@@ -165,12 +168,16 @@ pub fn repeats(axes: &[&[f64]]) -> Option<Repeats> {
     let counted: Vec<_> = runs.iter().filter(|(_, rows)| *rows <= longest).collect();
     let rows: usize = counted.iter().map(|(_, rows)| rows).sum();
     let repeated = rows - counted.len();
-    let chance = chance(axes);
-    let (is_rare, p) = (chance < 1e-3, repeated as f64 / rows.max(1) as f64);
-    let share = (p - chance) / (1.0 - chance);
+    let p = repeated as f64 / rows.max(1) as f64;
+    let beyond = |by_chance: f64| (p - by_chance) / (1.0 - by_chance);
+    let by_chance = chance(axes, 0.0);
+    let (is_rare, mut share) = (by_chance < 1e-3, beyond(by_chance));
     let least = LEAST[usize::from(!is_rare || axes.len() == 1)];
-    if !(share > least && is_beyond(repeated, rows, chance)) {
+    if !(share > least && is_beyond(repeated, rows, by_chance)) {
         return None;
+    }
+    for _ in 0..8 {
+        share = beyond(chance(axes, share));
     }
     // a stretch of n rows is of as many samples as have no more rows
     let per_sample = 1.0 / (1.0 - share);
@@ -273,9 +280,9 @@ pub fn moving(recording: &Recording) -> (usize, usize) {
     if width < 10 || seconds < 10 {
         return (0, seconds);
     }
-    // Gaussian tail of the means of all seconds and axes, and 3.4 deviations of the median of the steps
+    // 3.4 deviations of a median of so many; Gaussian tail of the means of all seconds and axes
     let sampling = 1.0 + 4.0 / (seconds as f64).sqrt();
-    let z = (2.0 * (12.0 * seconds as f64 / LEVEL).ln()).sqrt() * sampling;
+    let z = (2.0 * (12.0 * seconds as f64 / LEVEL).ln()).sqrt();
     let mut moves = vec![false; seconds];
     for signal in &recording.signals {
         let present: Vec<f64> = signal
@@ -317,13 +324,14 @@ pub fn moving(recording: &Recording) -> (usize, usize) {
         } else {
             0.0
         };
-        // white noise by the quietest tenth: χ² of ten samples has a tenth below 0.36 of its mean
+        // white noise by the quietest tenth, which χ² of ten samples has below 0.36 of its mean
         let mut quiet = own;
         let tenth = quiet.len() / 10;
         let quiet = *quiet.select_nth_unstable_by(tenth, f64::total_cmp).1;
-        let noise = (quiet / (0.36 * width as f64)).sqrt();
+        let below = (1.0 - 2.6 / (width as f64).sqrt()).max(0.36);
+        let noise = (quiet / (below * width as f64)).sqrt();
         let limit = motion(signal.channel.sensor)
-            .max(z * noise.max(usual))
+            .max(z * noise.max(sampling * usual))
             .max(1.5 * step);
         for k in 0..seconds {
             moves[k] |= squares[k] > 16.0 * level || k > 0 && steps[k - 1] > limit;

@@ -4,10 +4,11 @@
 use super::{Channel, DICTIONARY, FileReport, Gaps, ReadOptions, SIX, channel_of, timing};
 use crate::io::table::{Column, Table, find, normalised};
 use crate::io::{Failure, Place, help};
-use crate::report::six_digits;
+use crate::report::{readable, six_digits};
 use nav_sim_signal::facts::{self, Marks, Repeats};
 use nav_sim_signal::imu::{Recording, Sensor};
-use nav_sim_signal::units::DEG;
+use nav_sim_signal::noise::{Kind, Model, Process};
+use nav_sim_signal::units::{DEG, STANDARD_GRAVITY};
 use std::ops::Range;
 
 /// Repeated rows up to which they are missing samples, not those of another rate.
@@ -110,11 +111,8 @@ fn repeated(sensor: Sensor, repeats: &Repeats, rate_hz: f64) -> String {
     let repeated = format!("{sensor}: {share} of its rows repeat the row before");
     match &repeats.held {
         Some((rows, _)) => {
-            let native = six_digits(rate_hz / rows);
-            format!(
-                "{repeated}: a sensor of {native:.4} Hz written at {} Hz",
-                six_digits(rate_hz)
-            )
+            let [native, written] = [rate_hz / rows, rate_hz].map(readable);
+            format!("{repeated}: a sensor of {native} Hz written at {written} Hz")
         }
         None => repeated,
     }
@@ -222,7 +220,7 @@ impl Repair {
             let text = repeated(*sensor, repeats, rate_hz);
             if let Some(own) = &repeats.held {
                 held.push(own);
-                report.warn(text);
+                report.warn(format!("{text}, taken at its own rate"));
                 continue;
             }
             if repeats.share > MOST_REPEATED {
@@ -252,7 +250,8 @@ impl Repair {
         let is_same =
             |(other, _): &&(f64, Vec<usize>)| (other / rows_per_sample - 1.0).abs() < 0.01;
         if held.len() < found.len() || !held.iter().all(is_same) {
-            let text = report.warnings.pop().unwrap_or_default();
+            let first = found.iter().find_map(|(s, r)| Some((*s, r.as_ref()?)));
+            let text = first.map_or_else(String::new, |(s, r)| repeated(s, r, rate_hz));
             return Err(Failure::contents(&table.path, Place::Within, text)
                 .or_option(("axes", "take one sensor at a time, each at its own rate: --axes accel, then --axes gyro"))
                 .or_without(("axes", "wv and calibrate take one sensor at a time: --axes accel, then --axes gyro")));
@@ -334,33 +333,53 @@ pub(super) fn examine(recording: &Recording, report: &mut FileReport) -> Result<
         ));
     }
     for signal in &recording.signals {
-        let (channel, quietest) = (signal.channel, quietest(signal.channel.sensor));
+        let (channel, [quietest, _]) = (signal.channel, range(signal.channel.sensor));
         let found = facts::white_noise(&signal.samples, recording.rate_hz);
         if let Some(n) = found.filter(|n| *n < 0.1 * quietest) {
             let [n, quietest] = [n, quietest].map(|n| in_hours(channel.sensor, n));
             report.warn(format!(
-                "{channel}: N of {n}, a tenth of the quietest units' {quietest} or less: wrong unit, or increments named rates?"
+                "{channel}: N {n}, below a tenth of the quietest units' {quietest}: wrong unit, or increments named rates?"
             ));
         }
     }
     Ok(())
 }
 
-/// White noise of navigation-grade units (units·√s): ring-laser gyroscopes with 0.001 deg/√h, quartz accelerometers with 0.001
-/// m/s/√h.
-const fn quietest(sensor: Sensor) -> f64 {
+/// White noise of units (units·√s): from navigation grade, 0.001 deg/√h of ring lasers and 0.001 m/s/√h of quartz
+/// accelerometers, to the noisiest of the catalogue, ADIS16405 (2 deg/√h) and MPU-6050 (400 µg/√Hz).
+const fn range(sensor: Sensor) -> [f64; 2] {
     match sensor {
-        Sensor::Accel => 0.001 / 60.0,
-        Sensor::Gyro => 0.001 * DEG / 60.0,
+        Sensor::Accel => [0.001 / 60.0, 400e-6 * STANDARD_GRAVITY],
+        Sensor::Gyro => [0.001 * DEG / 60.0, 2.0 * DEG / 60.0],
     }
 }
 
 /// White noise as data sheets have it.
 fn in_hours(sensor: Sensor, n: f64) -> String {
     match sensor {
-        Sensor::Accel => format!("{:.2e} m/s/√h", 60.0 * n),
-        Sensor::Gyro => format!("{:.2e} deg/√h", 60.0 * n / DEG),
+        Sensor::Accel => format!("{} m/s/√h", readable(60.0 * n)),
+        Sensor::Gyro => format!("{} deg/√h", readable(60.0 * n / DEG)),
     }
+}
+
+/// Sensors of a model whose white noise is over three times that of the noisiest unit, or under a third of the quietest's.
+pub(crate) fn out_of_range(model: &Model) -> Vec<String> {
+    let of = |sensor: Sensor| {
+        let channels = Channel::ALL.into_iter().filter(|c| c.sensor == sensor);
+        let white = |c: Channel| {
+            let all = model.axes[c.index()].processes.iter();
+            let white = all.filter(|process| process.kind() == Kind::White);
+            (white.map(Process::amplitude).sum::<f64>() / model.rate_hz).sqrt()
+        };
+        let [low, high] = range(sensor);
+        let is_out = |n: &f64| *n > 0.0 && !(low / 3.0..=3.0 * high).contains(n);
+        let n = in_hours(sensor, channels.map(white).find(is_out)?);
+        let [low, high] = [low, high].map(|n| in_hours(sensor, n));
+        Some(format!(
+            "{sensor} N {n}, units have {low} to {high}: sigma2 is the variance of a sample at rate_hz"
+        ))
+    };
+    Sensor::ALL.into_iter().filter_map(of).collect()
 }
 
 /// What a recording under way says of itself: copies and lost samples are left out.
