@@ -43,6 +43,8 @@ pub(super) struct Repair {
     missing: Vec<(Option<Channel>, Range<usize>)>,
     /// First rows after rows that were left out.
     pub(super) breaks: Vec<usize>,
+    /// What is said of samples that were interpolated.
+    on_line: Option<String>,
     /// Stretches of one value, to be told with their times.
     frozen: Vec<(Channel, f64, Range<usize>)>,
 }
@@ -160,11 +162,7 @@ pub(super) fn repair(
         return Err(missing(table, rows.start, &text));
     }
     let (zeros, on_line) = suspicions(table);
-    if let Some(on_line) = on_line {
-        return Err(Failure::contents(&table.path, Place::Within, on_line)
-            .or_hint("write the samples as the sensor gave them, at its own rate and stamps")
-            .or_option(help::CHANNELS));
-    }
+    repair.on_line = on_line;
     report
         .warnings
         .extend(zeros.into_iter().filter(|_| !is_lossy));
@@ -296,6 +294,19 @@ fn even_out(stamps: &mut [f64], rows_per_sample: f64) {
 }
 
 impl Repair {
+    /// Refuses interpolated samples.
+    ///
+    /// # Errors
+    /// Where there are some.
+    pub(super) fn measured(self, path: &str) -> Result<(), Failure> {
+        let refused = |text: String| {
+            Failure::contents(path, Place::Within, text)
+                .or_hint("write the samples as the sensor gave them, at its own rate and stamps")
+                .or_option(help::CHANNELS)
+        };
+        self.on_line.map_or(Ok(()), |text| Err(refused(text)))
+    }
+
     /// Tells which stretches hold one value, now that the rate is known.
     pub(super) fn tell(&self, rate_hz: f64, report: &mut FileReport) {
         for channel in Channel::ALL {
@@ -409,11 +420,13 @@ pub(super) fn marks(table: &Table) -> Vec<Marks> {
 pub(super) fn compare(files: &[FileReport]) -> Result<Vec<String>, Failure> {
     for (i, later) in files.iter().enumerate() {
         for first in &files[..i] {
-            let pairs = later.marks.iter().zip(&first.marks);
-            let shared = pairs.filter_map(|(a, b)| a.shared_with(b));
-            if let Some(share) = shared.reduce(f64::max) {
+            let pairs = || later.marks.iter().zip(&first.marks);
+            let shared = pairs().filter_map(|(a, b)| a.shared_with(b));
+            let of_first = pairs().filter_map(|(a, b)| b.shared_with(a));
+            if let (Some(share), Some(other)) = (shared.reduce(f64::max), of_first.reduce(f64::max))
+            {
                 let name = &first.file;
-                let message = match share > 0.99 {
+                let message = match share.min(other) > 0.99 {
                     true => format!("is a copy of {name}: it would count as two replicates"),
                     false => format!(
                         "shares {} of its samples with {name}: they would count twice",

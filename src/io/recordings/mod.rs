@@ -580,6 +580,7 @@ pub(super) fn recordings(
             report.means = means;
         }
     }
+    repair.measured(&report.file)?;
     report.rate_hz = timing.rate_hz;
     Ok((recordings, report))
 }
