@@ -9,6 +9,7 @@ use nav_sim_signal::facts::{self, Marks, Repeats};
 use nav_sim_signal::imu::{Recording, Sensor};
 use nav_sim_signal::noise::{Kind, Model, Process};
 use nav_sim_signal::units::{DEG, STANDARD_GRAVITY};
+use std::fmt::Display;
 use std::ops::Range;
 
 /// Repeated rows up to which they are missing samples, not those of another rate.
@@ -77,26 +78,46 @@ fn lost(table: &Table) -> (Vec<usize>, Option<String>) {
     (rows, (count > 0).then_some(text))
 }
 
-/// What is said of zeros and of interpolated samples, column by column.
-fn suspicions(table: &Table) -> (Vec<String>, Option<String>) {
-    let (mut zeros, mut on_line) = (Vec::new(), None);
-    for column in &table.columns {
-        let Some(channel) = channel_of(column) else {
-            continue;
-        };
-        if let Some(share) = facts::zeros(&column.values).map(percent) {
-            zeros.push(format!(
-                "{share} of {channel} is exactly 0, which its step does not explain: a dead band, or lost samples"
-            ));
-        }
-        on_line = on_line.or_else(|| {
-            let share = percent(facts::interpolated(&column.values)?);
-            Some(format!(
-                "{share} of {channel} lies on the line between its neighbours: interpolated, not measured"
-            ))
-        });
-    }
-    (zeros, on_line)
+/// What is said of the zeros of a column.
+fn zeros(name: impl Display, values: &[f64]) -> Option<String> {
+    let share = percent(facts::zeros(values)?);
+    let why = "which its step does not explain: a dead band, or lost samples";
+    Some(format!("{share} of {name} is exactly 0, {why}"))
+}
+
+/// What is said of a column that was interpolated.
+fn interpolated(name: impl Display, values: &[f64]) -> Option<String> {
+    let share = percent(facts::interpolated(values)?);
+    let why = "interpolated, not measured";
+    Some(format!(
+        "{share} of {name} lies on the line between its neighbours: {why}"
+    ))
+}
+
+/// Warnings of one signal in memory, NaN where a sample is missing.
+#[must_use]
+pub fn doubts(name: &str, signal: &[f64]) -> Vec<String> {
+    let repeats = facts::repeats(&[signal]);
+    let frozen = facts::frozen(signal).into_iter().next();
+    let frozen = frozen.filter(|rows| rows.len() < signal.len());
+    let frozen = frozen.map(|rows| {
+        let (value, from, to) = (signal[rows.start], rows.start, rows.end - 1);
+        format!("{name} holds {value} from sample {from} to {to}")
+    });
+    let repeated = repeats.map(|repeats| repeated(name, &repeats, f64::NAN));
+    let all = [
+        repeated,
+        frozen,
+        zeros(name, signal),
+        interpolated(name, signal),
+    ];
+    all.into_iter().flatten().collect()
+}
+
+/// The signals of a table, by channel.
+fn signals(table: &Table) -> impl Iterator<Item = (Channel, &[f64])> {
+    let columns = table.columns.iter();
+    columns.filter_map(|column| Some((channel_of(column)?, &column.values[..])))
 }
 
 fn repeats_of(table: &Table) -> Vec<(Sensor, Option<Repeats>)> {
@@ -107,16 +128,16 @@ fn repeats_of(table: &Table) -> Vec<(Sensor, Option<Repeats>)> {
     Sensor::ALL.into_iter().filter_map(of).collect()
 }
 
-/// What is said of repeated rows; `rate_hz` is that of the rows.
-fn repeated(sensor: Sensor, repeats: &Repeats, rate_hz: f64) -> String {
+/// What is said of repeated rows; `rate_hz` is that of the rows, if it is known.
+fn repeated(name: impl Display, repeats: &Repeats, rate_hz: f64) -> String {
     let share = percent(repeats.share);
-    let repeated = format!("{sensor}: {share} of its rows repeat the row before");
+    let repeated = format!("{name}: {share} of its rows repeat the row before");
     match &repeats.held {
-        Some((rows, _)) => {
+        Some((rows, _)) if rate_hz.is_finite() => {
             let [native, written] = [rate_hz / rows, rate_hz].map(readable);
             format!("{repeated}: a sensor of {native} Hz written at {written} Hz")
         }
-        None => repeated,
+        _ => repeated,
     }
 }
 
@@ -145,15 +166,10 @@ pub(super) fn repair(
         .extend(zero.iter().map(|row| (None, *row..row + 1)));
     repair.apply(table, options.gaps);
     repair.own_rate(table, options, report)?;
-    for column in &table.columns {
-        let Some(channel) = channel_of(column) else {
-            continue;
-        };
-        for rows in facts::frozen(&column.values) {
+    for (channel, values) in signals(table) {
+        for rows in facts::frozen(values) {
             repair.missing.push((Some(channel), rows.clone()));
-            repair
-                .frozen
-                .push((channel, column.values[rows.start], rows));
+            repair.frozen.push((channel, values[rows.start], rows));
         }
     }
     if let (Gaps::Refuse, Some((channel, value, rows))) = (options.gaps, repair.frozen.first()) {
@@ -161,11 +177,9 @@ pub(super) fn repair(
         let text = format!("{channel} holds one value, {value}, for {count} rows: missing samples");
         return Err(missing(table, rows.start, &text));
     }
-    let (zeros, on_line) = suspicions(table);
-    repair.on_line = on_line;
-    report
-        .warnings
-        .extend(zeros.into_iter().filter(|_| !is_lossy));
+    repair.on_line = signals(table).find_map(|(channel, values)| interpolated(channel, values));
+    let zeros = signals(table).filter_map(|(channel, values)| zeros(channel, values));
+    report.warnings.extend(zeros.filter(|_| !is_lossy));
     repair.apply(table, options.gaps);
     Ok(repair)
 }
@@ -403,7 +417,7 @@ pub(crate) fn of_drive(table: &mut Table) -> Vec<String> {
     for (sensor, repeats) in repeats_of(table) {
         said.extend(repeats.map(|repeats| repeated(sensor, &repeats, rate_hz)));
     }
-    said.extend(suspicions(table).1);
+    said.extend(signals(table).find_map(|(channel, values)| interpolated(channel, values)));
     said
 }
 

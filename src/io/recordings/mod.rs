@@ -23,7 +23,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use timing::Timing;
 
-pub(crate) mod facts;
+pub mod facts;
 pub(crate) mod timing;
 
 /// How recordings are read.
@@ -635,6 +635,9 @@ fn pieces(
 /// Below this (m/s²) the mean was removed before: nothing to be learnt from it.
 const NO_GRAVITY: f64 = 0.3;
 
+/// A column without a larger value has squares that are no variances.
+const SMALLEST: f64 = 1e-45;
+
 /// What brings each column to SI units; refuses dead axes.
 fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
     let from_gravity = gravity_factor(raw)?;
@@ -650,6 +653,16 @@ fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
             return Err(Failure::contents(&raw.path, Place::Within, message)
                 .or_option(help::CHANNELS)
                 .or_hint("record again"));
+        }
+        let largest = column
+            .values
+            .iter()
+            .fold(0.0_f64, |most, v| most.max(v.abs()));
+        if largest < SMALLEST {
+            let message = format!("{channel} is nowhere above {largest:e}: no measurement");
+            return Err(Failure::contents(&raw.path, Place::Within, message)
+                .or_option(help::CHANNELS)
+                .or_hint("write it in the unit that its name has"));
         }
         let per_sample = if column.quantity.per_sample {
             rate_hz
