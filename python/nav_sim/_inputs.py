@@ -81,7 +81,7 @@ def path(value: object, name: str) -> str:
 def number(value: Any, name: str) -> float:
     """One number."""
     try:
-        return float(None if isinstance(value, bool) else value)
+        return float("bool" if isinstance(value, bool) else value)
     except (TypeError, ValueError):
         raise NavSimError(f"{name}={value!r} is not a number") from None
 
@@ -136,7 +136,7 @@ def vector(value: npt.ArrayLike, name: str) -> FloatArray:
 
 def _floats(value: npt.ArrayLike, name: str) -> FloatArray:
     try:
-        raw = value.astype(float).filled(np.nan) if isinstance(value, np.ma.MaskedArray) else np.asarray(value)
+        raw = np.ma.filled(value.astype(float), np.nan) if isinstance(value, np.ma.MaskedArray) else np.asarray(value)
         if raw.dtype.kind == "c":
             raise NavSimError(f"{name}: complex numbers, and real ones are needed")
         if raw.dtype.kind in "mM":
@@ -162,7 +162,7 @@ def columns(table: Table, name: str) -> dict[str, FloatArray]:
     index = getattr(table, "index", None)
     label = getattr(index, "name", None)
     if getattr(getattr(index, "dtype", None), "kind", "") == "M":
-        index, label = (index - index[0]) / np.timedelta64(1, "s"), "t_s"  # type: ignore[index,operator]
+        index, label = (index - index[0]) / np.timedelta64(1, "s"), "t_s"  # type: ignore[index]
     if isinstance(label, str) and label not in found:
         found = {label: vector(index, f"{name}.index"), **found}  # type: ignore[arg-type]
     if not found:

@@ -121,12 +121,13 @@ pub fn zero_rows(columns: &[&[f64]], accel: &[&[f64]]) -> Vec<usize> {
 #[must_use]
 pub fn zeros(axis: &[f64]) -> Option<f64> {
     let other: Vec<f64> = axis.iter().map(|x| x.abs()).filter(|x| *x > 0.0).collect();
-    let zeros = axis.len() - other.len();
+    let zeros = axis.iter().filter(|x| **x == 0.0).count();
+    let there = zeros + other.len();
     let grain = grain(axis)?;
     let width = median(other) / grain.step;
     let p = 10.0 / width;
-    let share = zeros as f64 / axis.len() as f64;
-    (p < 0.5 && share > p + 0.005 && is_beyond(zeros, axis.len(), p)).then_some(share)
+    let share = zeros as f64 / there as f64;
+    (p < 0.5 && share > p + 0.005 && is_beyond(zeros, there, p)).then_some(share)
 }
 
 /// Rows that repeat the one before on all axes of a sensor.

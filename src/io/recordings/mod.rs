@@ -572,7 +572,7 @@ pub(super) fn recordings(
     for recording in &recordings {
         let means = recording.signals.iter().map(|s| (s.channel, s.mean));
         let means: Vec<(Channel, f64)> = means.collect();
-        plausible(&means, timing.rate_hz, &mut report)?;
+        plausible(recording, &means, &mut report)?;
         facts::examine(recording, &mut report)?;
         let samples = recording.signals.first().map_or(0, |s| s.samples.len());
         report.samples.push(samples);
@@ -659,7 +659,7 @@ fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
             .iter()
             .fold(0.0_f64, |most, v| most.max(v.abs()));
         if largest < SMALLEST {
-            let message = format!("{channel} is nowhere above {largest:e}: no measurement");
+            let message = format!("{channel} is nowhere above {largest:.0e}: no measurement");
             return Err(Failure::contents(&raw.path, Place::Within, message)
                 .or_option(help::CHANNELS)
                 .or_hint("write it in the unit that its name has"));
@@ -724,8 +724,8 @@ fn norm(vector: &[f64]) -> f64 {
 
 /// Static specific force is gravity, or nothing where the mean was removed before; rates are small.
 fn plausible(
+    recording: &Recording,
     means: &[(Channel, f64)],
-    rate_hz: f64,
     report: &mut FileReport,
 ) -> Result<(), Failure> {
     let [accel, gyro] = Sensor::ALL.map(|sensor| -> Vec<f64> {
@@ -743,7 +743,16 @@ fn plausible(
             .or_option(help::COLUMN_NAMES));
     }
     if accel.len() == 3 {
-        check_gravity(&report.file, f, rate_hz)?;
+        // the mean of noise without gravity is of any size
+        let own = recording
+            .signals
+            .iter()
+            .filter(|s| s.channel.sensor == Sensor::Accel);
+        let spread = own.map(|s| mean(&s.samples.iter().map(|x| x * x).collect::<Vec<_>>(), 1.0));
+        if f > 5.0 * spread.sum::<f64>().sqrt() {
+            check_increments(&report.file, f, recording.rate_hz)?;
+        }
+        check_gravity(&report.file, f)?;
     }
     if rate > 0.1 {
         let degrees = rate.to_degrees();
@@ -754,17 +763,23 @@ fn plausible(
     Ok(())
 }
 
-pub(crate) fn check_gravity(path: &str, norm: f64, rate_hz: f64) -> Result<(), Failure> {
-    let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
-    if rate_hz > 1.2 && near(STANDARD_GRAVITY / rate_hz) {
-        let message = format!(
-            "static |f| is {norm:.4} m/s², 9.81 m/s² over {} Hz: increments named rates",
-            six_digits(rate_hz)
-        );
-        return Err(Failure::contents(path, Place::Within, message).or_hint(
-            "name the columns of increments dv_x_m_s, dv_y_m_s, dv_z_m_s, dtheta_x_rad, dtheta_y_rad, dtheta_z_rad",
-        ));
+/// Refuses increments under the names of rates: the specific force is gravity over the rate.
+pub(crate) fn check_increments(path: &str, norm: f64, rate_hz: f64) -> Result<(), Failure> {
+    // below, |f| of rates is near gravity too
+    if rate_hz < 1.2 || (norm * rate_hz / STANDARD_GRAVITY - 1.0).abs() > 0.1 {
+        return Ok(());
     }
+    let message = format!(
+        "static |f| is {norm:.4} m/s², 9.81 m/s² over {} Hz: increments named rates",
+        six_digits(rate_hz)
+    );
+    Err(Failure::contents(path, Place::Within, message).or_hint(
+        "name the columns of increments dv_x_m_s, dv_y_m_s, dv_z_m_s, dtheta_x_rad, dtheta_y_rad, dtheta_z_rad",
+    ))
+}
+
+pub(crate) fn check_gravity(path: &str, norm: f64) -> Result<(), Failure> {
+    let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
     if near(STANDARD_GRAVITY) || norm < NO_GRAVITY {
         return Ok(());
     }
