@@ -129,19 +129,20 @@ def vector(value: npt.ArrayLike, name: str) -> FloatArray:
     if array.ndim != 1:
         hint = f"give one signal at a time, such as {name}[:, 0]" if array.ndim == 2 else None
         raise NavSimError(f"{name}: {array.ndim} dimensions, and one is needed", hint=hint)
-    if array.size == 0:
-        raise NavSimError(f"{name}: there is nothing in it")
     return array
 
 
 def _floats(value: npt.ArrayLike, name: str) -> FloatArray:
     try:
-        raw = np.ma.filled(value.astype(float), np.nan) if isinstance(value, np.ma.MaskedArray) else np.asarray(value)
+        raw = np.asanyarray(value)
+        if raw.size == 0:
+            raise NavSimError(f"{name}: there is nothing in it")
         if raw.dtype.kind == "c":
             raise NavSimError(f"{name}: complex numbers, and real ones are needed")
         if raw.dtype.kind in "mM":
             raise NavSimError(f"{name}: dates, and seconds are needed")
-        return np.asarray(raw, dtype=np.float64)
+        # what is masked is missing
+        return np.asarray(np.ma.filled(raw.astype(np.float64, copy=False), np.nan))
     except (TypeError, ValueError) as e:
         raise NavSimError(f"{name}: not an array of numbers: {e}") from None
 
@@ -161,7 +162,7 @@ def columns(table: Table, name: str) -> dict[str, FloatArray]:
     # a pandas frame may have its time as the index
     index = getattr(table, "index", None)
     label = getattr(index, "name", None)
-    if getattr(getattr(index, "dtype", None), "kind", "") == "M":
+    if str(getattr(index, "dtype", "")).startswith("datetime64"):
         index, label = (index - index[0]) / np.timedelta64(1, "s"), "t_s"  # type: ignore[index]
     if isinstance(label, str) and label not in found:
         found = {label: vector(index, f"{name}.index"), **found}  # type: ignore[arg-type]
@@ -259,8 +260,6 @@ def _is_numbers(value: object) -> bool:
 def _channels(value: npt.ArrayLike, name: str, channel: str | None) -> dict[str, FloatArray]:
     """The columns of an array without names: one channel that is named, three of a sensor, or six."""
     array = _floats(value, name)
-    if array.size == 0:
-        raise NavSimError(f"{name}: there is nothing in it")
     if array.ndim == 1:
         array = array[:, np.newaxis]
     if array.ndim != 2:

@@ -91,6 +91,8 @@ def test_whatever_numpy_takes_for_a_vector_is_one(x: object) -> None:
         ([1j, 2j], 1.0, "x: complex"),
         ([1.0, 2.0, 4.0, 3.0], -1.0, "rate_hz: -1.0"),
         ([1.0, 2.0, 4.0, 3.0], np.nan, "rate_hz: nan"),
+        ([], True, "rate_hz=True is not a number"),
+        ([1e200, 0.0], 1.0, "x: 5e199 is no measurement"),
     ],
 )
 def test_what_is_no_signal_is_refused_by_name(x: object, rate_hz: float, words: str) -> None:
@@ -137,33 +139,14 @@ def test_missing_samples_are_those_of_a_recording_with_gaps() -> None:
     with pytest.warns(nav_sim.NavSimWarning):
         (file,) = nav_sim.wv(given).signals
     for name, robust in (("classical", False), ("robust", True)):
-        own = wavelet_variance(np.where(missing, np.nan, x), 100.0, robust=robust)
+        holed = np.ma.array(x, mask=missing) if robust else np.where(missing, np.nan, x)
+        own = wavelet_variance(holed, 100.0, robust=robust)
         for key, values in file[name].items():
             np.testing.assert_allclose(own[key], values, rtol=1e-12, err_msg=f"{name} {key}")
 
 
-def test_masked_samples_are_missing_ones() -> None:
-    x = np.random.default_rng(9).standard_normal(4096)
-    mask = np.arange(4096) % 50 == 0
-    masked = wavelet_variance(np.ma.array(np.where(mask, 1e6, x), mask=mask), 100.0)
-    assert masked["wv"] == pytest.approx(wavelet_variance(np.where(mask, np.nan, x), 100.0)["wv"], rel=1e-12)
-
-
-def test_what_is_no_rate_or_no_measurement_is_refused() -> None:
-    x = np.random.default_rng(10).standard_normal(4096)
-    with pytest.raises(NavSimError, match="rate_hz=True is not a number"):
-        wavelet_variance(x, True)
-    for scale in (1e200, 1e-200):
-        with pytest.raises(NavSimError, match="is no measurement"):
-            wavelet_variance(scale * x, 100.0)
-    with pytest.warns(nav_sim.NavSimWarning, match="50 % of its rows repeat the row before"):
-        wavelet_variance(np.repeat(x, 2), 100.0)
-
-
 def test_dates_of_rows_are_their_times() -> None:
     pandas = pytest.importorskip("pandas")
-    x = np.random.default_rng(11).standard_normal(4096)
-    frame = pandas.DataFrame({"gyro_x_rad_s": x}, index=pandas.date_range("2026-01-01", periods=4096, freq="10ms"))
-    assert nav_sim.wv(frame).data["rate_hz"] == pytest.approx(100.0)
-    with pytest.raises(NavSimError, match="runs at 100 Hz, but 200 Hz is given"):
+    frame = pandas.DataFrame({"gyro_x_rad_s": [1.0, 2.0]}, pandas.to_datetime([0, 10**7]))
+    with pytest.raises(NavSimError, match="runs at 100 Hz"):
         nav_sim.wv(frame, rate_hz=200.0)

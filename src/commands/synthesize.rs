@@ -3,7 +3,6 @@
 use crate::app::reading::{ChannelSet, channel_set};
 use crate::app::{Answer, Command, Context, Failure, Inputs, Out, OutputFile, Result, refused};
 use crate::io::model_file::{self, ModelFile};
-use crate::io::recordings::facts;
 use crate::io::{contamination_file, recordings};
 use crate::parse;
 use nav_sim_document::{Document, Tone};
@@ -115,8 +114,6 @@ impl Command for Synthesize {
     fn run(&self, context: &Context<'_>) -> Result<Synthesis> {
         let file = model_file::read(&self.model)?;
         let (shown, rate_hz) = (self.model.display(), file.model.rate_hz);
-        let out_of_range = facts::out_of_range(&file.model).into_iter();
-        context.warn_each(out_of_range.map(|text| format!("{shown}: {text}")));
         if self.spread && file.spread.is_none() {
             return refused(
                 format!("{shown}: no [spread] to draw parameters from"),

@@ -3,9 +3,7 @@
 
 use super::logs::LogOptions;
 use super::recordings::timing::{median_step, unit_of_step};
-use super::recordings::{
-    OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, check_increments, gravity_factor,
-};
+use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
 use super::table::{Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table};
 use super::toml_file::Source;
 use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
@@ -757,8 +755,8 @@ fn doubt_units(
     };
     let (force, rate) = (mean(|sample| sample.dv), mean(|sample| sample.dtheta));
     if !(4.0..25.0).contains(&force) {
-        check_increments(path, force, rate_hz)?;
-        check_gravity(path, force.max(0.3))?;
+        check_gravity(path, force, Some(rate_hz))?;
+        check_gravity(path, force.max(0.3), None)?;
     }
     let degrees = rate / DEG;
     let text = format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?");

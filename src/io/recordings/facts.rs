@@ -198,11 +198,8 @@ impl Repair {
             let mut rows: Vec<usize> = missing.into_iter().flat_map(|(_, rows)| rows).collect();
             rows.sort_unstable();
             rows.dedup();
-            self.breaks = rows
-                .iter()
-                .enumerate()
-                .map(|(before, row)| row - before)
-                .collect();
+            let firsts = rows.iter().enumerate().map(|(before, row)| row - before);
+            self.breaks.extend(firsts);
             return leave_out(table, &rows);
         }
         for (channel, rows) in missing {
@@ -434,13 +431,11 @@ pub(super) fn marks(table: &Table) -> Vec<Marks> {
 pub(super) fn compare(files: &[FileReport]) -> Result<Vec<String>, Failure> {
     for (i, later) in files.iter().enumerate() {
         for first in &files[..i] {
-            let pairs = || later.marks.iter().zip(&first.marks);
-            let shared = pairs().filter_map(|(a, b)| a.shared_with(b));
-            let of_first = pairs().filter_map(|(a, b)| b.shared_with(a));
-            if let (Some(share), Some(other)) = (shared.reduce(f64::max), of_first.reduce(f64::max))
-            {
+            let pairs = later.marks.iter().zip(&first.marks);
+            let shared = pairs.filter_map(|(a, b)| a.shared_with(b));
+            if let Some(share) = shared.reduce(f64::max) {
                 let name = &first.file;
-                let message = match share.min(other) > 0.99 {
+                let message = match share > 0.99 && later.samples == first.samples {
                     true => format!("is a copy of {name}: it would count as two replicates"),
                     false => format!(
                         "shares {} of its samples with {name}: they would count twice",

@@ -749,10 +749,8 @@ fn plausible(
             .iter()
             .filter(|s| s.channel.sensor == Sensor::Accel);
         let spread = own.map(|s| mean(&s.samples.iter().map(|x| x * x).collect::<Vec<_>>(), 1.0));
-        if f > 5.0 * spread.sum::<f64>().sqrt() {
-            check_increments(&report.file, f, recording.rate_hz)?;
-        }
-        check_gravity(&report.file, f)?;
+        let rate_hz = Some(recording.rate_hz).filter(|_| f > 5.0 * spread.sum::<f64>().sqrt());
+        check_gravity(&report.file, f, rate_hz)?;
     }
     if rate > 0.1 {
         let degrees = rate.to_degrees();
@@ -763,26 +761,15 @@ fn plausible(
     Ok(())
 }
 
-/// Refuses increments under the names of rates: the specific force is gravity over the rate.
-pub(crate) fn check_increments(path: &str, norm: f64, rate_hz: f64) -> Result<(), Failure> {
-    // below, |f| of rates is near gravity too
-    if rate_hz < 1.2 || (norm * rate_hz / STANDARD_GRAVITY - 1.0).abs() > 0.1 {
-        return Ok(());
-    }
-    let message = format!(
-        "static |f| is {norm:.4} m/s², 9.81 m/s² over {} Hz: increments named rates",
-        six_digits(rate_hz)
-    );
-    Err(Failure::contents(path, Place::Within, message).or_hint(
-        "name the columns of increments dv_x_m_s, dv_y_m_s, dv_z_m_s, dtheta_x_rad, dtheta_y_rad, dtheta_z_rad",
-    ))
-}
-
-pub(crate) fn check_gravity(path: &str, norm: f64) -> Result<(), Failure> {
+/// Refuses a specific force that is not gravity, nor none; with the rate (Hz) also that of increments named rates.
+pub(crate) fn check_gravity(path: &str, norm: f64, rate_hz: Option<f64>) -> Result<(), Failure> {
     let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
-    if near(STANDARD_GRAVITY) || norm < NO_GRAVITY {
+    let step = rate_hz.map(|rate_hz| 1.0 / rate_hz);
+    let step = step.filter(|step| near(STANDARD_GRAVITY * step));
+    if near(STANDARD_GRAVITY) || norm < NO_GRAVITY && step.is_none() {
         return Ok(());
     }
+    let increments = step.map(|step| format!("increments over {} s named rates", six_digits(step)));
     let guess = if near(1.0) {
         "it looks like g"
     } else if near(1000.0) {
@@ -792,8 +779,11 @@ pub(crate) fn check_gravity(path: &str, norm: f64) -> Result<(), Failure> {
     } else {
         "wrong unit, or the sensor was moving"
     };
+    let guess = increments.as_deref().unwrap_or(guess);
+    let names = step.map(|_| "name increments dv_x_m_s … dv_z_m_s, dtheta_x_rad … dtheta_z_rad");
     let message = format!("static |f| is {norm:.4} m/s², far from 9.81 m/s²: {guess}");
     Err(Failure::contents(path, Place::Within, message)
+        .or_hint_if(names.map(str::to_owned))
         .or_hint("name the unit in the columns: accel_x_m_s2, accel_x_g or accel_x_mg"))
 }
 
