@@ -273,7 +273,7 @@ fn what_makes_a_model_worthless_is_refused() {
     let clean = rows(5, 6000);
     let said = |rows: &[[f64; 6]]| refusal(at(100.0, rows));
     let between = |k: usize| -> [f64; 6] {
-        let [a, b] = [clean[k / 2], clean[(k + 1) / 2]];
+        let [a, b] = [clean[k / 2], clean[k.div_ceil(2)]];
         std::array::from_fn(|i| 0.5 * (a[i] + b[i]))
     };
     let line: Vec<[f64; 6]> = (0..11_998).map(between).collect();
