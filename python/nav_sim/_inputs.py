@@ -142,7 +142,7 @@ def _floats(value: npt.ArrayLike, name: str) -> FloatArray:
         if raw.dtype.kind in "mM":
             raise NavSimError(f"{name}: dates, and seconds are needed")
         # what is masked is missing
-        return np.asarray(np.ma.filled(raw.astype(np.float64, copy=False), np.nan))
+        return np.asarray(np.ma.filled(raw.astype(float, copy=False), np.nan))
     except (TypeError, ValueError) as e:
         raise NavSimError(f"{name}: not an array of numbers: {e}") from None
 
@@ -162,7 +162,7 @@ def columns(table: Table, name: str) -> dict[str, FloatArray]:
     # a pandas frame may have its time as the index
     index = getattr(table, "index", None)
     label = getattr(index, "name", None)
-    if str(getattr(index, "dtype", "")).startswith("datetime64"):
+    if "datetime64" in str(getattr(index, "dtype", "")):
         index, label = (index - index[0]) / np.timedelta64(1, "s"), "t_s"  # type: ignore[index]
     if isinstance(label, str) and label not in found:
         found = {label: vector(index, f"{name}.index"), **found}  # type: ignore[arg-type]
