@@ -81,7 +81,7 @@ def path(value: object, name: str) -> str:
 def number(value: Any, name: str) -> float:
     """One number."""
     try:
-        return float(value)
+        return float("bool" if isinstance(value, bool) else value)
     except (TypeError, ValueError):
         raise NavSimError(f"{name}={value!r} is not a number") from None
 
@@ -129,19 +129,20 @@ def vector(value: npt.ArrayLike, name: str) -> FloatArray:
     if array.ndim != 1:
         hint = f"give one signal at a time, such as {name}[:, 0]" if array.ndim == 2 else None
         raise NavSimError(f"{name}: {array.ndim} dimensions, and one is needed", hint=hint)
-    if array.size == 0:
-        raise NavSimError(f"{name}: there is nothing in it")
     return array
 
 
 def _floats(value: npt.ArrayLike, name: str) -> FloatArray:
     try:
-        raw = np.asarray(value)
+        raw = np.asanyarray(value)
+        if raw.size == 0:
+            raise NavSimError(f"{name}: there is nothing in it")
         if raw.dtype.kind == "c":
             raise NavSimError(f"{name}: complex numbers, and real ones are needed")
         if raw.dtype.kind in "mM":
             raise NavSimError(f"{name}: dates, and seconds are needed")
-        return np.asarray(raw, dtype=np.float64)
+        # what is masked is missing
+        return np.asarray(np.ma.filled(raw.astype(float, copy=False), np.nan))
     except (TypeError, ValueError) as e:
         raise NavSimError(f"{name}: not an array of numbers: {e}") from None
 
@@ -161,6 +162,8 @@ def columns(table: Table, name: str) -> dict[str, FloatArray]:
     # a pandas frame may have its time as the index
     index = getattr(table, "index", None)
     label = getattr(index, "name", None)
+    if "datetime64" in str(getattr(index, "dtype", "")):
+        index, label = (index - index[0]) / np.timedelta64(1, "s"), "t_s"  # type: ignore[index]
     if isinstance(label, str) and label not in found:
         found = {label: vector(index, f"{name}.index"), **found}  # type: ignore[arg-type]
     if not found:
@@ -257,8 +260,6 @@ def _is_numbers(value: object) -> bool:
 def _channels(value: npt.ArrayLike, name: str, channel: str | None) -> dict[str, FloatArray]:
     """The columns of an array without names: one channel that is named, three of a sensor, or six."""
     array = _floats(value, name)
-    if array.size == 0:
-        raise NavSimError(f"{name}: there is nothing in it")
     if array.ndim == 1:
         array = array[:, np.newaxis]
     if array.ndim != 2:

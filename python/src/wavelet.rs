@@ -2,6 +2,7 @@
 
 use crate::error;
 use crate::work::work;
+use nav_sim::io::recordings::facts::doubts;
 use nav_sim::signal::wavelet::{
     RobustVariance, Tuning, WaveletError, both, default_levels, gappy, haar, interval,
 };
@@ -23,6 +24,15 @@ pub(crate) fn wavelet<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     // a copy, so that Ctrl-C need not wait and nobody changes what is being read
     let signal = without_mean(x.as_array().to_vec());
+    let largest = signal.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    if largest.is_finite() && largest > 0.0 && !(1e-100..=1e100).contains(&largest) {
+        let message = format!("x: {largest:e} is no measurement: 1e-100 to 1e100");
+        return Err(error::refused(py, &message));
+    }
+    let doubts = doubts("x", x.as_array().to_vec().as_slice());
+    py.import("nav_sim._errors")?
+        .getattr("warn")?
+        .call1((doubts,))?;
     let found = work(py, None, None, move |_| {
         variances(&signal, scales, efficiency)
     })?;

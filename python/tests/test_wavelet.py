@@ -91,6 +91,8 @@ def test_whatever_numpy_takes_for_a_vector_is_one(x: object) -> None:
         ([1j, 2j], 1.0, "x: complex"),
         ([1.0, 2.0, 4.0, 3.0], -1.0, "rate_hz: -1.0"),
         ([1.0, 2.0, 4.0, 3.0], np.nan, "rate_hz: nan"),
+        ([], True, "rate_hz=True is not a number"),
+        ([1e200, 0.0], 1.0, "x: 5e199 is"),
     ],
 )
 def test_what_is_no_signal_is_refused_by_name(x: object, rate_hz: float, words: str) -> None:
@@ -137,6 +139,12 @@ def test_missing_samples_are_those_of_a_recording_with_gaps() -> None:
     with pytest.warns(nav_sim.NavSimWarning):
         (file,) = nav_sim.wv(given).signals
     for name, robust in (("classical", False), ("robust", True)):
-        own = wavelet_variance(np.where(missing, np.nan, x), 100.0, robust=robust)
+        own = wavelet_variance(np.ma.array(x, mask=missing), 100.0, robust=robust)
         for key, values in file[name].items():
             np.testing.assert_allclose(own[key], values, rtol=1e-12, err_msg=f"{name} {key}")
+
+
+def test_dates_of_rows_are_their_times() -> None:
+    pandas = pytest.importorskip("pandas")
+    with pytest.raises(NavSimError, match="runs at 100 Hz"):
+        nav_sim.wv(pandas.DataFrame({"gyro_x_rad_s": [1, 2]}, pandas.to_datetime([0, 10**7])), rate_hz=200.0)

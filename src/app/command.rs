@@ -391,7 +391,9 @@ impl<C: Command> Asked<C> {
             let values = values(arg, value);
             match arg.get_index() {
                 Some(index) => _ = positional.insert(index, values),
-                None if value == &Value::Bool(true) => words.push(format!("--{option}")),
+                None if value == &Value::Bool(true) && is_flag(arg) => {
+                    words.push(format!("--{option}"));
+                }
                 None => words.extend(values.iter().map(|value| format!("--{option}={value}"))),
             }
         }
@@ -408,7 +410,7 @@ fn set(settings: &Map<String, Value>, place: &str) -> Result<Vec<String>> {
         let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         let key = match !key.is_empty() && key.chars().all(is_bare) {
             true => format!("{place}{key}"),
-            false => format!("{place}{}", toml::Value::from(key.as_str())),
+            false => format!("{place}{}", Value::from(key.as_str())),
         };
         match value {
             Value::Null => {}
@@ -424,6 +426,12 @@ fn set(settings: &Map<String, Value>, place: &str) -> Result<Vec<String>> {
     Ok(words)
 }
 
+/// True of an option that may stand without a value.
+fn is_flag(arg: &Arg) -> bool {
+    arg.get_num_args()
+        .is_none_or(|count| count.min_values() == 0)
+}
+
 /// The values of an option; none where it is not given.
 fn values(arg: &Arg, value: &Value) -> Vec<String> {
     let text = |value: &Value| match value {
@@ -431,7 +439,7 @@ fn values(arg: &Arg, value: &Value) -> Vec<String> {
         other => other.to_string(),
     };
     match value {
-        Value::Null | Value::Bool(_) => Vec::new(),
+        Value::Null | Value::Bool(false) => Vec::new(),
         Value::Array(list) if is_repeated(arg) => list.iter().map(text).collect(),
         Value::Array(list) => vec![list.iter().map(text).collect::<Vec<_>>().join(",")],
         other => vec![text(other)],

@@ -2,7 +2,7 @@
 
 use super::{Context, Failure, Refuse, Result, refused};
 use crate::io::model_file::{self, ModelFile, TurnOn};
-use crate::io::recordings::{self, ReadOptions};
+use crate::io::recordings::{self, Gaps, ReadOptions};
 use crate::io::toml_file::Source;
 use crate::io::{scenario_file, trajectory_file};
 use crate::parse;
@@ -76,10 +76,12 @@ pub(crate) fn at_rate(
 pub(crate) fn recordings(
     paths: &[PathBuf],
     rate_hz: Option<f64>,
+    gaps: Gaps,
     context: &Context<'_>,
 ) -> Result<Vec<Recording>> {
     let options = ReadOptions {
         rate_hz,
+        gaps,
         ..ReadOptions::default()
     };
     let (recordings, report) = recordings::read(paths, &options)?;

@@ -5,6 +5,7 @@ use super::inspect::inspect;
 use crate::app::{Command, Context, Failure, Inputs, PlainAnswer, Result, inputs};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::fusion_files::{ImuFile, read_gnss, read_imu, read_initial};
+use crate::io::recordings::Gaps;
 use crate::io::{contamination_file, curve_file, datasheet, scenario_file};
 use crate::parse;
 use crate::report::six_digits;
@@ -145,17 +146,19 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
         }
         FileKind::Imu => return Ok(drive(&read_imu(path, None, None)?, context)),
         FileKind::Recording => {
-            let recordings = match inputs::recordings(&[path.to_owned()], rate_hz, context) {
-                Ok(recordings) => recordings,
-                // what is no static recording may be one of a drive or a flight
-                Err(refusal) => {
-                    let imu = read_imu(path, None, None).ok();
-                    return Ok(drive(
-                        &imu.filter(|imu| moves(&imu.samples)).ok_or(refusal)?,
-                        context,
-                    ));
-                }
-            };
+            let recordings =
+                match inputs::recordings(&[path.to_owned()], rate_hz, Gaps::Keep, context) {
+                    Ok(recordings) => recordings,
+                    // what is no static recording may be one of a drive or a flight
+                    Err(refusal) => {
+                        let imu = read_imu(path, None, None).ok();
+                        let Some(imu) = imu.filter(|imu| moves(&imu.samples)) else {
+                            return Err(refusal);
+                        };
+                        context.warn(refusal);
+                        return Ok(drive(&imu, context));
+                    }
+                };
             let mut described: Vec<String> = recordings
                 .iter()
                 .map(|r| {

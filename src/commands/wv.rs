@@ -127,21 +127,9 @@ impl Answer for SignalsFile {
     }
 
     fn document(&self) -> Document {
-        let (tone, verdict) = match self
-            .signals
-            .iter()
-            .flat_map(|s| ratios(s).map(move |r| (s, r)))
-            .min_by(|a, b| a.1.1.total_cmp(&b.1.1))
-        {
-            Some((s, (tau_s, ratio))) if ratio < 1.0 / OUTLIERS => {
-                let (name, ratio) = (recording_names([s.file.as_str()]).concat(), 1.0 / ratio);
-                let (channel, at) = (s.channel(), duration(tau_s));
-                let verdict = format!(
-                    "outliers? {name} {channel}: classical wavelet variance {ratio:.2} times the robust one at {at}"
-                );
-                (Tone::Doubtful, verdict)
-            }
-            _ => (
+        let (tone, verdict) = match outliers(&self.signals) {
+            Some(verdict) => (Tone::Doubtful, verdict),
+            None => (
                 Tone::Good,
                 "classical and robust wavelet variances agree".to_owned(),
             ),
@@ -160,6 +148,19 @@ impl Answer for SignalsFile {
         document.charts(&charts, "Robust wavelet variance; dashed: classical, which outliers raise. τ is twice the averaging time.");
         document
     }
+}
+
+/// The signal and scale at which the classical wavelet variance is highest above the robust one, if outliers are suspected.
+pub(super) fn outliers(signals: &[SignalCurves]) -> Option<String> {
+    let all = signals.iter().flat_map(|s| ratios(s).map(move |r| (s, r)));
+    let (s, (tau_s, ratio)) = all.min_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
+    (ratio < 1.0 / OUTLIERS).then(|| {
+        let (name, ratio) = (recording_names([s.file.as_str()]).concat(), 1.0 / ratio);
+        let (channel, at) = (s.channel(), duration(tau_s));
+        format!(
+            "outliers? {name} {channel}: classical wavelet variance {ratio:.2} times the robust one at {at}"
+        )
+    })
 }
 
 /// A chart of an axis, the recordings in colour.

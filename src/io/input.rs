@@ -67,13 +67,3 @@ fn hash_of_file(path: &Path) -> std::io::Result<String> {
 pub(crate) fn hash_of(bytes: &[u8]) -> String {
     blake3::hash(bytes).to_hex().to_string()
 }
-
-/// BLAKE3 of samples, in hexadecimal.
-pub(crate) fn hash_of_samples(samples: &[f64]) -> String {
-    let mut hasher = blake3::Hasher::new();
-    for block in samples.chunks(4096) {
-        let bytes: Vec<u8> = block.iter().flat_map(|x| x.to_le_bytes()).collect();
-        hasher.update(&bytes);
-    }
-    hasher.finalize().to_hex().to_string()
-}

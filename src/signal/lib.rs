@@ -13,5 +13,6 @@ pub mod units;
 // L1
 pub mod imu;
 // L2
+pub mod facts;
 pub mod noise;
 pub mod wavelet;

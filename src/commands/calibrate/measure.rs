@@ -4,7 +4,7 @@ use super::document::CalibrationNote;
 use crate::app::reading::note_report;
 use crate::app::{Context, Failure, refused};
 use crate::io::recordings::{FileReport, ReadOptions, Report};
-use crate::io::{curve_file, input, recordings};
+use crate::io::{curve_file, recordings};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
     self, Advance, Beginning, Bootstrap, CalibrationError, Diagnosis, Estimator, Group, Outcome,
@@ -116,7 +116,6 @@ pub(crate) fn measure(
     let look = |recording: Recording| MeasuredRecording::new(recording, scales, &settings.tuning);
     let (looks, report) = visit(paths, &reading, &look, context)?;
     let looks = looks.into_iter().collect::<Result<Vec<_>, _>>()?;
-    distinct(&looks)?;
     let rate_hz = report.files[0].rate_hz;
     let beginnings = beginnings(&looks, reading.skip_s, rate_hz);
     shortest(&report, scales, context);
@@ -201,11 +200,9 @@ pub(crate) fn visit<T: Send>(
     Ok((looks, report))
 }
 
-/// Wavelet variances and hashes of a recording; its samples are dropped.
+/// Wavelet variances of a recording; its samples are dropped.
 struct MeasuredRecording {
     recording: String,
-    /// What tells the samples of each signal from others.
-    signals: Vec<(Channel, String)>,
     warm_ups: Vec<WarmUp>,
     replicates: Vec<(Channel, Replicate)>,
 }
@@ -216,13 +213,7 @@ impl MeasuredRecording {
         levels: Option<u32>,
         tuning: &Tuning,
     ) -> Result<Self, CalibrationError> {
-        let signals = recording
-            .signals
-            .par_iter()
-            .map(|s| (s.channel, input::hash_of_samples(&s.samples)))
-            .collect();
         Ok(Self {
-            signals,
             warm_ups: recording
                 .signals
                 .par_iter()
@@ -246,24 +237,6 @@ fn one_switching_on(report: &Report, measured: &mut [(Channel, Replicate)]) {
         .iter_mut()
         .filter(|(_, replicate)| later.contains(&replicate.name))
         .for_each(|(_, replicate)| replicate.mean = f64::NAN);
-}
-
-/// Refuses copies of a recording.
-fn distinct(looks: &[MeasuredRecording]) -> Result<(), Failure> {
-    for (i, look) in looks.iter().enumerate() {
-        let copy = |other: &&MeasuredRecording| {
-            other.recording != look.recording
-                && other.signals.iter().any(|s| look.signals.contains(s))
-        };
-        if let Some(first) = looks[..i].iter().find(copy) {
-            let (copy, first) = (&look.recording, &first.recording);
-            return refused(
-                format!("{copy} is a copy of {first}: it would count as two replicates"),
-                "leave one of them out",
-            );
-        }
-    }
-    Ok(())
 }
 
 /// The recordings that do not begin as they go on after what was skipped.

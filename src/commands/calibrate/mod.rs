@@ -30,17 +30,20 @@ pub(crate) use measure::{Measured, measure, visit};
 
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
 use crate::app::{Answer, Command, Context, Out, OutputFile, Result, refused};
+use crate::commands::wv;
 use crate::io::draws_file::DrawsFile;
 use crate::io::input;
 use crate::io::model_file::ModelFile;
 use crate::parse;
 use crate::report;
+use crate::report::curves::SignalCurves;
 use measure::{Curves, calibrate_curves, read_curves};
 use nav_sim_calibration::{
-    Bootstrap, Estimator, ModelChoice, ModelSpec, Pool, Settings, Trim, Weighting,
+    Bootstrap, Estimator, ModelChoice, ModelSpec, Pool, Replicate, Settings, Trim, Weighting,
     calibrate_telling, grouped,
 };
 use nav_sim_document::Document;
+use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::Model;
 use serde::Serialize;
 use std::borrow::Cow;
@@ -186,6 +189,11 @@ impl Command for Calibrate {
                         "--pool axes",
                     );
                 }
+                // with several, each is judged beside the others
+                let first = replicates.first().map(|(_, r)| &r.name);
+                if replicates.iter().all(|(_, r)| Some(&r.name) == first) {
+                    context.warn_each(wv::outliers(&curves_of(&replicates, &settings)));
+                }
                 let groups = grouped(replicates, self.pool.unwrap_or(settings.pool()));
                 let bootstrap = self.draws(context);
                 let steps = settings.model.steps() + u64::from(self.bootstrap);
@@ -205,6 +213,17 @@ impl Command for Calibrate {
         };
         Ok(calibration)
     }
+}
+
+/// The curves of signals as `wv` has them.
+fn curves_of(signals: &[(Channel, Replicate)], settings: &Settings) -> Vec<SignalCurves> {
+    let curves = |(channel, replicate): &(Channel, Replicate)| {
+        let levels = 1..=replicate.classical.len() as u32;
+        let edof = levels.map(|level| replicate.edof_eta3(level)).collect();
+        let efficiency = settings.tuning.efficiency();
+        SignalCurves::new(*channel, replicate, settings.rate_hz, edof, efficiency)
+    };
+    signals.iter().map(curves).collect()
 }
 
 impl Serialize for Calibration {

@@ -13,7 +13,7 @@ use crate::app::{Command, Context, Inputs, Out, PlainAnswer, Result, refused};
 use crate::commands::calibrate::{
     Calibration, CalibrationNote, ESTIMATORS, EstimatorChoice, Measured, measure,
 };
-use crate::io::recordings::{self, FileReport, Gaps, ReadOptions};
+use crate::io::recordings::{self, FileReport, Gaps};
 use crate::parse;
 use crate::report::csv::merged;
 use crate::report::{self, six_digits, some};
@@ -145,11 +145,6 @@ impl Command for Choose {
             ));
             measured.settings.rate_hz = rate_hz;
         }
-        // The clocks of the files are not quite alike: one rate is that of all.
-        let reading = ReadOptions {
-            rate_hz: Some(rate_hz),
-            ..reading
-        };
         let files = &measured.report.files;
         if files.len() < FEWEST {
             let message = format!(
@@ -172,7 +167,9 @@ impl Command for Choose {
         let mut folds = Vec::new();
         for k in &judges {
             let file = &files[*k];
-            let (read, _) = recordings::read(std::slice::from_ref(&file.path), &reading)?;
+            let (mut read, _) = recordings::read(std::slice::from_ref(&file.path), &reading)?;
+            // The clocks of the files are not quite alike: one rate is that of all.
+            read.iter_mut().for_each(|r| r.rate_hz = rate_hz);
             let advance = |n| context.advance(n);
             let (recording, windows) = (file.file.clone(), self.runs);
             let scores = drive

@@ -5,6 +5,7 @@
 
 use crate::app::{Command, Context, Failure, Out, PlainAnswer, Refuse, Result, refused};
 use crate::io::model_file::{self, ModelFile};
+use crate::io::recordings::facts;
 use crate::parse::{one_of, seconds_range};
 use nav_sim_calibration::percent;
 use nav_sim_document::{Document, Importance, Tone, readable};
@@ -75,7 +76,9 @@ impl Command for ExportArgs {
         for line in export.summary() {
             document.note(Importance::Remark, line);
         }
-        for doubt in export.doubts() {
+        let out_of_range = facts::out_of_range(&file.model).into_iter();
+        let out_of_range = out_of_range.map(|text| format!("{model}: {text}"));
+        for doubt in out_of_range.chain(export.doubts()) {
             document.note(Importance::Warning, doubt);
         }
         let [accel, gyro] = &export.sensors;

@@ -6,6 +6,7 @@ use crate::app::{
 };
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::ModelFile;
+use crate::io::recordings::Gaps;
 use crate::parse;
 use crate::report::tables::{epochs_csv, runs_csv};
 use crate::report::verdict::requirement_line;
@@ -265,7 +266,12 @@ impl Run {
             ),
             (None, []) => (TrueImu::AsBelieved, None),
             (_, paths) => (
-                TrueImu::Recordings(inputs::recordings(paths, self.rate_hz, context)?),
+                TrueImu::Recordings(inputs::recordings(
+                    paths,
+                    self.rate_hz,
+                    Gaps::Refuse,
+                    context,
+                )?),
                 None,
             ),
         };

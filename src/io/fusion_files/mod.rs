@@ -649,7 +649,8 @@ pub(crate) fn read_imu(
         },
         ..ReadOptions::default()
     };
-    let table = recordings::load(path, &options, &SAMPLES)?;
+    let mut table = recordings::load(path, &options, &SAMPLES)?;
+    let facts = recordings::facts::of_drive(&mut table);
     let names = [
         "t_s", "accel.x", "accel.y", "accel.z", "gyro.x", "gyro.y", "gyro.z",
     ];
@@ -658,7 +659,7 @@ pub(crate) fn read_imu(
     let unit_s = time.factor.unwrap_or_else(|| unit_s(&time.values));
     let from_gravity = gravity_factor(&table)?;
     let mut remarks: Vec<Note> = table.assumptions.iter().map(remark).collect();
-    remarks.extend(table.warnings.iter().map(doubt));
+    remarks.extend(table.warnings.iter().chain(&facts).map(doubt));
     if table.is_bare {
         let odometer = match table.ignored.is_empty() {
             true => "",
@@ -698,7 +699,7 @@ pub(crate) fn read_imu(
         }
     });
     let samples: Vec<ImuIncrement> = samples.collect();
-    remarks.extend(doubt_units(&table.path, &samples)?.map(doubt));
+    remarks.extend(doubt_units(&table.path, &samples, 1.0 / step)?.map(doubt));
     let mut holes = Vec::new();
     for (k, sample) in samples.iter().enumerate() {
         let refuse = |message: String| Error::contents(&table.path, table.line(k), message);
@@ -741,7 +742,11 @@ pub(crate) fn read_imu(
 }
 
 /// Over a whole recording the specific force is gravity in the mean, and nothing turns all the time.
-fn doubt_units(path: &str, samples: &[ImuIncrement]) -> Result<Option<String>, Error> {
+fn doubt_units(
+    path: &str,
+    samples: &[ImuIncrement],
+    rate_hz: f64,
+) -> Result<Option<String>, Error> {
     let mean = |of: fn(&ImuIncrement) -> DVec3| {
         let lengths = samples
             .iter()
@@ -750,7 +755,8 @@ fn doubt_units(path: &str, samples: &[ImuIncrement]) -> Result<Option<String>, E
     };
     let (force, rate) = (mean(|sample| sample.dv), mean(|sample| sample.dtheta));
     if !(4.0..25.0).contains(&force) {
-        check_gravity(path, force.max(0.3))?;
+        check_gravity(path, force, Some(rate_hz))?;
+        check_gravity(path, force.max(0.3), None)?;
     }
     let degrees = rate / DEG;
     let text = format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?");

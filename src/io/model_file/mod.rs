@@ -18,6 +18,7 @@
 //! [`ModelFile::missing`].
 
 use super::file_kind::FileKind;
+use super::recordings::facts;
 use super::toml_file::{OneOrEach, Source};
 use super::{Failure, atomic, file_kind};
 use crate::report::readable;
@@ -96,8 +97,10 @@ impl ModelFile {
             format!("{shown} has no noise model for {channel}; it is taken as free of noise")
         };
         let misfit = self.misfit().map(|misfit| format!("{shown} {misfit}"));
+        let out_of_range = facts::out_of_range(&self.model).into_iter();
         misfit
             .into_iter()
+            .chain(out_of_range.map(|text| format!("{shown}: {text}")))
             .chain(self.missing.iter().map(unsaid))
             .collect()
     }

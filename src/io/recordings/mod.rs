@@ -12,6 +12,7 @@ use super::table::{
 };
 use super::{Failure, Place, help, table};
 use crate::report::six_digits;
+use nav_sim_signal::facts::Marks;
 use nav_sim_signal::imu::{Channel, Recording, Sensor, Signal};
 use nav_sim_signal::units::STANDARD_GRAVITY;
 use rayon::prelude::*;
@@ -22,6 +23,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use timing::Timing;
 
+pub mod facts;
 pub(crate) mod timing;
 
 /// How recordings are read.
@@ -172,7 +174,9 @@ pub(crate) fn load(
         log: Some(&options.log),
         ..*dictionary
     };
-    let table = table::read(path, dictionary)?;
+    let mut table = table::read(path, dictionary)?;
+    let is_wanted = |channel| wanted.is_none_or(|wanted| wanted.contains(&channel));
+    table.warnings.extend(facts::misspelt(&table, is_wanted));
     let is_gyro = |c: &&Column| c.factor.is_none() && c.quantity.name.starts_with("gyro");
     if let Some(column) = table.columns.iter().find(is_gyro) {
         return Err(table.no_unit(column));
@@ -255,6 +259,7 @@ pub(crate) fn visit<T: Send>(
         }
     }
     same_rate(&report.files)?;
+    report.warnings.extend(facts::compare(&report.files)?);
     if looks.is_empty() {
         let path = paths
             .first()
@@ -437,6 +442,8 @@ pub struct FileReport {
     pub assumptions: Vec<String>,
     /// Doubts, in words.
     pub warnings: Vec<String>,
+    /// What tells its samples from those of others.
+    marks: Vec<Marks>,
 }
 
 /// The name of one of the recordings of a file.
@@ -520,7 +527,21 @@ pub(super) fn recordings(
     options: &ReadOptions,
 ) -> Result<(Vec<Recording>, FileReport), Failure> {
     let mut report = FileReport::new(&raw);
-    let timing = timing::timing(&mut raw, options, &mut report)?;
+    let repair = facts::repair(&mut raw, options, &mut report)?;
+    let own = |rate_hz: f64| rate_hz / repair.rows_per_sample;
+    raw.rate_hz = raw.rate_hz.map(|(rate_hz, of)| (own(rate_hz), of));
+    let options = &ReadOptions {
+        rate_hz: options.rate_hz.map(own),
+        ..options.clone()
+    };
+    let mut timing = timing::timing(&mut raw, options, &mut report)?;
+    if options.gaps == Gaps::Split {
+        timing.breaks.extend(&repair.breaks);
+        timing.breaks.sort_unstable();
+        timing.breaks.dedup();
+    }
+    repair.tell(timing.rate_hz, &mut report);
+    report.marks = facts::marks(&raw);
     raw.columns
         .sort_by_key(|c| channel_of(c).map(Channel::index));
     let factors = factors(&raw, timing.rate_hz)?;
@@ -551,13 +572,15 @@ pub(super) fn recordings(
     for recording in &recordings {
         let means = recording.signals.iter().map(|s| (s.channel, s.mean));
         let means: Vec<(Channel, f64)> = means.collect();
-        plausible(&means, &mut report)?;
+        plausible(recording, &means, &mut report)?;
+        facts::examine(recording, &mut report)?;
         let samples = recording.signals.first().map_or(0, |s| s.samples.len());
         report.samples.push(samples);
         if report.means.is_empty() {
             report.means = means;
         }
     }
+    repair.measured(&report.file)?;
     report.rate_hz = timing.rate_hz;
     Ok((recordings, report))
 }
@@ -612,6 +635,9 @@ fn pieces(
 /// Below this (m/s²) the mean was removed before: nothing to be learnt from it.
 const NO_GRAVITY: f64 = 0.3;
 
+/// A column without a larger value has squares that are no variances.
+const SMALLEST: f64 = 1e-45;
+
 /// What brings each column to SI units; refuses dead axes.
 fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
     let from_gravity = gravity_factor(raw)?;
@@ -627,6 +653,16 @@ fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
             return Err(Failure::contents(&raw.path, Place::Within, message)
                 .or_option(help::CHANNELS)
                 .or_hint("record again"));
+        }
+        let largest = column
+            .values
+            .iter()
+            .fold(0.0_f64, |most, v| most.max(v.abs()));
+        if largest < SMALLEST {
+            let message = format!("{channel} is nowhere above {largest:.0e}: no measurement");
+            return Err(Failure::contents(&raw.path, Place::Within, message)
+                .or_option(help::CHANNELS)
+                .or_hint("write it in the unit that its name has"));
         }
         let per_sample = if column.quantity.per_sample {
             rate_hz
@@ -663,15 +699,23 @@ pub(crate) fn gravity_factor(raw: &Table) -> Result<f64, Failure> {
     Err(raw.no_unit(first))
 }
 
-/// Mean of values times a factor, summed about the first of them so that a large offset costs no digits.
+/// Mean of the values that are there, times a factor, summed about the first of them so that a large offset costs no digits.
 fn mean(values: &[f64], factor: f64) -> f64 {
     /// Values whose sum is taken before it is added: rounding grows with their number.
     const BLOCK: usize = 4096;
-    let Some(first) = values.first().map(|first| first * factor) else {
+    let is_there = |v: &&f64| !v.is_nan();
+    let Some(first) = values.iter().find(is_there).map(|first| first * factor) else {
         return 0.0;
     };
-    let sum_of = |block: &[f64]| block.iter().map(|v| v * factor - first).sum::<f64>();
-    first + values.chunks(BLOCK).map(sum_of).sum::<f64>() / values.len() as f64
+    let present = |block: &[f64]| {
+        block
+            .iter()
+            .filter(is_there)
+            .map(|v| v * factor - first)
+            .sum::<f64>()
+    };
+    let count = values.iter().filter(is_there).count();
+    first + values.chunks(BLOCK).map(present).sum::<f64>() / count as f64
 }
 
 fn norm(vector: &[f64]) -> f64 {
@@ -679,7 +723,11 @@ fn norm(vector: &[f64]) -> f64 {
 }
 
 /// Static specific force is gravity, or nothing where the mean was removed before; rates are small.
-fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Failure> {
+fn plausible(
+    recording: &Recording,
+    means: &[(Channel, f64)],
+    report: &mut FileReport,
+) -> Result<(), Failure> {
     let [accel, gyro] = Sensor::ALL.map(|sensor| -> Vec<f64> {
         let own = means.iter().filter(|(channel, _)| channel.sensor == sensor);
         own.map(|(_, mean)| *mean).collect()
@@ -695,7 +743,14 @@ fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Fa
             .or_option(help::COLUMN_NAMES));
     }
     if accel.len() == 3 {
-        check_gravity(&report.file, f)?;
+        // the mean of noise without gravity is of any size
+        let own = recording
+            .signals
+            .iter()
+            .filter(|s| s.channel.sensor == Sensor::Accel);
+        let spread = own.map(|s| mean(&s.samples.iter().map(|x| x * x).collect::<Vec<_>>(), 1.0));
+        let rate_hz = Some(recording.rate_hz).filter(|_| f > 5.0 * spread.sum::<f64>().sqrt());
+        check_gravity(&report.file, f, rate_hz)?;
     }
     if rate > 0.1 {
         let degrees = rate.to_degrees();
@@ -706,11 +761,15 @@ fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), Fa
     Ok(())
 }
 
-pub(crate) fn check_gravity(path: &str, norm: f64) -> Result<(), Failure> {
+/// Refuses a specific force that is not gravity, nor none; with the rate (Hz) also that of increments named rates.
+pub(crate) fn check_gravity(path: &str, norm: f64, rate_hz: Option<f64>) -> Result<(), Failure> {
     let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
-    if near(STANDARD_GRAVITY) || norm < NO_GRAVITY {
+    let step = rate_hz.map(|rate_hz| 1.0 / rate_hz);
+    let step = step.filter(|step| near(STANDARD_GRAVITY * step));
+    if near(STANDARD_GRAVITY) || norm < NO_GRAVITY && step.is_none() {
         return Ok(());
     }
+    let increments = step.map(|step| format!("increments over {} s named rates", six_digits(step)));
     let guess = if near(1.0) {
         "it looks like g"
     } else if near(1000.0) {
@@ -720,8 +779,11 @@ pub(crate) fn check_gravity(path: &str, norm: f64) -> Result<(), Failure> {
     } else {
         "wrong unit, or the sensor was moving"
     };
+    let guess = increments.as_deref().unwrap_or(guess);
+    let names = step.map(|_| "name increments dv_x_m_s … dv_z_m_s, dtheta_x_rad … dtheta_z_rad");
     let message = format!("static |f| is {norm:.4} m/s², far from 9.81 m/s²: {guess}");
     Err(Failure::contents(path, Place::Within, message)
+        .or_hint_if(names.map(str::to_owned))
         .or_hint("name the unit in the columns: accel_x_m_s2, accel_x_g or accel_x_mg"))
 }
 

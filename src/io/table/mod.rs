@@ -425,15 +425,20 @@ impl Table {
         Some(self.columns.swap_remove(at))
     }
 
+    /// Keeps these rows.
+    pub(crate) fn keep(&mut self, rows: &[usize]) {
+        self.lines = rows.iter().map(|row| self.line(*row)).collect();
+        for column in &mut self.columns {
+            column.values = rows.iter().map(|row| column.values[*row]).collect();
+        }
+    }
+
     /// Keeps the rows of finite numbers; what was left out, in words.
     pub(crate) fn keep_whole(&mut self) -> Option<String> {
         let all = self.rows();
         let is_whole = |row: &usize| self.columns.iter().all(|c| c.values[*row].is_finite());
         let kept: Vec<usize> = (0..all).filter(is_whole).collect();
-        self.lines = kept.iter().map(|row| self.line(*row)).collect();
-        for column in &mut self.columns {
-            column.values = kept.iter().map(|row| column.values[*row]).collect();
-        }
+        self.keep(&kept);
         let count = all - kept.len();
         (count > 0).then(|| format!("{count} rows left out: values not finite, or out of range"))
     }

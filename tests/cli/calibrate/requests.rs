@@ -211,9 +211,12 @@ fn what_was_drawn_is_recorded_and_copies_are_refused() {
         "{stderr}"
     );
     // Of three recordings a short one lacks the longest scales, of two it limits both.
-    let rows = std::fs::read_to_string(&copy).unwrap();
-    let first: Vec<&str> = rows.lines().take(600).collect();
-    std::fs::write(&copy, first.join("\n") + "\n").unwrap();
+    let mut rows = "t_s,gyro_x_rad_s,gyro_y_rad_s\n".to_owned();
+    let [x, y] = ["gyro.x", "gyro.y"].map(|channel| signal(2, channel));
+    for t in 0..599 {
+        writeln!(rows, "{:.2},{:e},{:e}", 0.02 * t as f64, x[t], y[t]).unwrap();
+    }
+    std::fs::write(&copy, rows).unwrap();
     let short = [
         "calibrate",
         "runs",

@@ -1,0 +1,499 @@
+//! What recordings hold beside measurements: repaired and counted where it is certain, a warning where it is not, refused
+//! where it makes a noise model worthless. The tests are those of [`nav_sim_signal::facts`].
+
+use super::{Channel, DICTIONARY, FileReport, Gaps, ReadOptions, SIX, channel_of, timing};
+use crate::io::table::{Column, Table, find, normalised};
+use crate::io::{Failure, Place, help};
+use crate::report::{readable, six_digits};
+use nav_sim_signal::facts::{self, Marks, Repeats};
+use nav_sim_signal::imu::{Recording, Sensor};
+use nav_sim_signal::noise::{Kind, Model, Process};
+use nav_sim_signal::units::{DEG, STANDARD_GRAVITY};
+use std::fmt::Display;
+use std::ops::Range;
+
+/// Repeated rows up to which they are missing samples, not those of another rate.
+const MOST_REPEATED: f64 = 0.1;
+/// Seconds in motion from which on a recording is not static.
+const MOST_MOVING: f64 = 0.5;
+
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    match percent {
+        p if p < 10.0 => format!("{p:.1} %"),
+        p => format!("{p:.0} %"),
+    }
+}
+
+fn axes(table: &Table, is: impl Fn(Channel) -> bool) -> Vec<&[f64]> {
+    let own = |c: &&Column| channel_of(c).is_some_and(&is);
+    table
+        .columns
+        .iter()
+        .filter(own)
+        .map(|c| &c.values[..])
+        .collect()
+}
+
+/// Rows of a table that are no measurements, and what is said of them.
+#[derive(Default)]
+pub(super) struct Repair {
+    /// Rows of a sample where a sensor is slower than the file, else 1.
+    pub(super) rows_per_sample: f64,
+    /// Stretches without a measurement, by channel; none of the channel: of all.
+    missing: Vec<(Option<Channel>, Range<usize>)>,
+    /// First rows after rows that were left out.
+    pub(super) breaks: Vec<usize>,
+    /// What is said of samples that were interpolated.
+    on_line: Option<String>,
+    /// Stretches of one value, to be told with their times.
+    frozen: Vec<(Channel, f64, Range<usize>)>,
+}
+
+/// Leaves out rows that are copies.
+pub(crate) fn drop_copies(table: &mut Table) -> Option<String> {
+    let stamps = table.get("t_s").or_else(|| table.get("counter"))?;
+    let copies = facts::copies(&stamps.values, &axes(table, |_| true));
+    leave_out(table, &copies);
+    let count = copies.len();
+    (count > 0)
+        .then(|| format!("{count} rows are copies of the row before, stamp and values: left out"))
+}
+
+fn leave_out(table: &mut Table, rows: &[usize]) {
+    if !rows.is_empty() {
+        let mut out = rows.iter().peekable();
+        let kept = (0..table.rows()).filter(|row| out.next_if_eq(&row).is_none());
+        let kept: Vec<usize> = kept.collect();
+        table.keep(&kept);
+    }
+}
+
+/// Rows that are zero for lost samples, and what is said of them.
+fn lost(table: &Table) -> (Vec<usize>, Option<String>) {
+    let accel = axes(table, |channel| channel.sensor == Sensor::Accel);
+    let rows = facts::zero_rows(&axes(table, |_| true), &accel);
+    let (count, share) = (rows.len(), percent(rows.len() as f64 / table.rows() as f64));
+    let text = format!("{count} rows ({share}) are zero in all columns: missing samples");
+    (rows, (count > 0).then_some(text))
+}
+
+/// What is said of the zeros of a column.
+fn zeros(name: impl Display, values: &[f64]) -> Option<String> {
+    let share = percent(facts::zeros(values)?);
+    let why = "which its step does not explain: a dead band, or lost samples";
+    Some(format!("{share} of {name} is exactly 0, {why}"))
+}
+
+/// What is said of a column that was interpolated.
+fn interpolated(name: impl Display, values: &[f64]) -> Option<String> {
+    let share = percent(facts::interpolated(values)?);
+    let why = "interpolated, not measured";
+    Some(format!(
+        "{share} of {name} lies on the line between its neighbours: {why}"
+    ))
+}
+
+/// Warnings of one signal in memory, NaN where a sample is missing.
+#[must_use]
+pub fn doubts(name: &str, signal: &[f64]) -> Vec<String> {
+    let repeats = facts::repeats(&[signal]);
+    let frozen = facts::frozen(signal).into_iter().next();
+    let frozen = frozen.filter(|rows| rows.len() < signal.len());
+    let frozen = frozen.map(|rows| {
+        let (value, from, to) = (signal[rows.start], rows.start, rows.end - 1);
+        format!("{name} holds {value} from sample {from} to {to}")
+    });
+    let repeated = repeats.map(|repeats| repeated(name, &repeats, f64::NAN));
+    let all = [
+        repeated,
+        frozen,
+        zeros(name, signal),
+        interpolated(name, signal),
+    ];
+    all.into_iter().flatten().collect()
+}
+
+/// The signals of a table, by channel.
+fn signals(table: &Table) -> impl Iterator<Item = (Channel, &[f64])> {
+    let columns = table.columns.iter();
+    columns.filter_map(|column| Some((channel_of(column)?, &column.values[..])))
+}
+
+fn repeats_of(table: &Table) -> Vec<(Sensor, Option<Repeats>)> {
+    let of = |sensor| {
+        let own = axes(table, |channel| channel.sensor == sensor);
+        (!own.is_empty()).then(|| (sensor, facts::repeats(&own)))
+    };
+    Sensor::ALL.into_iter().filter_map(of).collect()
+}
+
+/// What is said of repeated rows; `rate_hz` is that of the rows, if it is known.
+fn repeated(name: impl Display, repeats: &Repeats, rate_hz: f64) -> String {
+    let share = percent(repeats.share);
+    let repeated = format!("{name}: {share} of its rows repeat the row before");
+    match &repeats.held {
+        Some((rows, _)) if rate_hz.is_finite() => {
+            let [native, written] = [rate_hz / rows, rate_hz].map(readable);
+            format!("{repeated}: a sensor of {native} Hz written at {written} Hz")
+        }
+        _ => repeated,
+    }
+}
+
+/// Repairs a table of a static recording before its time is looked at.
+///
+/// # Errors
+/// What makes a noise model worthless.
+pub(super) fn repair(
+    table: &mut Table,
+    options: &ReadOptions,
+    report: &mut FileReport,
+) -> Result<Repair, Failure> {
+    let mut repair = Repair {
+        rows_per_sample: 1.0,
+        ..Repair::default()
+    };
+    report.warnings.extend(drop_copies(table));
+    let (zero, text) = lost(table);
+    let is_lossy = text.is_some();
+    if let (Gaps::Refuse, Some(text)) = (options.gaps, &text) {
+        return Err(missing(table, zero[0], text));
+    }
+    report.warnings.extend(text);
+    repair
+        .missing
+        .extend(zero.iter().map(|row| (None, *row..row + 1)));
+    repair.apply(table, options.gaps);
+    repair.own_rate(table, options, report)?;
+    for (channel, values) in signals(table) {
+        for rows in facts::frozen(values) {
+            repair.missing.push((Some(channel), rows.clone()));
+            repair.frozen.push((channel, values[rows.start], rows));
+        }
+    }
+    if let (Gaps::Refuse, Some((channel, value, rows))) = (options.gaps, repair.frozen.first()) {
+        let count = rows.len();
+        let text = format!("{channel} holds one value, {value}, for {count} rows: missing samples");
+        return Err(missing(table, rows.start, &text));
+    }
+    repair.on_line = signals(table).find_map(|(channel, values)| interpolated(channel, values));
+    let zeros = signals(table).filter_map(|(channel, values)| zeros(channel, values));
+    report.warnings.extend(zeros.filter(|_| !is_lossy));
+    repair.apply(table, options.gaps);
+    Ok(repair)
+}
+
+fn missing(table: &Table, row: usize, text: &str) -> Failure {
+    Failure::contents(&table.path, table.line(row), text)
+        .or_option(help::GAPS)
+        .or_without(help::GAPS_ELSEWHERE)
+}
+
+impl Repair {
+    /// Takes what is missing out of a table: NaN where gaps are kept, else whole rows.
+    fn apply(&mut self, table: &mut Table, gaps: Gaps) {
+        let missing = std::mem::take(&mut self.missing);
+        if gaps != Gaps::Keep {
+            let mut rows: Vec<usize> = missing.into_iter().flat_map(|(_, rows)| rows).collect();
+            rows.sort_unstable();
+            rows.dedup();
+            let firsts = rows.iter().enumerate().map(|(before, row)| row - before);
+            self.breaks.extend(firsts);
+            return leave_out(table, &rows);
+        }
+        for (channel, rows) in missing {
+            for column in &mut table.columns {
+                let own = channel_of(column);
+                if own.is_some() && (channel.is_none() || own == channel) {
+                    column.values[rows.clone()].fill(f64::NAN);
+                }
+            }
+        }
+    }
+
+    /// Takes the samples of a file whose sensors are slower than its rows at their own rate; rows that are repeated now and
+    /// then are missing samples.
+    fn own_rate(
+        &mut self,
+        table: &mut Table,
+        options: &ReadOptions,
+        report: &mut FileReport,
+    ) -> Result<(), Failure> {
+        let (Some(rate_hz), found) = (rate_of_rows(table, options), repeats_of(table)) else {
+            return Ok(());
+        };
+        let mut held: Vec<&(f64, Vec<usize>)> = Vec::new();
+        for (sensor, repeats) in &found {
+            let Some(repeats) = repeats else { continue };
+            let text = repeated(*sensor, repeats, rate_hz);
+            if let Some(own) = &repeats.held {
+                held.push(own);
+                report.warn(format!("{text}, taken at its own rate"));
+                continue;
+            }
+            if repeats.share > MOST_REPEATED {
+                return Err(Failure::contents(&table.path, Place::Within, text)
+                    .or_hint("write each sample once, at its own stamp")
+                    .or_option(help::CHANNELS));
+            }
+            if let (Gaps::Refuse, Some(row)) = (options.gaps, repeats.rows.first()) {
+                return Err(missing(table, *row, &text));
+            }
+            let what = match repeats.rows.is_empty() {
+                true => "",
+                false => ", taken as missing samples",
+            };
+            report.warn(format!("{text}{what}"));
+            for channel in Channel::ALL.into_iter().filter(|c| c.sensor == *sensor) {
+                let rows = repeats
+                    .rows
+                    .iter()
+                    .map(|row| (Some(channel), *row..row + 1));
+                self.missing.extend(rows);
+            }
+        }
+        let Some((rows_per_sample, firsts)) = held.first() else {
+            return Ok(());
+        };
+        let is_same =
+            |(other, _): &&(f64, Vec<usize>)| (other / rows_per_sample - 1.0).abs() < 0.01;
+        if held.len() < found.len() || !held.iter().all(is_same) {
+            let first = found.iter().find_map(|(s, r)| Some((*s, r.as_ref()?)));
+            let text = first.map_or_else(String::new, |(s, r)| repeated(s, r, rate_hz));
+            return Err(Failure::contents(&table.path, Place::Within, text)
+                .or_option(("axes", "take one sensor at a time, each at its own rate: --axes accel, then --axes gyro"))
+                .or_without(("axes", "wv and calibrate take one sensor at a time: --axes accel, then --axes gyro")));
+        }
+        table.keep(firsts);
+        self.rows_per_sample = *rows_per_sample;
+        for clock in ["t_s", "counter"] {
+            let clock = table.columns.iter_mut().find(|c| c.quantity.name == clock);
+            clock
+                .into_iter()
+                .for_each(|c| even_out(&mut c.values, *rows_per_sample));
+        }
+        Ok(())
+    }
+}
+
+/// Rate of the rows (Hz), by their stamps or as it is given.
+fn rate_of_rows(table: &Table, options: &ReadOptions) -> Option<f64> {
+    let Some(time) = table.get("t_s") else {
+        return options
+            .rate_hz
+            .or(table.rate_hz.map(|(rate_hz, _)| rate_hz));
+    };
+    let step = timing::median_step(&time.values);
+    let unit_s = time.factor.unwrap_or_else(|| timing::unit_of_step(step).0);
+    Some(1.0 / (step * unit_s)).filter(|rate_hz| rate_hz.is_finite())
+}
+
+/// Stamps of samples that were taken evenly, and written with the next row; gaps stay.
+fn even_out(stamps: &mut [f64], rows_per_sample: f64) {
+    let longest = (1.5 + 1.0 / rows_per_sample) * timing::median_step(stamps);
+    let mut from = 0;
+    for k in 1..=stamps.len() {
+        if k == stamps.len() || stamps[k] - stamps[k - 1] > longest {
+            let (first, last, steps) = (stamps[from], stamps[k - 1], k - 1 - from);
+            for (i, stamp) in stamps[from..k].iter_mut().enumerate() {
+                *stamp = first + (last - first) * i as f64 / steps.max(1) as f64;
+            }
+            from = k;
+        }
+    }
+}
+
+impl Repair {
+    /// Refuses interpolated samples.
+    ///
+    /// # Errors
+    /// Where there are some.
+    pub(super) fn measured(self, path: &str) -> Result<(), Failure> {
+        let refused = |text: String| {
+            Failure::contents(path, Place::Within, text)
+                .or_hint("write the samples as the sensor gave them, at its own rate and stamps")
+                .or_option(help::CHANNELS)
+        };
+        self.on_line.map_or(Ok(()), |text| Err(refused(text)))
+    }
+
+    /// Tells which stretches hold one value, now that the rate is known.
+    pub(super) fn tell(&self, rate_hz: f64, report: &mut FileReport) {
+        for channel in Channel::ALL {
+            let own = || self.frozen.iter().filter(|(c, ..)| *c == channel);
+            let Some((_, value, rows)) = own().next() else {
+                continue;
+            };
+            let [from, to] = [rows.start, rows.end].map(|row| six_digits(row as f64 / rate_hz));
+            let more = match own().count() - 1 {
+                0 => String::new(),
+                n => format!(", and {n} more such stretches"),
+            };
+            report.warn(format!(
+                "{channel} holds {value} from {from} s to {to} s{more}: left out as missing"
+            ));
+        }
+    }
+}
+
+/// What a static recording says of itself in SI units.
+///
+/// # Errors
+/// When it moves in most of its seconds.
+pub(super) fn examine(recording: &Recording, report: &mut FileReport) -> Result<(), Failure> {
+    let (moving, seconds) = facts::moving(recording);
+    let share = moving as f64 / seconds.max(1) as f64;
+    if share > MOST_MOVING {
+        let text = format!("moves in {} of its seconds: not static", percent(share));
+        return Err(Failure::contents(&report.file, Place::Itself, text)
+            .or_hint("record with the unit at rest; nav-sim fuse reads drives and flights"));
+    }
+    if moving > 0 {
+        report.warn(format!(
+            "moves in {moving} of its {seconds} seconds, or was knocked"
+        ));
+    }
+    for signal in &recording.signals {
+        let (channel, [quietest, _]) = (signal.channel, range(signal.channel.sensor));
+        let found = facts::white_noise(&signal.samples, recording.rate_hz);
+        if let Some(n) = found.filter(|n| *n < 0.1 * quietest) {
+            let [n, quietest] = [n, quietest].map(|n| in_hours(channel.sensor, n));
+            report.warn(format!(
+                "{channel}: N {n}, below a tenth of the quietest units' {quietest}: wrong unit, or increments named rates?"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// White noise of units (units·√s): from navigation grade, 0.001 deg/√h of ring lasers and 0.001 m/s/√h of quartz
+/// accelerometers, to the noisiest of the catalogue, ADIS16405 (2 deg/√h) and MPU-6050 (400 µg/√Hz).
+const fn range(sensor: Sensor) -> [f64; 2] {
+    match sensor {
+        Sensor::Accel => [0.001 / 60.0, 400e-6 * STANDARD_GRAVITY],
+        Sensor::Gyro => [0.001 * DEG / 60.0, 2.0 * DEG / 60.0],
+    }
+}
+
+/// White noise as data sheets have it.
+fn in_hours(sensor: Sensor, n: f64) -> String {
+    match sensor {
+        Sensor::Accel => format!("{} m/s/√h", readable(60.0 * n)),
+        Sensor::Gyro => format!("{} deg/√h", readable(60.0 * n / DEG)),
+    }
+}
+
+/// Sensors of a model whose white noise is over three times that of the noisiest unit, or under a third of the quietest's.
+pub(crate) fn out_of_range(model: &Model) -> Vec<String> {
+    let of = |sensor: Sensor| {
+        let channels = Channel::ALL.into_iter().filter(|c| c.sensor == sensor);
+        let white = |c: Channel| {
+            let all = model.axes[c.index()].processes.iter();
+            let white = all.filter(|process| process.kind() == Kind::White);
+            (white.map(Process::amplitude).sum::<f64>() / model.rate_hz).sqrt()
+        };
+        let [low, high] = range(sensor);
+        let is_out = |n: &f64| *n > 0.0 && !(low / 3.0..=3.0 * high).contains(n);
+        let n = in_hours(sensor, channels.map(white).find(is_out)?);
+        let [low, high] = [low, high].map(|n| in_hours(sensor, n));
+        Some(format!(
+            "{sensor} N {n}, units have {low} to {high}: sigma2 is the variance of a sample at rate_hz"
+        ))
+    };
+    Sensor::ALL.into_iter().filter_map(of).collect()
+}
+
+/// What a recording under way says of itself: copies and lost samples are left out.
+pub(crate) fn of_drive(table: &mut Table) -> Vec<String> {
+    let mut said: Vec<String> = drop_copies(table).into_iter().collect();
+    let (zero, text) = lost(table);
+    leave_out(table, &zero);
+    said.extend(text);
+    let rate_hz = rate_of_rows(table, &ReadOptions::default()).unwrap_or(f64::NAN);
+    for (sensor, repeats) in repeats_of(table) {
+        said.extend(repeats.map(|repeats| repeated(sensor, &repeats, rate_hz)));
+    }
+    said.extend(signals(table).find_map(|(channel, values)| interpolated(channel, values)));
+    said
+}
+
+/// Marks of the samples of each sensor.
+pub(super) fn marks(table: &Table) -> Vec<Marks> {
+    let of = |sensor| facts::marks(&axes(table, |channel| channel.sensor == sensor));
+    Sensor::ALL.map(of).into()
+}
+
+/// Refuses recordings that share samples, and warns of channels that some of them lack.
+///
+/// # Errors
+/// When two recordings share samples.
+pub(super) fn compare(files: &[FileReport]) -> Result<Vec<String>, Failure> {
+    for (i, later) in files.iter().enumerate() {
+        for first in &files[..i] {
+            let pairs = later.marks.iter().zip(&first.marks);
+            let shared = pairs.filter_map(|(a, b)| a.shared_with(b));
+            if let Some(share) = shared.reduce(f64::max) {
+                let name = &first.file;
+                let message = match share > 0.99 && later.samples == first.samples {
+                    true => format!("is a copy of {name}: it would count as two replicates"),
+                    false => format!(
+                        "shares {} of its samples with {name}: they would count twice",
+                        percent(share)
+                    ),
+                };
+                return Err(Failure::contents(&later.file, Place::Itself, message)
+                    .or_hint("leave one of them out, or cut what is in both out of one"));
+            }
+        }
+    }
+    let has = |file: &FileReport, channel| file.means.iter().any(|(c, _)| *c == channel);
+    let lacks = Channel::ALL.into_iter().filter_map(|channel| {
+        let with = files.iter().find(|file| has(file, channel))?;
+        let without = files.iter().find(|file| !has(file, channel))?;
+        let (with, without) = (&with.file, &without.file);
+        Some(format!("{channel} is in {with}, but not in {without}"))
+    });
+    Ok(lacks.collect())
+}
+
+/// Columns that nearly have the name of a channel that is missing.
+pub(crate) fn misspelt(table: &Table, is_wanted: impl Fn(Channel) -> bool) -> Vec<String> {
+    let has = |channel| table.columns.iter().any(|c| channel_of(c) == Some(channel));
+    let missing = Channel::ALL
+        .into_iter()
+        .filter(|c| is_wanted(*c) && !has(*c));
+    let names: Vec<String> = missing
+        .flat_map(|channel| names_of(table, channel))
+        .collect();
+    let meant = |ignored: &String| {
+        let plain = normalised(ignored);
+        let near = names
+            .iter()
+            .map(|name| (strsim::osa_distance(&normalised(name), &plain), name));
+        let (edits, name) = near.min_by_key(|(edits, _)| *edits)?;
+        (1..=2)
+            .contains(&edits)
+            .then(|| format!("column \"{ignored}\" is not used: did you mean \"{name}\"?"))
+    };
+    table.ignored.iter().filter_map(meant).collect()
+}
+
+/// Names that a column of a channel may have beside the others of a table: theirs with its axis, and our own.
+fn names_of(table: &Table, channel: Channel) -> Vec<String> {
+    let is_name = |name: &String| {
+        find(DICTIONARY.quantities, name).is_some_and(|(q, _)| q.name == channel.to_string())
+    };
+    let own = SIX.split(' ').nth(channel.index()).map(str::to_owned);
+    let beside = table
+        .columns
+        .iter()
+        .filter_map(|c| Some((c.name.to_lowercase(), channel_of(c)?)));
+    let swapped = beside.flat_map(|(name, other)| {
+        let places = name.match_indices(other.axis.name()).map(|(at, _)| at);
+        places
+            .map(|at| format!("{}{}{}", &name[..at], channel.axis.name(), &name[at + 1..]))
+            .collect::<Vec<_>>()
+    });
+    own.into_iter().chain(swapped.filter(is_name)).collect()
+}

@@ -1,0 +1,404 @@
+//! Facts about recorded columns that no noise explains: copied rows, zeros for lost samples, held and frozen values,
+//! interpolation, motion, samples in two recordings.
+//!
+//! Columns are as a file has them, in any unit. The null hypothesis is a noise with stationary increments that is rounded to
+//! the steps of a quantiser, with axes that are independent of one another within a block of rows: equal neighbours of one
+//! axis are those that its step explains. [`LEVEL`] bounds the false alarms of each fact and recording.
+
+use crate::imu::{Recording, Sensor};
+use std::collections::HashSet;
+use std::f64::consts::SQRT_2;
+use std::ops::Range;
+
+/// Probability of a false alarm.
+pub const LEVEL: f64 = 1e-4;
+/// Rows over which the shares of equal neighbours are those of one level of the signal.
+const BLOCK: usize = 256;
+/// Changes (in steps) from which on a step is fine: wherever the mean lies between two steps, neighbours are rarely equal.
+const FINE: f64 = 4.0;
+
+/// Median of |x| of a standard normal.
+const NORMAL: f64 = 0.674_489_75;
+
+/// True if `count` of `trials` is more than a chance of `p` explains: Chernoff's bound on the binomial tail.
+fn is_beyond(count: usize, trials: usize, p: f64) -> bool {
+    let (n, q, p) = (
+        trials as f64,
+        count as f64 / trials.max(1) as f64,
+        p.max(1e-15),
+    );
+    let term = |q: f64, p: f64| if q > 0.0 { q * (q / p).ln() } else { 0.0 };
+    q > p && n * (term(q, p) + term(1.0 - q, 1.0 - p)) > -LEVEL.ln()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Step of a quantiser, and the median change from one sample to the next in such steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grain {
+    /// Smallest change (unit of the column).
+    pub step: f64,
+    /// Median of the changes that are not zero, in steps.
+    pub changes: f64,
+}
+
+/// The grain of a column; none of a constant one.
+#[must_use]
+pub fn grain(axis: &[f64]) -> Option<Grain> {
+    let changes = axis.windows(2).map(|x| (x[1] - x[0]).abs());
+    let changes: Vec<f64> = changes.filter(|change| *change > 0.0).collect();
+    let step = changes.iter().copied().reduce(f64::min)?;
+    let changes = median(changes) / step;
+    Some(Grain { step, changes })
+}
+
+/// Chance that all axes have the value of the row before. An axis explains its own share of such rows, but no more than its
+/// step does: differences of a rounded Gaussian are zero 0.27 times in so many steps as their median has; ten leaves room for
+/// numbers of so many digits, whose steps differ by ten.
+/// Rows that are `held` are none of chance.
+fn chance(axes: &[&[f64]], held: f64) -> f64 {
+    let most: Vec<f64> = axes
+        .iter()
+        .map(|axis| grain(axis).map_or(1.0, |grain| 10.0 / grain.changes))
+        .collect();
+    let rows = axes.first().map_or(0, |axis| axis.len());
+    let starts = (0..rows.saturating_sub(1)).step_by(BLOCK);
+    let blocks = starts.map(|from| from..(from + BLOCK).min(rows - 1));
+    let all = blocks.map(|block| {
+        let share = |axis: &&[f64]| {
+            let equal = block.clone().filter(|k| axis[*k] == axis[k + 1]);
+            let share = equal.count() as f64 / block.len() as f64;
+            ((share - held) / (1.0 - held)).max(0.0)
+        };
+        let shares = axes
+            .iter()
+            .zip(&most)
+            .map(|(axis, most)| share(axis).min(*most));
+        shares.product::<f64>() * block.len() as f64
+    });
+    all.sum::<f64>() / (rows.max(2) - 1) as f64
+}
+
+/// Rows that are the row before once more, in stamp and all values.
+#[must_use]
+pub fn copies(stamps: &[f64], columns: &[&[f64]]) -> Vec<usize> {
+    let stands = (1..stamps.len()).filter(|k| stamps[*k] == stamps[k - 1]);
+    let stands: Vec<usize> = stands.collect();
+    let is_copy = |k: &usize| columns.iter().all(|x| x[*k] == x[k - 1]);
+    let copies: Vec<usize> = stands.iter().copied().filter(is_copy).collect();
+    let is_beyond =
+        !copies.is_empty() && is_beyond(copies.len(), stands.len(), chance(columns, 0.0));
+    copies.into_iter().filter(|_| is_beyond).collect()
+}
+
+/// Rows in which every column is exactly zero, where one of the accelerometers has a mean over ten of its steps, which no
+/// noise takes to zero on all axes at once.
+#[must_use]
+pub fn zero_rows(columns: &[&[f64]], accel: &[&[f64]]) -> Vec<usize> {
+    let rows = columns.first().map_or(0, |x| x.len());
+    let zero: Vec<usize> = (0..rows)
+        .filter(|k| columns.iter().all(|x| x[*k] == 0.0))
+        .collect();
+    let has_gravity = |axis: &&[f64]| {
+        let mean = axis.iter().sum::<f64>() / (rows - zero.len()).max(1) as f64;
+        let spread = axis
+            .iter()
+            .filter(|x| **x != 0.0)
+            .map(|x| (x - mean).powi(2));
+        let spread = (spread.sum::<f64>() / (rows - zero.len()).max(1) as f64).sqrt();
+        let step = grain(axis).map_or(f64::INFINITY, |grain| grain.step);
+        mean.abs() > (10.0 * step).max(6.0 * spread)
+    };
+    let is_lost = !zero.is_empty() && accel.iter().any(has_gravity);
+    zero.into_iter().filter(|_| is_lost).collect()
+}
+
+/// Share of zeros in a column, where its step does not explain them: a dead band, or zeros for lost samples. About any mean
+/// the density at zero is at most that within the median of |x|, times two for its mode.
+#[must_use]
+pub fn zeros(axis: &[f64]) -> Option<f64> {
+    let other: Vec<f64> = axis.iter().map(|x| x.abs()).filter(|x| *x > 0.0).collect();
+    let zeros = axis.iter().filter(|x| **x == 0.0).count();
+    let there = zeros + other.len();
+    let grain = grain(axis)?;
+    let width = median(other) / grain.step;
+    let p = 10.0 / width;
+    let share = zeros as f64 / there as f64;
+    (p < 0.5 && share > p + 0.005 && is_beyond(zeros, there, p)).then_some(share)
+}
+
+/// Rows that repeat the one before on all axes of a sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Repeats {
+    /// Share of the rows that repeat the one before, beyond chance.
+    pub share: f64,
+    /// Rows of a sample of the sensor, and the first row of each sample, where the sensor has a rate of its own.
+    pub held: Option<(f64, Vec<usize>)>,
+    /// Rows that repeat the one before, where hardly one of them is chance.
+    pub rows: Vec<usize>,
+}
+
+/// First rows and lengths of stretches in which no axis changes.
+fn runs(axes: &[&[f64]]) -> Vec<(usize, usize)> {
+    let rows = axes.first().map_or(0, |axis| axis.len());
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    for k in 0..rows {
+        match runs.last_mut() {
+            Some(run) if axes.iter().all(|x| x[k] == x[k - 1]) => run.1 += 1,
+            _ => runs.push((k, 1)),
+        }
+    }
+    runs
+}
+
+/// The repeated rows of a sensor, if there are more than its steps explain. Stretches far longer than the usual one are
+/// frozen, not repeated, and do not count.
+#[must_use]
+pub fn repeats(axes: &[&[f64]]) -> Option<Repeats> {
+    /// Share of repeated rows that changes no figure.
+    const LEAST: [f64; 2] = [0.005, 0.05];
+    let runs = runs(axes);
+    if runs.is_empty() {
+        return None;
+    }
+    let usual = median(runs.iter().map(|(_, rows)| *rows as f64).collect());
+    let longest = 8 * usual as usize + 24;
+    let counted: Vec<_> = runs.iter().filter(|(_, rows)| *rows <= longest).collect();
+    let rows: usize = counted.iter().map(|(_, rows)| rows).sum();
+    let repeated = rows - counted.len();
+    let p = repeated as f64 / rows.max(1) as f64;
+    let beyond = |by_chance: f64| (p - by_chance) / (1.0 - by_chance);
+    let by_chance = chance(axes, 0.0);
+    let (is_rare, mut share) = (by_chance < 1e-3, beyond(by_chance));
+    let least = LEAST[usize::from(!is_rare || axes.len() == 1)];
+    if !(share > least && is_beyond(repeated, rows, by_chance)) {
+        return None;
+    }
+    for _ in 0..8 {
+        share = beyond(chance(axes, share));
+    }
+    // a stretch of n rows is of as many samples as have no more rows
+    let per_sample = 1.0 / (1.0 - share);
+    let firsts = runs.iter().flat_map(|&(from, rows)| {
+        let samples = ((rows - 1) as f64 / per_sample) as usize + 1;
+        (0..samples).map(move |k| from + k * rows / samples)
+    });
+    let firsts: Vec<usize> = firsts.collect();
+    let total = axes[0].len();
+    let per_sample = total as f64 / firsts.len() as f64;
+    let repeated = counted
+        .iter()
+        .flat_map(|(from, rows)| from + 1..from + rows);
+    Some(Repeats {
+        share,
+        rows: repeated.filter(|_| is_rare).collect(),
+        held: is_regular(&firsts, total).then_some((per_sample, firsts)),
+    })
+}
+
+/// True if nine of ten windows have the same number of samples, give or take two: repeated at random, they would differ by the
+/// root of the number of repeated rows.
+fn is_regular(firsts: &[usize], rows: usize) -> bool {
+    let width = (rows / 8).clamp(1, 1000);
+    let mut counts = vec![0.0_f64; rows / width];
+    for first in firsts {
+        if let Some(count) = counts.get_mut(first / width) {
+            *count += 1.0;
+        }
+    }
+    let usual = median(counts.clone());
+    let near = counts.iter().filter(|count| (*count - usual).abs() <= 2.0);
+    10 * near.count() >= 9 * counts.len()
+}
+
+/// Stretches of rows in which a column of fine steps holds one value: three times as long as the longest that its step
+/// explains.
+#[must_use]
+pub fn frozen(axis: &[f64]) -> Vec<Range<usize>> {
+    let Some(grain) = grain(axis).filter(|grain| grain.changes >= FINE) else {
+        return Vec::new();
+    };
+    let longest = (axis.len() as f64 / LEVEL).ln() / grain.changes.ln();
+    let least = (3.0 * longest).ceil().max(16.0) as usize;
+    let runs = runs(&[axis]).into_iter();
+    let long = runs.filter(|(_, rows)| *rows >= least);
+    long.map(|(from, rows)| from..from + rows).collect()
+}
+
+/// Share of samples on the line between their neighbours, where steps do not explain it: samples that were interpolated. Second
+/// differences of noise have a mode no higher than their neighbourhood; those of interpolated samples have two sizes, rounding
+/// and that of the noise.
+#[must_use]
+pub fn interpolated(axis: &[f64]) -> Option<f64> {
+    let step = grain(axis)?.step;
+    let largest = axis.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let rounding = (2.01 * step).max(4.0 * f64::EPSILON * largest);
+    let moving = axis.windows(3).filter(|x| x[0] != x[1] && x[1] != x[2]);
+    let second = moving.map(|x| (x[2] - 2.0 * x[1] + x[0]).abs());
+    let second: Vec<f64> = second.filter(|d| d.is_finite()).collect();
+    let trials = second.len();
+    if trials < BLOCK {
+        return None;
+    }
+    let others: Vec<f64> = second.into_iter().filter(|d| *d > rounding).collect();
+    let near = others.iter().filter(|d| **d <= 8.0 * rounding).count();
+    let on_line = trials - others.len();
+    // of the rounded 5 values against 28; twice and more for a peak
+    let explained = 0.5 * near as f64 / trials.max(1) as f64;
+    let share = on_line as f64 / trials.max(1) as f64;
+    let is_apart = !others.is_empty() && median(others) > 8.0 * rounding;
+    (is_apart && share > 0.1 + explained && is_beyond(on_line, trials, explained)).then_some(share)
+}
+
+/// White noise of a column (units·√s), from the median change of its samples; none where steps hide it.
+#[must_use]
+pub fn white_noise(axis: &[f64], rate_hz: f64) -> Option<f64> {
+    let present: Vec<f64> = axis.iter().copied().filter(|x| !x.is_nan()).collect();
+    let grain = grain(&present).filter(|grain| grain.changes >= FINE)?;
+    Some(grain.changes * grain.step / (NORMAL * SQRT_2 * rate_hz.sqrt()))
+}
+
+/// Change of the mean from one second to the next from which on a unit moves (m/s² or rad/s): 0.3° of tilt, or turning with
+/// 0.25 °/s. The white noise of the noisiest units in the catalogue changes it by a tenth.
+const fn motion(sensor: Sensor) -> f64 {
+    match sensor {
+        Sensor::Accel => 0.05,
+        Sensor::Gyro => 0.0044,
+    }
+}
+
+/// Seconds in which a unit moves, and all of them: its mean changes by more than a unit at rest, by more than its white noise
+/// explains, and by more than the steps of all seconds do (those of noise with stationary increments, walks too, are Gaussian of
+/// one size); or samples change by four times as much as usual. Where noise is not stationary because the level of a second
+/// differs more than χ² does, the unit moves most of the time, and the usual step tells nothing.
+#[must_use]
+pub fn moving(recording: &Recording) -> (usize, usize) {
+    let width = recording.rate_hz.round() as usize;
+    let seconds = recording.len() / width.max(1);
+    if width < 10 || seconds < 10 {
+        return (0, seconds);
+    }
+    // 3.4 deviations of a median of so many; Gaussian tail of the means of all seconds and axes
+    let sampling = 1.0 + 4.0 / (seconds as f64).sqrt();
+    let z = (2.0 * (12.0 * seconds as f64 / LEVEL).ln()).sqrt();
+    let mut moves = vec![false; seconds];
+    for signal in &recording.signals {
+        let present: Vec<f64> = signal
+            .samples
+            .iter()
+            .copied()
+            .filter(|x| !x.is_nan())
+            .collect();
+        let step = grain(&present).map_or(0.0, |grain| grain.step);
+        let windows = || signal.samples.chunks_exact(width);
+        let means: Vec<f64> = windows()
+            .map(|x| x.iter().sum::<f64>() / width as f64)
+            .collect();
+        let square = |x: &[f64]| {
+            let squares = x.windows(2).map(|x| (x[1] - x[0]).powi(2));
+            squares.sum::<f64>() / (width - 1) as f64
+        };
+        let squares: Vec<f64> = windows().map(square).collect();
+        let steps: Vec<f64> = means.windows(2).map(|x| (x[1] - x[0]).abs()).collect();
+        let there = |all: &[f64]| {
+            all.iter()
+                .copied()
+                .filter(|x| !x.is_nan())
+                .collect::<Vec<_>>()
+        };
+        let (usual, own) = (there(&steps), there(&squares));
+        if usual.is_empty() || own.is_empty() {
+            continue;
+        }
+        let level = median(own.clone()).max(step * step);
+        let levels = own
+            .iter()
+            .map(|square| (square.max(step * step) / level).ln().abs());
+        // the squares of second differences of white noise are of half as many
+        let explained = 2.0 * NORMAL / (width as f64).sqrt() * sampling;
+        let is_stationary = median(levels.collect()) < explained;
+        let usual = if is_stationary {
+            median(usual) / NORMAL
+        } else {
+            0.0
+        };
+        // white noise by the quietest tenth, which χ² of ten samples has below 0.36 of its mean
+        let mut quiet = own;
+        let tenth = quiet.len() / 10;
+        let quiet = *quiet.select_nth_unstable_by(tenth, f64::total_cmp).1;
+        let below = (1.0 - 2.6 / (width as f64).sqrt()).max(0.36);
+        let noise = (quiet / (below * width as f64)).sqrt();
+        let limit = motion(signal.channel.sensor)
+            .max(z * noise.max(sampling * usual))
+            .max(1.5 * step);
+        for k in 0..seconds {
+            moves[k] |= squares[k] > 16.0 * level || k > 0 && steps[k - 1] > limit;
+        }
+    }
+    (moves.iter().filter(|moves| **moves).count(), seconds)
+}
+
+/// Marks of the samples of a sensor, to be found again in another recording: hashes of some of its windows of 64 rows.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Marks {
+    /// One window in so many is kept, a power of two.
+    one_in: u64,
+    hashes: HashSet<u64>,
+}
+
+/// The marks of all axes of a sensor. Windows with fewer than 16 changes are left out: rows of coarse steps agree by chance.
+#[must_use]
+pub fn marks(axes: &[&[f64]]) -> Marks {
+    const WINDOW: usize = 64;
+    const BASE: u64 = 0x9e37_79b9_7f4a_7c15;
+    let rows = axes.first().map_or(0, |axis| axis.len());
+    let mix = |hash: u64| (hash ^ (hash >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let of_row = |k: usize| {
+        let bits = axes.iter().map(|x| (x[k] + 0.0).to_bits());
+        bits.fold(0, |hash, bits| mix(hash ^ mix(bits).wrapping_add(BASE)))
+    };
+    let hashes: Vec<u64> = (0..rows).map(of_row).collect();
+    let one_in = (rows as u64 >> 12).next_power_of_two();
+    let oldest = (0..WINDOW).fold(1_u64, |power, _| power.wrapping_mul(BASE));
+    let (mut rolling, mut changes) = (0_u64, 0);
+    let (mut kept, mut windows) = (HashSet::new(), 0);
+    for k in 0..rows {
+        rolling = rolling.wrapping_mul(BASE).wrapping_add(hashes[k]);
+        changes += usize::from(k > 0 && hashes[k] != hashes[k - 1]);
+        if let Some(out) = k.checked_sub(WINDOW) {
+            rolling = rolling.wrapping_sub(hashes[out].wrapping_mul(oldest));
+            changes -= usize::from(hashes[out + 1] != hashes[out]);
+        }
+        let mark = mix(mix(rolling));
+        if k + 1 >= WINDOW && changes >= 16 && mark % one_in == 0 {
+            windows += 1;
+            kept.insert(mark);
+        }
+    }
+    // what comes again in one recording tells nothing of two
+    if 2 * kept.len() < windows {
+        kept.clear();
+    }
+    Marks {
+        one_in,
+        hashes: kept,
+    }
+}
+
+impl Marks {
+    /// Share of the samples that are those of another recording, from four windows on.
+    #[must_use]
+    pub fn shared_with(&self, other: &Self) -> Option<f64> {
+        let one_in = self.one_in.max(other.one_in);
+        let own = self.hashes.iter().filter(|mark| *mark % one_in == 0);
+        let own: Vec<&u64> = own.collect();
+        let shared = own
+            .iter()
+            .filter(|mark| other.hashes.contains(mark))
+            .count();
+        (shared >= 4).then(|| shared as f64 / own.len() as f64)
+    }
+}
