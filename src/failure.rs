@@ -202,6 +202,7 @@ impl Failure {
             K::NotFound => "check the path",
             K::UnexpectedEof => "the file is cut off: copy or pack it again",
             K::FileTooLarge => "write what comes through a pipe to a file first",
+            K::InvalidInput if e.get_ref().is_some() => "fetch it: git lfs pull",
             K::PermissionDenied | K::ReadOnlyFilesystem => {
                 "change the permissions of the file or its directory, or name another path"
             }
@@ -274,7 +275,10 @@ impl Failure {
     }
 
     /// With further advice for commands that have an option.
-    pub(crate) fn or_option(self, (option, text): (&'static str, &'static str)) -> Self {
+    pub(crate) fn or_option(
+        self,
+        (option, text): (&'static str, impl Into<Cow<'static, str>>),
+    ) -> Self {
         self.or(Some((option, true)), text)
     }
 

@@ -7,8 +7,8 @@
 use super::input::listed;
 use super::logs::LogOptions;
 use super::table::{
-    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, Column, Dictionary, NO_COLUMN, Quantity, TIME, Table,
-    Units, is_oxts, unreadable,
+    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, Column, Dictionary, NO_COLUMN, Quantity,
+    SENSOR_LOGGER, TICKS, TIME, Table, Units, is_oxts, unreadable,
 };
 use super::{Failure, Place, help, table};
 use crate::report::six_digits;
@@ -113,7 +113,7 @@ const fn gyro(name: &'static str) -> [Quantity; 3] {
 }
 
 /// Quantities of a recording. A packet counter starts again at 0 after 65535.
-static QUANTITIES: [[Quantity; 3]; 8] = [
+static QUANTITIES: [[Quantity; 3]; 9] = [
     [
         time(STAMP, Bare::Unknown, 0),
         time(OF_CLOCK, Bare::Unknown, 1),
@@ -122,6 +122,11 @@ static QUANTITIES: [[Quantity; 3]; 8] = [
     [
         time("timeus", Bare::Is(1e-6), 1),
         time("timems itow", Bare::Is(1e-3), 1),
+        time(SENSOR_LOGGER, Bare::Is(1.0), 1),
+    ],
+    [
+        time("timestamp*", Bare::Not, 1),
+        time(TICKS, Bare::Unknown, 3),
         Quantity::number("counter", "packetcounter packet_counter"),
     ],
     accel("accel.x"),
@@ -172,10 +177,20 @@ pub(crate) fn load(
         log: Some(&options.log),
         ..*dictionary
     };
-    let table = table::read(path, dictionary)?;
-    let is_gyro = |c: &&Column| c.factor.is_none() && c.quantity.name.starts_with("gyro");
-    if let Some(column) = table.columns.iter().find(is_gyro) {
+    let mut table = table::read(path, dictionary)?;
+    let is_unclear = |c: &&Column| {
+        let is_ticks = || c.quantity.stems == TICKS && options.rate_hz.is_none();
+        c.factor.is_none() && (c.quantity.name.starts_with("gyro") || is_ticks())
+    };
+    if let Some(column) = table.columns.iter().find(is_unclear) {
         return Err(table.no_unit(column));
+    }
+    let name = file_name(path).to_lowercase();
+    let is_estimate = name.starts_with("accelerometer.") || name.starts_with("linear");
+    if is_estimate && table.get("t_s").is_some_and(|t| t.quantity.stems == SENSOR_LOGGER) {
+        let text = "Sensor Logger writes accelerations without gravity into this file, as the phone estimates them: \
+                    TotalAcceleration.csv has what the accelerometer measures";
+        table.warnings.push(text.to_owned());
     }
     if table.columns.iter().all(|c| c.quantity.axis.is_empty()) {
         let known = table.columns.iter().map(|c| &c.name);

@@ -299,7 +299,7 @@ fn bad_cells_are_named() {
     );
     let (message, hint) = refusal_with(
         "a.csv",
-        "t_s\tgyro_x_rad_s\n0,00\t1\n",
+        "t_s,gyro_x_rad_s\n\"0,00\",1\n",
         &ReadOptions::default(),
     );
     assert_eq!(

@@ -116,6 +116,7 @@ pub(crate) fn read(path: &Path, dictionary: &Dictionary<'_>) -> Result<Table, Fa
     };
     let name = path.display().to_string();
     let of = |columns| of_columns(&name, columns, dictionary);
+    source::open(path).map_err(|e| unreadable(path, e))?;
     let table = match logs::kind_of(path) {
         #[cfg(feature = "npz")]
         Some(LogKind::Npz) => {
@@ -161,7 +162,8 @@ pub(crate) fn parse(name: &str, text: &str, dictionary: &Dictionary<'_>) -> Resu
 
 /// Error of the system on a table, with a hint.
 pub(crate) fn unreadable(path: &Path, e: std::io::Error) -> Failure {
-    let is_cut = is_damage(e.kind()) && e.kind() != std::io::ErrorKind::FileTooLarge;
+    use std::io::ErrorKind as K;
+    let is_cut = is_damage(e.kind()) && !matches!(e.kind(), K::FileTooLarge | K::InvalidInput);
     let failure = Failure::io(path, e);
     match is_cut {
         true => failure.hint(
@@ -194,6 +196,20 @@ fn empty(path: &str) -> Failure {
     Failure::contents(path, Place::Within, "no rows in it").passing_over(IS_EMPTY)
 }
 
+/// Columns beside which rates and accelerations are in SI: of ArduPilot and of Sensor Logger.
+const IN_SI: [&str; 3] = ["timeus", "timems", SENSOR_LOGGER];
+pub(crate) const SENSOR_LOGGER: &str = "seconds_elapsed";
+/// Counter of Xsens, in ticks of 0.1 ms where MT Manager writes it, in other units elsewhere.
+pub(crate) const TICKS: &str = "sampletimefine";
+
+/// The sensor that a file is named after, as those of phones are.
+fn sensor_of(path: &str) -> Option<&'static str> {
+    let name = Path::new(path).file_name()?.to_str()?.to_lowercase();
+    let sensors = [("gyr", "gyro"), ("acc", "accel")];
+    let found = sensors.iter().find(|(part, _)| name.contains(part));
+    found.map(|(_, sensor)| *sensor)
+}
+
 /// Beyond this a number is no measurement, and its square may be no number.
 const LARGEST: f64 = 1e100;
 const BEYOND: &str = "is beyond 1e100, no measurement";
@@ -207,7 +223,7 @@ impl Table {
         header_line: u64,
         names: &[String],
         dictionary: &Dictionary<'_>,
-        is_si: bool,
+        is_xsens: bool,
     ) -> Result<Self, Failure> {
         let mut table = Self {
             path: path.to_owned(),
@@ -216,14 +232,27 @@ impl Table {
             ..Self::default()
         };
         let unwanted = |quantity: &Quantity| dictionary.unwanted.is_some_and(|is| is(quantity));
+        let is_si = is_xsens || names.iter().any(|name| IN_SI.contains(&&*normalised(name)));
+        let found = |name: &str| quantity::find(dictionary.quantities, name);
+        let is_axis = |name: &String| found(name).is_some_and(|(q, _)| !q.axis.is_empty());
+        let sensor = match names.iter().any(is_axis) {
+            true => None,
+            false => sensor_of(path),
+        };
+        let of_sensor = |name: &str| {
+            let is_axis = name.starts_with(['x', 'y', 'z', 'X', 'Y', 'Z']);
+            found(&format!("{}_{name}", sensor.filter(|_| is_axis)?))
+        };
         for (place, name) in names.iter().enumerate() {
             let name = name.trim().to_owned();
-            match quantity::find(dictionary.quantities, &name) {
+            match found(&name).or_else(|| of_sensor(&name)) {
                 Some((quantity, _)) if unwanted(quantity) => table.ignored.push(name),
                 Some((quantity, factor)) => {
                     let values = Vec::new();
                     let is_signal = quantity.rank.is_none();
-                    let factor = factor.or((is_si && is_signal).then_some(1.0));
+                    let factor = factor
+                        .or((is_si && is_signal).then_some(1.0))
+                        .or((is_xsens && quantity.stems == TICKS).then_some(1e-4));
                     table.columns.push(Column {
                         name,
                         quantity,
@@ -547,6 +576,8 @@ fn read_text(
         let text = "header not in UTF-8, taken as ISO-8859-1";
         table.assumptions.push(text.to_owned());
     }
+    let units = head.units_line.map(|line| format!("units by line {line}"));
+    table.assumptions.extend(units);
     if !table.columns.is_empty() {
         head.rows(&mut table, lines, dictionary)?;
     }
@@ -571,7 +602,19 @@ struct Head {
     is_bare: bool,
     /// True if the header is no UTF-8: `²` and `°` are one byte each then.
     is_latin_1: bool,
+    /// True if the rows are sentences, which end in a checksum.
+    is_sentences: bool,
+    /// Line of the units, where they have one of their own.
+    units_line: Option<u64>,
 }
+
+/// Columns of the sentences of an IMU, by their first cells ([VectorNav VN-100 manual](https://www.vectornav.com/)).
+const SENTENCES: [(&str, &str); 3] = [
+    ("$VNIMU", "mag_x mag_y mag_z"),
+    ("$VNYMR", "yaw pitch roll mag_x mag_y mag_z"),
+    ("$VNQMR", "q_0 q_1 q_2 q_3 mag_x mag_y mag_z"),
+];
+const OF_SENTENCE: &str = "accel_x_m_s2 accel_y_m_s2 accel_z_m_s2 gyro_x_rad_s gyro_y_rad_s gyro_z_rad_s temperature pressure";
 
 impl Head {
     fn read(lines: &mut Lines<'_>, dictionary: &Dictionary<'_>) -> Result<Self, Failure> {
@@ -579,8 +622,8 @@ impl Head {
             delimiter: b',',
             ..Self::default()
         };
-        // the first line of words, which is the header where none names a quantity
-        let mut words: Option<(u64, Vec<String>)> = None;
+        // lines of words, of which one is the header where none names a quantity
+        let mut words: Vec<(u64, Vec<String>)> = Vec::new();
         while lines.next()? && lines.number <= MOST_BEFORE {
             let line = lines.number;
             if let Some(what) = no_text(&lines.line) {
@@ -605,51 +648,105 @@ impl Head {
             }
             let inside = text.trim_start_matches(['#', '%']).trim();
             let delimiter = delimiter_of(inside, dictionary);
-            let cell = |cell: &Cow<'_, [u8]>| String::from_utf8_lossy(cell).trim().to_owned();
-            let mut cells: Vec<String> = split(inside.as_bytes(), delimiter)
-                .iter()
-                .map(cell)
-                .collect();
-            cells.truncate(
-                cells
-                    .iter()
-                    .rposition(|cell| !cell.is_empty())
-                    .map_or(0, |at| at + 1),
-            );
+            let cells = words_of(inside, delimiter);
+            if cells.is_empty() {
+                continue;
+            }
+            if let Some(first) = cells.first().filter(|cell| cell.starts_with('$')) {
+                return head.of_sentences(lines.path, line, first, cells.len(), dictionary);
+            }
             let known = |cell: &&String| {
                 find(dictionary.quantities, cell).is_some_and(|(q, _)| q.rank.is_none())
             };
             let known = cells.iter().filter(known).count();
+            let is_number = |cell: &&String| number(cell.as_bytes(), delimiter).is_some();
+            let numbers = cells.iter().filter(is_number).count();
+            // words between blanks may be those of a sentence
+            let is_header =
+                known > 0 && numbers == 0 && (delimiter != b' ' || 2 * known + 1 >= cells.len());
             if inside.len() < text.len() {
                 head.comments.push(inside.to_owned());
-                // words between blanks may be those of a sentence
-                if known == 0 || delimiter == b' ' && 2 * known + 1 < cells.len() {
+                if !is_header {
                     continue;
                 }
             }
             (head.delimiter, head.line) = (delimiter, line);
-            let is_number = |cell: &String| number(cell.as_bytes(), delimiter).is_some();
-            head.has_row = cells.iter().all(is_number);
-            if head.has_row && words.is_some() {
-                break;
-            }
-            if head.has_row {
+            if 2 * numbers > cells.len() {
+                head.has_row = true;
+                let is_one = |(_, names): &&(u64, Vec<String>)| names.len() == cells.len();
+                let mut fitting = words.iter().filter(is_one);
+                if let (Some((line, names)), None) = (fitting.next(), dictionary.names) {
+                    (head.line, head.names) = (*line, names.clone());
+                    if let Some((line, units)) = fitting.next() {
+                        head.name_units(*line, units, dictionary);
+                    }
+                    return Ok(head);
+                }
+                if !words.is_empty() && dictionary.names.is_none() {
+                    break;
+                }
                 head.is_bare = dictionary.names.is_none();
                 let names = dictionary.names.map(<[String]>::to_vec);
                 let names = names.or_else(|| layout(dictionary.bare, cells.len()));
-                head.names = names.ok_or_else(|| no_header(lines.path, line, text, dictionary))?;
+                let no_header = || no_header(lines.path, line, text, cells.len(), dictionary);
+                head.names = names.ok_or_else(no_header)?;
                 return Ok(head);
             }
-            let names = dictionary.names.map_or(cells, <[String]>::to_vec);
-            if known > 0 || dictionary.names.is_some() {
-                head.names = names;
+            if is_header && dictionary.names.is_none() {
+                head.names = cells;
+                while lines.next()? && lines.line.trim_ascii().is_empty() {}
+                let below = split(&lines.line, delimiter);
+                head.has_row = !(lines.line.is_empty()
+                    || below.len() >= head.names.len() && is_words(&below));
+                if !head.has_row && !lines.line.is_empty() {
+                    let text = String::from_utf8_lossy(&lines.line);
+                    let units = words_of(text.trim(), delimiter);
+                    head.name_units(lines.number, &units, dictionary);
+                }
                 return Ok(head);
             }
-            words.get_or_insert((line, names));
+            words.push((line, cells));
         }
         // what names no quantity is the header all the same: its reader says what it lacks
-        (head.line, head.names) = words.ok_or_else(|| empty(lines.path))?;
+        let first = words.into_iter().next();
+        (head.line, head.names) = first.ok_or_else(|| empty(lines.path))?;
         Ok(head)
+    }
+
+    /// Puts the units that stand in a line of their own behind the names.
+    fn name_units(&mut self, line: u64, units: &[String], dictionary: &Dictionary<'_>) {
+        self.units_line = Some(line);
+        for (name, unit) in self.names.iter_mut().zip(units) {
+            let whole = format!("{name} {unit}");
+            let is_without = find(dictionary.quantities, name).is_some_and(|(_, f)| f.is_none());
+            if is_without && !unit.is_empty() || find(dictionary.quantities, &whole).is_some() {
+                *name = whole;
+            }
+        }
+    }
+
+    /// Rows that are sentences, with such a first cell.
+    fn of_sentences(
+        self,
+        path: &str,
+        line: u64,
+        first: &str,
+        count: usize,
+        dictionary: &Dictionary<'_>,
+    ) -> Result<Self, Failure> {
+        let Some((_, names)) = SENTENCES.iter().find(|(address, _)| *address == first) else {
+            let message = format!("sentences ({}), no table", shown(first, 20));
+            return Err(Failure::contents(path, line, message).or_hint(dictionary.advice));
+        };
+        let names = ["address", names, OF_SENTENCE].join(" ");
+        let names = names.split(' ').take(count).map(str::to_owned);
+        Ok(Self {
+            names: names.collect(),
+            line,
+            has_row: true,
+            is_sentences: true,
+            ..self
+        })
     }
 
     /// Appends the rows; what is passed over becomes a note.
@@ -662,11 +759,13 @@ impl Head {
         let path = lines.path;
         // of a packed file no more than what is read is known
         let length = std::fs::metadata(path).map_or(0, |m| m.len());
-        let (expected, mut row, mut has_units) = (self.names.len(), 0, false);
+        let (expected, mut row) = (self.names.len(), 0);
         let mut is_there = self.has_row || lines.next()?;
         while is_there {
             let line = lines.number;
             while lines.is_open() && lines.line.len() < LONGEST as usize && lines.more()? {}
+            let sum = self.is_sentences.then(|| lines.line.iter().rposition(|b| *b == b'*'));
+            lines.line.truncate(sum.flatten().unwrap_or(lines.line.len()));
             let cells = split(&lines.line, self.delimiter);
             let first = cells
                 .first()
@@ -677,10 +776,6 @@ impl Head {
                 let inside = text.trim_start_matches(['#', '%', ' ']).trim_end();
                 table.comments.push(inside.to_owned());
             } else if cells.iter().all(is_empty) {
-            } else if row == 0 && !has_units && cells.len() == expected && is_words(&cells) {
-                has_units = true;
-                let text = format!("line {line} has words and no numbers: passed over");
-                table.assumptions.push(text);
             } else if cells.len() < expected || !cells[expected..].iter().all(is_empty) {
                 let found = cells.len();
                 if lines.is_open() {
@@ -728,12 +823,32 @@ fn layout(headers: &[&str], columns: usize) -> Option<Vec<String>> {
     Some(found.map(str::to_owned).collect())
 }
 
-fn no_header(path: &str, line: u64, text: &str, dictionary: &Dictionary<'_>) -> Failure {
+fn no_header(
+    path: &str,
+    line: u64,
+    text: &str,
+    count: usize,
+    dictionary: &Dictionary<'_>,
+) -> Failure {
     let found = shown(text, 60);
     let message = format!("a header that names the columns is missing, found \"{found}\"");
+    let names = layout(dictionary.array, count).map(|names| names.join(","));
+    let option = format!(
+        "name its {count} columns: --columns {}",
+        names.unwrap_or_else(|| "t_s,accel_x_m_s2,…".to_owned())
+    );
     Failure::contents(path, line, message)
         .or_hint(dictionary.advice)
-        .or_option(help::COLUMN_NAMES)
+        .or_option(("columns", option))
+}
+
+/// The cells of a line as words, without empty ones at its end.
+fn words_of(line: &str, delimiter: u8) -> Vec<String> {
+    let cells = split(line.as_bytes(), delimiter);
+    let is_full = |cell: &Cow<'_, [u8]>| !cell.trim_ascii().is_empty();
+    let count = cells.iter().rposition(is_full).map_or(0, |at| at + 1);
+    let word = |cell: &Cow<'_, [u8]>| String::from_utf8_lossy(cell).trim().to_owned();
+    cells[..count].iter().map(word).collect()
 }
 
 /// The rate in a comment such as `Update Rate: 100.0Hz`.
@@ -748,14 +863,20 @@ fn rate_in(comment: &str) -> Option<f64> {
     digits.parse().ok().filter(|r: &f64| *r > 0.0)
 }
 
-/// The separator of the cells of a line: of equals the last. Blanks do only where nothing else does and they are not inside
+/// The separator of the cells of a line: the most frequent of comma, semicolon and tab, of equals the last; but of n cells
+/// between semicolons or tabs each may have a decimal comma. Blanks do only where nothing else does and they are not inside
 /// one name.
 fn delimiter_of(line: &str, dictionary: &Dictionary<'_>) -> u8 {
     let count = |d: u8| line.bytes().filter(|b| *b == d).count();
-    let most = [b',', b';', b'\t'].into_iter().max_by_key(|d| count(*d));
+    let [commas, semicolons, tabs] = [b',', b';', b'\t'].map(count);
+    let others = semicolons.max(tabs);
     let is_spaced = count(b' ') > 0 && find(dictionary.quantities, line).is_none();
-    most.filter(|d| count(*d) > 0)
-        .unwrap_or(if is_spaced { b' ' } else { b',' })
+    match () {
+        () if others > 0 && tabs >= semicolons && commas <= others + 1 => b'\t',
+        () if others > 0 && commas <= others + 1 => b';',
+        () if commas == 0 && is_spaced => b' ',
+        () => b',',
+    }
 }
 
 /// The cells of a line, quotes removed.
@@ -813,13 +934,13 @@ fn no_text(bytes: &[u8]) -> Option<&'static str> {
     has_lone.then_some("its lines end in a carriage return only")
 }
 
-/// A number; with a decimal comma where semicolons separate.
+/// A number; with a decimal comma where something else separates.
 #[inline]
 pub(super) fn number(cell: &[u8], delimiter: u8) -> Option<f64> {
     let text = std::str::from_utf8(cell.trim_ascii()).ok()?;
     let comma = || text.replacen(',', ".", 1).parse().ok();
     let parsed = text.parse().ok();
-    parsed.or_else(|| if delimiter == b';' { comma() } else { None })
+    parsed.or_else(|| if delimiter == b',' { None } else { comma() })
 }
 
 // Tables that are no text: arrays of NumPy, Parquet, directories of KITTI, logs.
