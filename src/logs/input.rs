@@ -291,10 +291,32 @@ impl Kind {
     }
 }
 
-const MATLAB: &str = "in MATLAB: writematrix(imu, 'imu.csv')";
+const MATLAB: &str =
+    "in MATLAB: writematrix(imu, 'imu.csv'), and read it with --columns, which names its columns";
+const NOVATEL: Kind = Kind::Other(
+    "a NovAtel log",
+    "fixes: let the receiver write the logs GPGGA, GPRMC and GPGST; IMU: its counts times the scale factors of the IMU as \
+     a table t_s, accel_x_m_s2 … gyro_z_rad_s",
+);
 const HDF5: Kind = Kind::Other("an HDF5 file, as MATLAB 7.3 writes", MATLAB);
 /// First bytes of the formats that have such.
-const MAGIC: [(&[u8], Kind); 10] = [
+const MAGIC: [(&[u8], Kind); 14] = [
+    (b"\xaa\x44\x12", NOVATEL),
+    (b"\xaa\x44\x13", NOVATEL),
+    (
+        b"$IMURAW\0",
+        Kind::Other(
+            "an Inertial Explorer .imr",
+            "in Inertial Explorer: Tools > View Raw IMU Data, and save it as text with a header that names the units",
+        ),
+    ),
+    (
+        b"\xff\x5a",
+        Kind::Other(
+            "an SBG log",
+            "in sbgCenter or with sbgBasicLogger: export it as CSV or text, with the units in its header",
+        ),
+    ),
     (b"\x89MCAP0\r\n", Kind::Mcap),
     (b"#ROSBAG V", Kind::Bag),
     (b"ULog\x01\x12\x35", Kind::Ulog),
@@ -361,6 +383,16 @@ pub fn recognise(head: &[u8]) -> Option<Kind> {
         } else {
             Kind::Other("a zip archive", "unzip FILE.zip")
         });
+    }
+    // ASCII logs of NovAtel: `#BESTPOSA,` or, short, `%RAWIMUSA,`
+    if let Some(b'#' | b'%') = head.first()
+        && let Some(name) = head[1..].split(|b| *b == b',').next()
+        && name.len() > 4
+        && name.ends_with(b"A")
+        && name.iter().all(u8::is_ascii_alphanumeric)
+        && !name.iter().any(u8::is_ascii_lowercase)
+    {
+        return Some(NOVATEL);
     }
     // the label of the first line stands in its columns 61 to 80
     if head

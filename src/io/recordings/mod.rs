@@ -187,7 +187,11 @@ pub(crate) fn load(
     }
     let name = file_name(path).to_lowercase();
     let is_estimate = name.starts_with("accelerometer.") || name.starts_with("linear");
-    if is_estimate && table.get("t_s").is_some_and(|t| t.quantity.stems == SENSOR_LOGGER) {
+    if is_estimate
+        && table
+            .get("t_s")
+            .is_some_and(|t| t.quantity.stems == SENSOR_LOGGER)
+    {
         let text = "Sensor Logger writes accelerations without gravity into this file, as the phone estimates them: \
                     TotalAcceleration.csv has what the accelerometer measures";
         table.warnings.push(text.to_owned());

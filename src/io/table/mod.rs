@@ -696,8 +696,8 @@ impl Head {
                 head.names = cells;
                 while lines.next()? && lines.line.trim_ascii().is_empty() {}
                 let below = split(&lines.line, delimiter);
-                head.has_row = !(lines.line.is_empty()
-                    || below.len() >= head.names.len() && is_words(&below));
+                head.has_row =
+                    !(lines.line.is_empty() || below.len() >= head.names.len() && is_words(&below));
                 if !head.has_row && !lines.line.is_empty() {
                     let text = String::from_utf8_lossy(&lines.line);
                     let units = words_of(text.trim(), delimiter);
@@ -764,8 +764,12 @@ impl Head {
         while is_there {
             let line = lines.number;
             while lines.is_open() && lines.line.len() < LONGEST as usize && lines.more()? {}
-            let sum = self.is_sentences.then(|| lines.line.iter().rposition(|b| *b == b'*'));
-            lines.line.truncate(sum.flatten().unwrap_or(lines.line.len()));
+            let sum = self
+                .is_sentences
+                .then(|| lines.line.iter().rposition(|b| *b == b'*'));
+            lines
+                .line
+                .truncate(sum.flatten().unwrap_or(lines.line.len()));
             let cells = split(&lines.line, self.delimiter);
             let first = cells
                 .first()
