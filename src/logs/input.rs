@@ -295,8 +295,8 @@ const MATLAB: &str =
     "in MATLAB: writematrix(imu, 'imu.csv'), and read it with --columns, which names its columns";
 const NOVATEL: Kind = Kind::Other(
     "a NovAtel log",
-    "fixes: let the receiver write the logs GPGGA, GPRMC and GPGST; IMU: its counts times the scale factors of the IMU as \
-     a table t_s, accel_x_m_s2 … gyro_z_rad_s",
+    "fixes to the logs GPGGA, GPRMC and GPGST; counts of the IMU, times its scale factors, to a table t_s, accel_x_m_s2 … \
+     gyro_z_rad_s",
 );
 const HDF5: Kind = Kind::Other("an HDF5 file, as MATLAB 7.3 writes", MATLAB);
 /// First bytes of the formats that have such.

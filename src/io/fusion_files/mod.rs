@@ -70,12 +70,9 @@ fn increasing(
     let Some((k, (from, to))) = steps.find(|(_, (from, to))| to <= from) else {
         return Ok(());
     };
-    let advice = match from - to > 500_000.0 {
-        true => "a new GPS week? Count the seconds on, in both files",
-        false => "sort the rows by time and remove repeated ones",
-    };
     let message = format!("time goes from {from} s to {to} s: it must increase");
-    Err(Failure::contents(path, line(k), message).or_hint(advice))
+    Err(Failure::contents(path, line(k), message)
+        .or_hint("sort the rows by time and remove repeated ones"))
 }
 
 // Recorded GNSS fixes.
@@ -86,7 +83,7 @@ pub(crate) const WEEK_S: f64 = 604_800.0;
 const MAX_SPEED: f64 = 8000.0;
 
 /// Quantities of fixes; a deviation up is one down.
-pub(super) static FIX_QUANTITIES: [Quantity; 33] = [
+static FIX_QUANTITIES: [Quantity; 33] = [
     Quantity::time("t time timestamp tow sow gpstime"),
     Quantity::angle("lat_deg", "lat latitude").within(LATITUDE),
     Quantity::angle("lon_deg", "lon lng longitude").within(LONGITUDE),
@@ -147,7 +144,7 @@ const ECEF_COVARIANCE: [[&str; 3]; 2] = [
 ];
 
 /// Dictionary of fixes. Texts without a header are those of KF-GINS.
-const FIXES: Dictionary<'_> = Dictionary {
+pub(super) const FIXES: Dictionary<'_> = Dictionary {
     bare: &[
         "t_s lat_deg lon_deg h_m sd_n_m sd_e_m sd_d_m",
         "t_s lat_deg lon_deg h_m v_n_m_s v_e_m_s v_d_m_s sd_n_m sd_e_m sd_d_m sd_vn_m_s sd_ve_m_s sd_vd_m_s",
@@ -214,6 +211,7 @@ fn of_rows(
         remarks.push(remark(text));
     }
     remarks.extend(table.assumptions.iter().map(remark));
+    remarks.extend(table.warnings.iter().map(doubt));
     Ok(((0..table.rows()).map(fix).collect(), remarks))
 }
 

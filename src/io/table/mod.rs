@@ -2,6 +2,7 @@
 //!
 //! A reader is `read(path, &DICTIONARY)`: columns with a factor to SI and the line of each row.
 
+use super::recordings::timing::median_step;
 use super::suggest::nearest;
 use super::{Failure, Place, help, logs, source};
 use crate::failure::is_damage;
@@ -160,6 +161,15 @@ pub(crate) fn parse(name: &str, text: &str, dictionary: &Dictionary<'_>) -> Resu
     read_text(name, reader, dictionary)?.filled()
 }
 
+/// Quantities of a dictionary that the header of a text names.
+pub(crate) fn quantities(text: &str, dictionary: &Dictionary<'_>) -> Vec<&'static Quantity> {
+    let reader = Box::new(Cursor::new(text.to_owned()));
+    let head = Head::read(&mut Lines::new("", reader), dictionary);
+    let names = head.map(|head| head.names).unwrap_or_default();
+    let known = names.iter().map(|name| find(dictionary.quantities, name));
+    known.flatten().map(|(quantity, _)| quantity).collect()
+}
+
 /// Error of the system on a table, with a hint.
 pub(crate) fn unreadable(path: &Path, e: std::io::Error) -> Failure {
     use std::io::ErrorKind as K;
@@ -213,6 +223,18 @@ fn sensor_of(path: &str) -> Option<&'static str> {
 /// Beyond this a number is no measurement, and its square may be no number.
 const LARGEST: f64 = 1e100;
 const BEYOND: &str = "is beyond 1e100, no measurement";
+/// Numbers at which counters of time start again: of 16 and 32 bits, the latter also of microseconds and milliseconds told in
+/// seconds, and of the GPS week (s, ms).
+const TURNS: [f64; 6] = [
+    65_536.0,
+    4_294_967_296.0,
+    4_294.967_296,
+    4_294_967.296,
+    604_800.0,
+    604_800_000.0,
+];
+/// Steps that may be missing where one does.
+const MOST_MISSED: f64 = 100.0;
 /// Rows from one look at the memory to the next.
 const BETWEEN: usize = 1 << 16;
 
@@ -384,7 +406,7 @@ impl Table {
     }
 
     /// Refuses a table without rows, or whose rows end before others.
-    fn filled(self) -> Result<Self, Failure> {
+    fn filled(mut self) -> Result<Self, Failure> {
         let uneven = |c: &&Column| c.values.len() != self.columns[0].values.len();
         if let Some(other) = self.columns.iter().find(uneven) {
             let (rows, first) = (other.values.len(), &self.columns[0]);
@@ -399,7 +421,36 @@ impl Table {
         if self.columns.first().is_some_and(|c| c.values.is_empty()) {
             return Err(empty(&self.path));
         }
+        self.count_on();
         Ok(self)
+    }
+
+    /// Counts the time on where its counter starts again.
+    fn count_on(&mut self) {
+        let is_in_week = self.has("week");
+        let mut time = self.columns.iter_mut().find(|c| c.quantity.name == "t_s");
+        let Some(time) = time.as_mut().filter(|_| !is_in_week) else {
+            return;
+        };
+        let (mut step, mut added, mut count) = (f64::NAN, 0.0, 0);
+        for row in 1..time.values.len() {
+            let back = time.values[row - 1] - added - time.values[row];
+            if back > 0.0 {
+                if step.is_nan() {
+                    step = median_step(&time.values);
+                }
+                let is_turn = |turn: &&f64| (0.0..=MOST_MISSED * step).contains(&(**turn - back));
+                if let Some(turn) = TURNS.iter().find(is_turn) {
+                    (added, count) = (added + turn, count + 1);
+                }
+            }
+            time.values[row] += added;
+        }
+        if count > 0 {
+            let name = &time.name;
+            let text = format!("column \"{name}\" starts again {count} times: counted on");
+            self.warnings.push(text);
+        }
     }
 
     /// Refuses columns whose rows, so many or more, do not fit into the memory that is free.
@@ -531,7 +582,17 @@ struct Lines<'a> {
     bytes: u64,
 }
 
-impl Lines<'_> {
+impl<'a> Lines<'a> {
+    const fn new(path: &'a str, reader: Box<dyn BufRead>) -> Self {
+        Self {
+            path,
+            reader,
+            line: Vec::new(),
+            number: 0,
+            bytes: 0,
+        }
+    }
+
     /// Appends a line to the last one; false at the end.
     fn more(&mut self) -> Result<bool, Failure> {
         let mut reader = self.reader.by_ref().take(LONGEST);
@@ -561,13 +622,7 @@ fn read_text(
     reader: Box<dyn BufRead>,
     dictionary: &Dictionary<'_>,
 ) -> Result<Table, Failure> {
-    let mut lines = Lines {
-        path,
-        reader,
-        line: Vec::new(),
-        number: 0,
-        bytes: 0,
-    };
+    let mut lines = Lines::new(path, reader);
     let head = Head::read(&mut lines, dictionary)?;
     let mut table = Table::new(path, head.line, &head.names, dictionary, head.is_xsens)?;
     table.rate_hz = head.rate_hz.map(|rate_hz| (rate_hz, "head of the file"));

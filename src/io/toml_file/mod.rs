@@ -190,6 +190,9 @@ impl Source {
             .or_else(|| nearest(name, legal.clone()));
         let hint = match meant {
             Some(meant) => format!("did you mean \"{meant}\"?"),
+            None if name.starts_with("v_u") => {
+                "down is positive: v_d_m_s, of the other sign".into()
+            }
             None => format!("legal here: {}", legal.collect::<Vec<_>>().join(", ")),
         };
         self.error(key, format!("unknown key \"{key}\""))
