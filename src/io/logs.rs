@@ -44,6 +44,9 @@ pub(crate) fn refused(path: &Path, error: Error) -> Failure {
         Fault::Topic => {
             refusal(Place::Within).or_hint("--topic NAME names one (nav-sim inspect lists them)")
         }
+        Fault::NoTopic => {
+            refusal(Place::Within).or_hint("nav-sim inspect lists what it has: name another file")
+        }
         Fault::TimeBack => {
             refusal(Place::Within).or_option(("stamp", "--stamp log takes the times of arrival"))
         }

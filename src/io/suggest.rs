@@ -13,8 +13,9 @@ pub(crate) fn nearest<'a>(
         let longest = lower.chars().count().max(candidate.chars().count());
         // a part of one letter is an axis or a unit: another letter is another quantity
         let is_letter = |part: &str| part.chars().count() == 1;
-        let mut parts = lower.split(['_', '.']).zip(candidate.split(['_', '.']));
-        if parts.any(|(a, b)| a != b && is_letter(a) && is_letter(b)) {
+        let [own, others] = [&lower, &candidate].map(|name| name.split(['_', '.']));
+        let is_other = |(a, b)| a != b && is_letter(a) && is_letter(b);
+        if own.clone().count() == others.clone().count() && own.zip(others).any(is_other) {
             return None;
         }
         let begins = lower.len().min(candidate.len()) >= 3

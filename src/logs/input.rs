@@ -466,8 +466,10 @@ pub enum Fault {
     TimeBack,
     /// Bytes that do not follow the format.
     Damage,
-    /// No topic is the one that is wanted, or several could be.
+    /// No topic is the one that is named, or several could be.
     Topic,
+    /// No topic has what is wanted.
+    NoTopic,
     /// A format that is known by its first bytes, and is not read.
     NotRead(Kind),
 }
@@ -539,7 +541,11 @@ impl Error {
             [] => String::new(),
             _ => format!("; there are {}", topics.join(", ")),
         };
-        Self::new(Fault::Topic, format!("no topic has {what}{there}"))
+        let fault = match topics {
+            [] => Fault::NoTopic,
+            _ => Fault::Topic,
+        };
+        Self::new(fault, format!("no topic has {what}{there}"))
     }
 
     /// Byte at which a file ends that its writer did not end.
