@@ -193,8 +193,12 @@ pub(crate) fn load(
             .get("t_s")
             .is_some_and(|t| t.quantity.stems == SENSOR_LOGGER)
     {
-        let text = "Sensor Logger writes accelerations without gravity into this file, as the phone estimates them: \
-                    TotalAcceleration.csv has what the accelerometer measures";
+        let text = "has accelerations without gravity, as the phone estimates them; TotalAcceleration.csv has those measured";
+        if path.with_file_name("TotalAcceleration.csv").exists() {
+            return Err(Failure::contents(&table.path, Place::Itself, text)
+                .or_hint("name TotalAcceleration.csv")
+                .passing_over("it is without gravity"));
+        }
         table.warnings.push(text.to_owned());
     }
     if table.columns.iter().all(|c| c.quantity.axis.is_empty()) {
@@ -257,7 +261,7 @@ pub(crate) fn visit<T: Send>(
     tell: &dyn Fn(usize, usize),
 ) -> Result<(Vec<T>, Report), Failure> {
     let files = expand(paths)?;
-    let (mut looks, mut report) = (Vec::new(), Report::default());
+    let (mut looks, mut report, mut passed_over) = (Vec::new(), Report::default(), None);
     tell(0, files.len());
     let mut done = 0;
     for some in files.chunks(AT_ONCE) {
@@ -272,6 +276,7 @@ pub(crate) fn visit<T: Send>(
                     let (path, why) = (path.display(), e.passed_over().unwrap_or_default());
                     let text = format!("{path}: passed over, {why}");
                     report.warnings.push(text);
+                    passed_over = passed_over.or(Some(e));
                 }
                 outcome => {
                     let (of_file, held) = outcome?;
@@ -285,11 +290,8 @@ pub(crate) fn visit<T: Send>(
     }
     same_rate(&report.files)?;
     if looks.is_empty() {
-        let path = paths
-            .first()
-            .map(|p| p.display().to_string())
-            .unwrap_or_default();
-        return Err(no_files(path));
+        let path = paths.first().map(|p| p.display().to_string());
+        return Err(passed_over.unwrap_or_else(|| no_files(path.unwrap_or_default())));
     }
     Ok((looks, report))
 }
