@@ -169,8 +169,9 @@ impl Clock {
             let error = refused(format!(
                 "column \"{name}\" does not advance: its median step is 0"
             ));
+            let ignore = "take the samples as evenly spaced: --gaps ignore";
             return Err(match *end > 0.0 {
-                true => error.or_option(help::GAPS).or_without(help::GAPS_ELSEWHERE),
+                true => error.or_option(("gaps", ignore)),
                 false => error,
             });
         }

@@ -327,27 +327,31 @@ impl Table {
             };
             if let Some(quantity) = dictionary.quantities.iter().find(is_meant) {
                 let problem = "is in a unit that is not known";
-                return Err(self.unit(name, quantity, problem).or_option(help::CHANNELS));
+                let other = quantity.name.replace('.', "_");
+                let advice = format!("convert it, and end {other}");
+                let refusal = self.unit(name, quantity, problem, &advice);
+                return Err(refusal.or_option(help::CHANNELS));
             }
         }
         Ok(())
     }
 
     /// The refusal of the unit of a column.
-    fn unit(&self, name: &str, quantity: &Quantity, problem: &str) -> Failure {
+    fn unit(&self, name: &str, quantity: &Quantity, problem: &str, advice: &str) -> Failure {
         let endings = quantity
             .units
             .iter()
             .filter_map(|(names, _)| Some(format!("_{}", names.split(' ').next()?)));
         let endings: Vec<String> = endings.collect();
         self.refused(format!("column \"{name}\" {problem}"))
-            .or_hint(format!("end its name in one of {}", endings.join(", ")))
+            .or_hint(format!("{advice} in one of {}", endings.join(", ")))
             .or_option(help::COLUMN_NAMES)
     }
 
     /// The refusal of a column whose unit cannot be known.
     pub(crate) fn no_unit(&self, column: &Column) -> Failure {
-        self.unit(&column.name, column.quantity, "has no unit in its name")
+        let problem = "has no unit in its name";
+        self.unit(&column.name, column.quantity, problem, "end its name")
     }
 
     /// Appends a number to a column; `written`: as the file has it.
@@ -609,10 +613,17 @@ impl<'a> Lines<'a> {
         self.more()
     }
 
-    /// True if a quote is open at the end of the line.
-    fn is_open(&self) -> bool {
-        let quotes = || self.line.iter().filter(|b| **b == b'"').count();
-        self.line.contains(&b'"') && quotes() % 2 > 0 && !self.line.starts_with(b"#")
+    /// True if a quote that begins a cell is open at the end of the line.
+    fn is_open(&self, delimiter: u8) -> bool {
+        if !self.line.contains(&b'"') || self.line.starts_with(b"#") {
+            return false;
+        }
+        let (mut is_open, mut before) = (false, delimiter);
+        for byte in &self.line {
+            is_open ^= *byte == b'"' && (is_open || before == delimiter || before == b'"');
+            before = *byte;
+        }
+        is_open
     }
 }
 
@@ -818,7 +829,12 @@ impl Head {
         let mut is_there = self.has_row || lines.next()?;
         while is_there {
             let line = lines.number;
-            while lines.is_open() && lines.line.len() < LONGEST as usize && lines.more()? {}
+            let is_open = |lines: &Lines<'_>| lines.is_open(self.delimiter);
+            while is_open(&lines) && lines.line.len() < LONGEST as usize && lines.more()? {}
+            if is_open(&lines) {
+                return Err(Failure::contents(path, line, "a quote is not closed")
+                    .or_hint("close it, or remove it"));
+            }
             let sum = self
                 .is_sentences
                 .then(|| lines.line.iter().rposition(|b| *b == b'*'));
@@ -837,10 +853,6 @@ impl Head {
             } else if cells.iter().all(is_empty) {
             } else if cells.len() < expected || !cells[expected..].iter().all(is_empty) {
                 let found = cells.len();
-                if lines.is_open() {
-                    return Err(Failure::contents(path, line, "a quote is not closed")
-                        .or_hint("close it, or remove it"));
-                }
                 while lines.next()? && lines.line.trim_ascii().is_empty() {}
                 // a logger that lost its power within a row
                 if found < expected && row > 0 && lines.line.is_empty() {
