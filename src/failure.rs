@@ -51,7 +51,7 @@ pub(crate) mod help {
     pub(crate) const WRONG_RATE: (&str, &str) = ("rate-hz", "leave --rate-hz out, or correct it");
     pub(crate) const FIX_SIGMA: (&str, &str) = (
         "gnss-sigma",
-        "give them for all fixes with --gnss-sigma, such as 2,2,4:0.1 (m, m/s)",
+        "give them for all fixes, such as --gnss-sigma 2,2,4:0.1 (m, m/s)",
     );
 }
 
