@@ -202,7 +202,7 @@ impl Failure {
             K::NotFound => "check the path",
             K::UnexpectedEof => "the file is cut off: copy or pack it again",
             K::FileTooLarge => "write what comes through a pipe to a file first",
-            K::InvalidInput if e.get_ref().is_some() => "fetch it: git lfs pull",
+            K::Unsupported if e.get_ref().is_some() => "fetch it: git lfs pull",
             K::PermissionDenied | K::ReadOnlyFilesystem => {
                 "change the permissions of the file or its directory, or name another path"
             }
@@ -376,7 +376,7 @@ pub(crate) const fn is_damage(kind: ErrorKind) -> bool {
     use ErrorKind as K;
     matches!(
         kind,
-        K::InvalidData | K::InvalidInput | K::UnexpectedEof | K::FileTooLarge
+        K::InvalidData | K::InvalidInput | K::UnexpectedEof | K::FileTooLarge | K::Unsupported
     )
 }
 

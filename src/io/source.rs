@@ -39,7 +39,7 @@ pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
             .read_to_end(&mut first)?;
         if first == POINTER {
             let message = "a Git LFS pointer, not the file itself";
-            return Err(io::Error::new(ErrorKind::InvalidInput, message));
+            return Err(io::Error::new(ErrorKind::Unsupported, message));
         }
         file.rewind()?;
         return Ok(Box::new(file));

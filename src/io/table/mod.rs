@@ -173,7 +173,7 @@ pub(crate) fn quantities(text: &str, dictionary: &Dictionary<'_>) -> Vec<&'stati
 /// Error of the system on a table, with a hint.
 pub(crate) fn unreadable(path: &Path, e: std::io::Error) -> Failure {
     use std::io::ErrorKind as K;
-    let is_cut = is_damage(e.kind()) && !matches!(e.kind(), K::FileTooLarge | K::InvalidInput);
+    let is_cut = is_damage(e.kind()) && !matches!(e.kind(), K::FileTooLarge | K::Unsupported);
     let failure = Failure::io(path, e);
     match is_cut {
         true => failure.hint(
