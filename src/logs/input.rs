@@ -384,13 +384,14 @@ pub fn recognise(head: &[u8]) -> Option<Kind> {
             Kind::Other("a zip archive", "unzip FILE.zip")
         });
     }
-    // ASCII logs of NovAtel: `#BESTPOSA,` or, short, `%RAWIMUSA,`
-    if let Some(b'#' | b'%') = head.first()
-        && let Some(name) = head[1..].split(|b| *b == b',').next()
+    // ASCII logs of NovAtel: `#BESTPOSA,`, short `%RAWIMUSA,`, abbreviated `<BESTPOS `
+    if let Some(b'#' | b'%' | b'<') = head.first()
+        && let Some(name) = head[1..].split(|b| b", ".contains(b)).next()
         && name.len() > 4
-        && name.ends_with(b"A")
-        && name.iter().all(u8::is_ascii_alphanumeric)
-        && !name.iter().any(u8::is_ascii_lowercase)
+        && (name.ends_with(b"A") || head[0] == b'<')
+        && name
+            .iter()
+            .all(|b| b.is_ascii_digit() || b.is_ascii_uppercase())
     {
         return Some(NOVATEL);
     }

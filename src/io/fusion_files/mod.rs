@@ -87,16 +87,27 @@ static FIX_QUANTITIES: [Quantity; 33] = [
     Quantity::time("t time timestamp tow sow gpstime"),
     Quantity::angle("lat_deg", "lat latitude").within(LATITUDE),
     Quantity::angle("lon_deg", "lon lng longitude").within(LONGITUDE),
-    Quantity::length("h_m", "h height alt altitude ellip_hgt h_ell"),
+    Quantity::length(
+        "h_m",
+        "h height alt altitude ellip_hgt h_ell ellipsoidal_height",
+    ),
     Quantity::length("sd_n_m", SD_N).positive(),
     Quantity::length("sd_e_m", SD_E).positive(),
     Quantity::length("sd_d_m", SD_D).positive(),
-    Quantity::speed("v_n_m_s", "v_n vn local_vn"),
-    Quantity::speed("v_e_m_s", "v_e ve local_ve"),
+    Quantity::speed("v_n_m_s", "v_n vn local_vn vnorth v_north"),
+    Quantity::speed("v_e_m_s", "v_e ve local_ve veast v_east"),
     V_D,
-    V_D.reversed("v_u vu v_up local_vu"),
-    Quantity::speed("sd_vn_m_s", "sd_vn sd_v_n vel_std_n sdvn northvel_std").positive(),
-    Quantity::speed("sd_ve_m_s", "sd_ve sd_v_e vel_std_e sdve eastvel_std").positive(),
+    V_D.reversed("v_u vu v_up vup local_vu"),
+    Quantity::speed(
+        "sd_vn_m_s",
+        "sd_vn sd_v_n vel_std_n sdvn northvel_std sd_vnorth",
+    )
+    .positive(),
+    Quantity::speed(
+        "sd_ve_m_s",
+        "sd_ve sd_v_e vel_std_e sdve eastvel_std sd_veast",
+    )
+    .positive(),
     Quantity::speed("sd_vd_m_s", SD_VD).positive(),
     Quantity::number("week", "week gps_week wnc_w gpstime_week"),
     Quantity::length("x_ecef_m", "x_ecef ecef_x"),
@@ -118,10 +129,10 @@ static FIX_QUANTITIES: [Quantity; 33] = [
     Quantity::speed("sd_vyz_m_s", "sdvyz"),
     Quantity::speed("sd_vzx_m_s", "sdvzx"),
 ];
-const SD_N: &str = "sd_n std_n sigma_n pos_std_n sd_north sd_lat sdn north_std";
-const SD_E: &str = "sd_e std_e sigma_e pos_std_e sd_east sd_lon sde east_std";
-const SD_D: &str = "sd_d std_d sigma_d pos_std_d sd_u std_u sd_h sdu up_std";
-const SD_VD: &str = "sd_vd sd_v_d vel_std_d sdvu sd_vu sd_v_u upvel_std";
+const SD_N: &str = "sd_n std_n sigma_n pos_std_n sd_north sd_lat sdn north_std sdnorth";
+const SD_E: &str = "sd_e std_e sigma_e pos_std_e sd_east sd_lon sde east_std sdeast";
+const SD_D: &str = "sd_d std_d sigma_d pos_std_d sd_u std_u sd_h sdu up_std sdheight";
+const SD_VD: &str = "sd_vd sd_v_d vel_std_d sdvu sd_vu sd_v_u upvel_std sd_vup sd_vh";
 const V_D: Quantity = Quantity::speed("v_d_m_s", "v_d vd");
 /// Columns of position, its deviations, velocity and those.
 const GEODETIC: [[&str; 3]; 4] = [
@@ -434,6 +445,7 @@ fn of_log(path: &Path, topic: Option<&str>, imu_s: Option<(f64, f64)>) -> Result
 #[cfg(test)]
 mod fix_tests {
     use super::*;
+    use glam::DVec2;
 
     #[test]
     fn a_quantity_in_two_columns_is_refused() {
@@ -448,6 +460,34 @@ mod fix_tests {
             "{e}"
         );
         assert_eq!(e.advice().unwrap(), "remove one of them");
+    }
+
+    /// Text of Inertial Explorer: units in a line of their own, week and second, velocities up. The IMU ran in seconds of the
+    /// week, of which 462797.3 is there.
+    #[test]
+    fn names_and_units_in_two_lines_are_read() {
+        let rows = "\
+  GPSTime   GPSTime   Latitude  Longitude Ellip-Hgt Local-VE Local-VN Local-VU East-Std North-Std Up-Std EastVel-Std NorthVel-Std UpVel-Std
+     week       (s)      (deg)      (deg)       (m)    (m/s)    (m/s)    (m/s)      (m)       (m)    (m)       (m/s)        (m/s)     (m/s)
+     2209 462797.30      30.53    114.356      18.0     1.92     1.11     0.01     0.01     0.012  0.037       0.037        0.043     0.103
+";
+        let file = tempfile::NamedTempFile::with_suffix(".posT").unwrap();
+        std::fs::write(file.path(), rows).unwrap();
+        let (fixes, notes) =
+            read_gnss(file.path(), None, Some((462_000.0, 463_000.0)), None).unwrap();
+        let fix = &fixes[0];
+        assert_eq!((fix.t_s, fix.h), (462_797.3, 18.0));
+        assert!((fix.lat - 30.53 * DEG).abs() < 1e-15);
+        assert_eq!(fix.pos_sigma_n, DVec3::new(0.012, 0.01, 0.037));
+        let velocity = fix.velocity.unwrap();
+        assert_eq!(velocity.horizontal, DVec2::new(1.11, 1.92));
+        assert_eq!(velocity.down, Some((-0.01, 0.103)));
+        assert_eq!(velocity.horizontal_sigma, DVec2::new(0.043, 0.037));
+        assert!(
+            notes
+                .iter()
+                .any(|n| n.text.ends_with("seconds of GPS week 2209"))
+        );
     }
 
     /// The sums are those of the independent writer of the file (`src/logs/tests/data/expected.csv`), in degrees and metres.

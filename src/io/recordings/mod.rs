@@ -69,7 +69,8 @@ const GYRO_SI: &str = "angular_velocity field_angular_velocity w_rs_s omega";
 const INCREMENT: Units = &[("m_s", 1.0), ("mps", 1.0)];
 /// Time of measurement, preferred to the time of arrival beside it.
 pub(crate) const STAMP: &str = "field_header_stamp header_stamp stamp";
-pub(crate) const OF_CLOCK: &str = "t time timestamp time_stamp elapsed elapsed_time epoch";
+pub(crate) const OF_CLOCK: &str =
+    "t time timestamp time_stamp elapsed elapsed_time epoch time_since_start time_since_start_in";
 /// Time of a receiver, of the week or not: the last to be taken, because it may be that of its last fix.
 pub(crate) const OF_RECEIVER: &str = "tow gps_tow gpstow time_of_week gps_time_of_week sow gps_sow seconds_of_week second_of_week gps_seconds_of_week gps_seconds gps_time gpstime gps_timestamp";
 

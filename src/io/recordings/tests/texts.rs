@@ -124,3 +124,39 @@ fn sentences_of_an_imu_are_read() {
     assert_close(&samples_with_mean(z), &[-1.786e-3, -0.8e-3]);
     assert!(refusal("$GPRMC,,V,,,,,,,,,,N*53\n").ends_with("sentences ($GPRMC), no table"));
 }
+
+/// Sensor Logger names the sensor in the file's name; beside what the accelerometer measures, it writes what is left without
+/// gravity, which is no recording of its own.
+#[test]
+fn files_named_after_their_sensor_are_read() {
+    let gyro = "time,seconds_elapsed,z,y,x\n1760565906248623000,0.10,3,2,1\n1760565906258623000,0.11,-3,-2,-1\n";
+    let accel = "time,seconds_elapsed,z,y,x\n1760565906248623000,0.10,9.8,0,1\n1760565906258623000,0.11,9.82,0.1,0\n";
+    let files = Files::new();
+    files.add("Gyroscope.csv", gyro);
+    files.add("TotalAcceleration.csv", accel);
+    let estimate = files.add("Accelerometer.csv", accel);
+    files.add("Gravity.csv", accel);
+    let (recordings, report) = read(&[files.path()], &ReadOptions::default()).unwrap();
+    assert_eq!(channels(&recordings[0]), ["gyro.x", "gyro.y", "gyro.z"]);
+    assert_eq!(channels(&recordings[1]), ["accel.x", "accel.y", "accel.z"]);
+    assert_close(&samples_with_mean(&recordings[0].signals[2]), &[3.0, -3.0]);
+    assert_close(&samples_with_mean(&recordings[1].signals[0]), &[1.0, 0.0]);
+    assert_close(&[recordings[1].rate_hz], &[100.0]);
+    let [without, other] = &report.warnings[..] else {
+        panic!("{:?}", report.warnings);
+    };
+    assert!(without.ends_with("Accelerometer.csv: passed over, it is without gravity"));
+    assert!(other.ends_with("Gravity.csv: passed over, no column is a known one"));
+    let refusal = read(&[estimate], &ReadOptions::default()).unwrap_err();
+    assert_eq!(refusal.advice().unwrap(), "name TotalAcceleration.csv");
+
+    let files = Files::new();
+    files.add("Gravity.csv", accel);
+    let refusal = read(&[files.path()], &ReadOptions::default()).unwrap_err();
+    assert!(
+        refusal
+            .to_string()
+            .contains("Gravity.csv, line 1: no accelerometer"),
+        "{refusal}"
+    );
+}
