@@ -236,7 +236,6 @@ fn too_short(path: &str, samples: usize, needed: usize) -> Failure {
     let message = format!("{samples} samples, but {needed} are needed");
     Failure::contents(path, Place::Within, message)
         .or_hint("record for longer, or ask for fewer scales")
-        .or_option(("skip-s", "a smaller --skip-s"))
 }
 
 /// Reads recordings; those of a directory in name order (numbers in names by value). All are held.
@@ -628,7 +627,11 @@ fn pieces(
     let longest = all().map(|p| p.len()).max().unwrap_or(0);
     let needed = options.min_samples.max(2);
     if longest < needed {
-        return Err(too_short(path, longest, needed));
+        let refusal = too_short(path, longest, needed);
+        return Err(match skip > 0 {
+            true => refusal.or_option(("skip-s", "a smaller --skip-s")),
+            false => refusal,
+        });
     }
     // A short one would cost all others their long scales.
     let needed = needed.max(longest / LONGEST_OVER_SHORTEST);
