@@ -238,17 +238,33 @@ fn conversions_that_hints_name_are_read() {
     };
     let ardupilot = hint("a.bin", b"\xa3\x95\x80\x80");
     assert!(ardupilot.contains("mavlogdump.py --format csv --types IMU"));
-    let header = "timestamp,TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,ErrG,ErrA,Temp,GyHlt,AcHlt";
+    // the second IMU, ten times noisier, has rows of its own
+    let header = "timestamp,TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,ErrG,ErrA,Temp,GyHlt,AcHlt";
     let rows = table(header, |k, next| {
         let us = 10_200_000 + 40_000 * k;
-        let gyro = format!("{:.6},{:.6},{:.6}", next(), next(), next());
-        let accel = format!("{:.6},{:.6},{:.6}", next(), next(), next() - 9.8);
-        format!("{:.3},{us},{gyro},{accel},0,0,0.0,1,1", us as f64 * 1e-6)
+        let t_s = us as f64 * 1e-6;
+        let rows = [(0, 1.0), (1, 10.0)].map(|(instance, times)| {
+            let [x, y, z] = [0; 3].map(|_| times * next());
+            let down = z - 9.8;
+            format!(
+                "{t_s:.3},{us},{instance},{x:.6},{y:.6},{z:.6},{y:.6},{x:.6},{down:.6},0,0,0.0,1,1"
+            )
+        });
+        rows.join("\n")
     });
     write("imu.csv", &rows);
     let ran = run("wv imu.csv --format json");
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert!(ran.stderr.contains("25 Hz"), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("25 Hz") && ran.stderr.contains("with I = 0"),
+        "{}",
+        ran.stderr
+    );
+    // numbers within ±0.001 have a variance of 1e-6/3, of which the first scale has half
+    let json: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    let first = &json["signals"][3]["classical"]["wv"][0];
+    assert!(first.as_f64().unwrap() < 3e-7, "{first}");
+    assert_eq!(json["signals"][3]["samples"], 200);
 
     let matlab = hint("a.mat", b"MATLAB 5.0 MAT-file");
     assert!(matlab.contains("writematrix(imu, 'imu.csv')") && matlab.contains("--columns"));

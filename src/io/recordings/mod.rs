@@ -8,7 +8,7 @@ use super::fusion_files::FIXES;
 use super::input::listed;
 use super::logs::LogOptions;
 use super::table::{
-    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, Column, Dictionary, NO_COLUMN, Quantity,
+    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, Column, Dictionary, INSTANCE, NO_COLUMN, Quantity,
     SENSOR_LOGGER, TICKS, TIME, Table, Units, find, is_oxts, unreadable,
 };
 use super::{Failure, Place, help, table};
@@ -115,7 +115,7 @@ const fn gyro(name: &'static str) -> [Quantity; 3] {
 }
 
 /// Quantities of a recording. A packet counter starts again at 0 after 65535.
-static QUANTITIES: [[Quantity; 3]; 9] = [
+static QUANTITIES: [[Quantity; 3]; 10] = [
     [
         time(STAMP, Bare::Unknown, 0),
         time(OF_CLOCK, Bare::Unknown, 1),
@@ -131,6 +131,7 @@ static QUANTITIES: [[Quantity; 3]; 9] = [
         time(TICKS, Bare::Unknown, 3),
         Quantity::number("counter", "packetcounter packet_counter"),
     ],
+    [Quantity::number(INSTANCE, "i"); 3],
     accel("accel.x"),
     accel("accel.y"),
     accel("accel.z"),
@@ -186,6 +187,19 @@ pub(crate) fn load(
     };
     if let Some(column) = table.columns.iter().find(is_unclear) {
         return Err(table.no_unit(column));
+    }
+    if let Some(instance) = table.take(INSTANCE) {
+        let first = instance.values[0];
+        for column in &mut table.columns {
+            let values = column.values.iter_mut().zip(&instance.values);
+            values
+                .filter(|(_, own)| **own != first)
+                .for_each(|(value, _)| *value = f64::NAN);
+        }
+        if table.keep_whole().is_some() {
+            let text = format!("of several IMUs that with {} = {first}", instance.name);
+            table.assumptions.push(text);
+        }
     }
     let name = file_name(path).to_lowercase();
     let is_estimate = name.starts_with("accelerometer.") || name.starts_with("linear");

@@ -209,6 +209,8 @@ fn empty(path: &str) -> Failure {
 /// Columns beside which rates and accelerations are in SI: of ArduPilot and of Sensor Logger.
 const IN_SI: [&str; 3] = ["timeus", "timems", SENSOR_LOGGER];
 pub(crate) const SENSOR_LOGGER: &str = "seconds_elapsed";
+/// Number of the IMU, of several in one file of ArduPilot.
+pub(crate) const INSTANCE: &str = "instance";
 /// Counter of Xsens, in ticks of 0.1 ms where MT Manager writes it, in other units elsewhere.
 pub(crate) const TICKS: &str = "sampletimefine";
 
@@ -267,7 +269,8 @@ impl Table {
         };
         for (place, name) in names.iter().enumerate() {
             let name = name.trim().to_owned();
-            match found(&name).or_else(|| of_sensor(&name)) {
+            let known = found(&name).or_else(|| of_sensor(&name));
+            match known.filter(|(q, _)| is_si || q.name != INSTANCE) {
                 Some((quantity, _)) if unwanted(quantity) => table.ignored.push(name),
                 Some((quantity, factor)) => {
                     let values = Vec::new();
@@ -829,9 +832,11 @@ impl Head {
         let mut is_there = self.has_row || lines.next()?;
         while is_there {
             let line = lines.number;
-            let is_open = |lines: &Lines<'_>| lines.is_open(self.delimiter);
-            while is_open(&lines) && lines.line.len() < LONGEST as usize && lines.more()? {}
-            if is_open(&lines) {
+            let mut is_open = lines.is_open(self.delimiter);
+            while is_open && lines.line.len() < LONGEST as usize && lines.more()? {
+                is_open = lines.is_open(self.delimiter);
+            }
+            if is_open {
                 return Err(Failure::contents(path, line, "a quote is not closed")
                     .or_hint("close it, or remove it"));
             }

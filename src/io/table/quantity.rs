@@ -69,7 +69,7 @@ pub(crate) const LATITUDE: Range = (
 pub(crate) const LONGITUDE: Range = (-180.0, 360.0, "is not a longitude");
 
 /// A quantity that a column may hold.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Quantity {
     pub(crate) name: &'static str,
     /// Names without their unit and axis, between blanks; `stamp*` is all that begins so.
