@@ -141,7 +141,12 @@ fn an_open_quote_is_refused_where_it_stands() {
         let refusal = read(row).unwrap_err().to_string();
         assert_eq!(refusal, "a.csv, line 4: a quote is not closed");
     }
-    for row in ["2,3,5\" pipe", "2,3,\"5\"\" pipe\"", "2,3,\"a,\nb\""] {
+    for row in [
+        "2,3,5\" pipe",
+        "2,3,\"5\"\" pipe\"",
+        "2,3, \"a, b\" ",
+        "2,3,\"a,\nb\"",
+    ] {
         assert_eq!(read(row).unwrap().rows(), 5, "{row}");
     }
 }
