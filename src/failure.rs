@@ -51,7 +51,7 @@ pub(crate) mod help {
     pub(crate) const WRONG_RATE: (&str, &str) = ("rate-hz", "leave --rate-hz out, or correct it");
     pub(crate) const FIX_SIGMA: (&str, &str) = (
         "gnss-sigma",
-        "give them for all fixes with --gnss-sigma POS[:VEL]",
+        "give them for all fixes, such as --gnss-sigma 2,2,4:0.1 (m, m/s)",
     );
 }
 
@@ -202,6 +202,7 @@ impl Failure {
             K::NotFound => "check the path",
             K::UnexpectedEof => "the file is cut off: copy or pack it again",
             K::FileTooLarge => "write what comes through a pipe to a file first",
+            K::Unsupported if e.get_ref().is_some() => "fetch it: git lfs pull",
             K::PermissionDenied | K::ReadOnlyFilesystem => {
                 "change the permissions of the file or its directory, or name another path"
             }
@@ -274,7 +275,10 @@ impl Failure {
     }
 
     /// With further advice for commands that have an option.
-    pub(crate) fn or_option(self, (option, text): (&'static str, &'static str)) -> Self {
+    pub(crate) fn or_option(
+        self,
+        (option, text): (&'static str, impl Into<Cow<'static, str>>),
+    ) -> Self {
         self.or(Some((option, true)), text)
     }
 
@@ -372,7 +376,7 @@ pub(crate) const fn is_damage(kind: ErrorKind) -> bool {
     use ErrorKind as K;
     matches!(
         kind,
-        K::InvalidData | K::InvalidInput | K::UnexpectedEof | K::FileTooLarge
+        K::InvalidData | K::InvalidInput | K::UnexpectedEof | K::FileTooLarge | K::Unsupported
     )
 }
 

@@ -59,7 +59,7 @@ pub(crate) fn at_rate(
     let converted = continuous::at_rate(model, imu_hz);
     let converted = converted.refuse_within(path.display()).map_err(|e| {
         e.hint(format!(
-            "set rate_hz = {from_hz} in the [imu] section of a --scenario file"
+            "a model at {imu_hz} Hz, or rate_hz = {from_hz} in the [imu] section of a --scenario file"
         ))
     })?;
     if !continuous::same_rate(from_hz, imu_hz) {

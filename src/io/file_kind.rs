@@ -1,7 +1,9 @@
 //! What kind of file a path holds, by its ending and its contents.
 
-use super::fusion_files::{bare_row, is_nmea, is_rtklib};
-use super::{Failure, logs, source};
+use super::fusion_files::{FIXES, bare_row, is_nmea, is_rtklib};
+use super::table::{Quantity, quantities};
+use super::trajectory_file::DICTIONARY as TRAJECTORIES;
+use super::{Failure, logs, recordings, source};
 use std::path::Path;
 
 /// The kinds of files that commands read.
@@ -118,23 +120,30 @@ fn bare_kind(text: &str) -> Option<FileKind> {
 }
 
 fn table_kind(text: &str) -> FileKind {
-    let has_any = |line: &str, words: &[&str]| words.iter().any(|word| line.contains(word));
-    let is_position = |line: &str| {
-        has_any(line, &["lat_deg"]) || has_any(line, &["n_m"]) && has_any(line, &["e_m"])
-    };
-    let is_fix = |line: &str| {
-        is_position(line) && has_any(line, &["sd_", "std_", "sigma_"]) && !has_any(line, &["yaw"])
-    };
-    let mut head = text.lines().take(20);
+    let of = |dictionary| quantities(text, dictionary);
+    let (fix, path) = (of(&FIXES), of(&TRAJECTORIES));
+    let has = |all: &[&Quantity], name: &str| all.iter().any(|quantity| quantity.name == name);
+    let is_position = ["lat_deg", "e_m", "qw"].iter().any(|name| has(&path, name));
+    let is_stated = |q: &&Quantity| q.name.starts_with("sd_") || q.name == "week";
+    let is_fix = (is_position || has(&fix, "x_ecef_m")) && fix.iter().any(is_stated);
+    let is_signal = of(&recordings::DICTIONARY)
+        .iter()
+        .any(|q| !q.axis.is_empty());
     if let Some(kind) = bare_kind(text) {
         kind
     } else if is_nmea(text) || is_rtklib(text) {
         FileKind::Gnss
-    } else if head.clone().any(|line| has_any(line, &["tau_samples"])) {
+    } else if text
+        .lines()
+        .take(20)
+        .any(|line| line.contains("tau_samples"))
+    {
         FileKind::Curve
-    } else if head.clone().any(is_fix) {
+    } else if is_signal {
+        FileKind::Recording
+    } else if is_fix && !has(&path, "yaw_deg") {
         FileKind::Gnss
-    } else if head.any(is_position) {
+    } else if is_position {
         FileKind::Trajectory
     } else {
         FileKind::Recording

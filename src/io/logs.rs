@@ -1,6 +1,6 @@
 //! Logs of robots, flight controllers and receivers ([`nav_sim_logs`]), among the files that are read.
 
-use super::{Failure, Place};
+use super::{Failure, Place, source};
 use nav_sim_logs::{Damage, Error, Fault, HEAD, Kind, Log, Stamp, recognise};
 use std::fs::File;
 use std::io::Read;
@@ -32,6 +32,7 @@ pub(crate) fn kind_of(path: &Path) -> Option<Kind> {
 /// # Errors
 /// When it is not of a format that is read, or is damaged before its end.
 pub(crate) fn open(path: &Path) -> Result<Log, Failure> {
+    source::open(path).map_err(|e| Failure::io(path, e))?;
     Log::open(path).map_err(|e| refused(path, e))
 }
 
@@ -42,6 +43,9 @@ pub(crate) fn refused(path: &Path, error: Error) -> Failure {
     match error.fault {
         Fault::Topic => {
             refusal(Place::Within).or_hint("--topic NAME names one (nav-sim inspect lists them)")
+        }
+        Fault::NoTopic => {
+            refusal(Place::Within).or_hint("nav-sim inspect lists what it has: name another file")
         }
         Fault::TimeBack => {
             refusal(Place::Within).or_option(("stamp", "--stamp log takes the times of arrival"))

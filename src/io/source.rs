@@ -4,7 +4,7 @@ use super::Failure;
 use flate2::read::MultiGzDecoder;
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Cursor, ErrorKind, Read};
+use std::io::{self, BufRead, BufReader, Cursor, ErrorKind, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -13,10 +13,13 @@ const LARGEST_TEXT: u64 = 64 << 20;
 /// Largest contents of a pipe or device (bytes).
 const LARGEST_PIPE: u64 = 256 << 20;
 
+/// First bytes of what stands for a large file in a repository that was cloned without it.
+const POINTER: &[u8] = b"version https://git-lfs.github.com/spec/";
+
 /// Opens an input. A pipe gives its bytes once: they are kept, so that it reads, and hashes, the same again.
 ///
 /// # Errors
-/// When the system refuses, or a pipe or device has more than 256 MiB.
+/// When the system refuses, a pipe or device has more than 256 MiB, or a file is a pointer of Git LFS.
 pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
     static KEPT: Mutex<Option<HashMap<PathBuf, Arc<[u8]>>>> = Mutex::new(None);
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
@@ -24,9 +27,21 @@ pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
     if let Some(bytes) = kept.get(path) {
         return Ok(Box::new(Cursor::new(Arc::clone(bytes))));
     }
-    let file = File::open(path)?;
+    let mut file = File::open(path)?;
     let metadata = file.metadata()?;
-    if metadata.is_file() || metadata.is_dir() {
+    if metadata.is_dir() {
+        return Ok(Box::new(file));
+    }
+    if metadata.is_file() {
+        let mut first = Vec::new();
+        file.by_ref()
+            .take(POINTER.len() as u64)
+            .read_to_end(&mut first)?;
+        if first == POINTER {
+            let message = "a Git LFS pointer, not the file itself";
+            return Err(io::Error::new(ErrorKind::Unsupported, message));
+        }
+        file.rewind()?;
         return Ok(Box::new(file));
     }
     let bytes: Arc<[u8]> = bounded(file, LARGEST_PIPE)?.into();

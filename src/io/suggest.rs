@@ -11,6 +11,13 @@ pub(crate) fn nearest<'a>(
         let candidate = candidate.to_lowercase();
         let edits = strsim::osa_distance(&lower, &candidate);
         let longest = lower.chars().count().max(candidate.chars().count());
+        // a part of one letter is an axis or a unit: another letter is another quantity
+        let is_letter = |part: &str| part.chars().count() == 1;
+        let [own, others] = [&lower, &candidate].map(|name| name.split(['_', '.']));
+        let is_other = |(a, b)| a != b && is_letter(a) && is_letter(b);
+        if own.clone().count() == others.clone().count() && own.zip(others).any(is_other) {
+            return None;
+        }
         let begins = lower.len().min(candidate.len()) >= 3
             && (candidate.starts_with(&lower) || lower.starts_with(&candidate));
         (begins || edits <= (longest / 3).max(1) && edits < longest).then_some(edits)
@@ -35,5 +42,8 @@ mod tests {
         assert_eq!(nearest("temperature", keys), None);
         assert_eq!(nearest("x", keys), None);
         assert_eq!(nearest("q", []), None);
+        let names = ["v_d_m_s", "v_n_m_s"];
+        assert_eq!(nearest("v_u_m_s", names), None);
+        assert_eq!(nearest("vn_m_s", names), Some("v_n_m_s"));
     }
 }

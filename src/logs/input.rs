@@ -291,10 +291,32 @@ impl Kind {
     }
 }
 
-const MATLAB: &str = "in MATLAB: writematrix(imu, 'imu.csv')";
+const MATLAB: &str =
+    "in MATLAB: writematrix(imu, 'imu.csv'), and read it with --columns, which names its columns";
+const NOVATEL: Kind = Kind::Other(
+    "a NovAtel log",
+    "fixes to the logs GPGGA, GPRMC and GPGST; counts of the IMU, times its scale factors, to a table t_s, accel_x_m_s2 … \
+     gyro_z_rad_s",
+);
 const HDF5: Kind = Kind::Other("an HDF5 file, as MATLAB 7.3 writes", MATLAB);
 /// First bytes of the formats that have such.
-const MAGIC: [(&[u8], Kind); 10] = [
+const MAGIC: [(&[u8], Kind); 14] = [
+    (b"\xaa\x44\x12", NOVATEL),
+    (b"\xaa\x44\x13", NOVATEL),
+    (
+        b"$IMURAW\0",
+        Kind::Other(
+            "an Inertial Explorer .imr",
+            "in Inertial Explorer: Tools > View Raw IMU Data, and save it as text with a header that names the units",
+        ),
+    ),
+    (
+        b"\xff\x5a",
+        Kind::Other(
+            "an SBG log",
+            "in sbgCenter or with sbgBasicLogger: export it as CSV or text, with the units in its header",
+        ),
+    ),
     (b"\x89MCAP0\r\n", Kind::Mcap),
     (b"#ROSBAG V", Kind::Bag),
     (b"ULog\x01\x12\x35", Kind::Ulog),
@@ -361,6 +383,17 @@ pub fn recognise(head: &[u8]) -> Option<Kind> {
         } else {
             Kind::Other("a zip archive", "unzip FILE.zip")
         });
+    }
+    // ASCII logs of NovAtel: `#BESTPOSA,`, short `%RAWIMUSA,`, abbreviated `<BESTPOS `
+    if let Some(b'#' | b'%' | b'<') = head.first()
+        && let Some(name) = head[1..].split(|b| b", ".contains(b)).next()
+        && name.len() > 4
+        && (name.ends_with(b"A") || head[0] == b'<')
+        && name
+            .iter()
+            .all(|b| b.is_ascii_digit() || b.is_ascii_uppercase())
+    {
+        return Some(NOVATEL);
     }
     // the label of the first line stands in its columns 61 to 80
     if head
@@ -434,8 +467,10 @@ pub enum Fault {
     TimeBack,
     /// Bytes that do not follow the format.
     Damage,
-    /// No topic is the one that is wanted, or several could be.
+    /// No topic is the one that is named, or several could be.
     Topic,
+    /// No topic has what is wanted.
+    NoTopic,
     /// A format that is known by its first bytes, and is not read.
     NotRead(Kind),
 }
@@ -507,7 +542,11 @@ impl Error {
             [] => String::new(),
             _ => format!("; there are {}", topics.join(", ")),
         };
-        Self::new(Fault::Topic, format!("no topic has {what}{there}"))
+        let fault = match topics {
+            [] => Fault::NoTopic,
+            _ => Fault::Topic,
+        };
+        Self::new(fault, format!("no topic has {what}{there}"))
     }
 
     /// Byte at which a file ends that its writer did not end.

@@ -27,6 +27,7 @@ mod export;
 mod file_commands;
 mod fuse;
 mod help_examples;
+mod hints;
 mod laboratory;
 mod logs;
 mod pages;

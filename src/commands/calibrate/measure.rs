@@ -119,7 +119,12 @@ pub(crate) fn measure(
     let rate_hz = report.files[0].rate_hz;
     let beginnings = beginnings(&looks, reading.skip_s, rate_hz);
     shortest(&report, scales, context);
-    let estimators = estimators.estimators(report.files.iter().map(|f| f.samples.len()).sum())?;
+    // a file for each sensor, as phones write them, is no more than one recording of each
+    let of = |channel: &Channel| {
+        let has = |look: &&MeasuredRecording| look.signals.iter().any(|(own, _)| own == channel);
+        looks.iter().filter(has).count()
+    };
+    let estimators = estimators.estimators(Channel::ALL.iter().map(of).max().unwrap_or(0))?;
     let settings = Settings {
         estimators,
         rate_hz,

@@ -84,7 +84,8 @@ impl FuseAnswer {
 
     /// What helps where the solution is overconfident.
     pub(crate) fn advice(&self) -> &'static str {
-        if self.summary.outcome.nis_per_component < 1.0 {
+        let outcome = &self.summary.outcome;
+        if outcome.reference.is_some() && outcome.nis_per_component < 1.0 {
             "axes and clock of the reference may be others than those of the solution"
         } else {
             "check axes (--mounting), units, start (--initial), clocks (--gnss-delay) and antenna (--lever-arm)"

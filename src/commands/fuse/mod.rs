@@ -6,7 +6,7 @@ use crate::app::{
     Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, inputs, refused,
 };
 use crate::commands::run::reduction_of;
-use crate::io::fusion_files::{read_gnss, read_imu, read_initial, read_wheel};
+use crate::io::fusion_files::{WEEK_S, read_gnss, read_imu, read_initial, read_wheel};
 use crate::io::model_file::ModelFile;
 use crate::io::trajectory_file::load_reference;
 use crate::parse::{numbers, pair, positive};
@@ -649,9 +649,14 @@ impl Drive<'_> {
         let given_s = self.request.gnss_delay_s;
         let found = (given_s == 0.0).then(|| rough_origin(&recorded)).flatten();
         let origin_s = found.ok_or_else(|| {
-            let more_s = apart.delay_s();
-            let hint = more_s.map(|s| format!("--gnss-delay={}", given_s + s));
-            Failure::from(apart).or_hint_if(hint)
+            // beginnings may lie any time apart, weeks are counted
+            let weeks_s = apart.delay_s().filter(|s| s % WEEK_S == 0.0);
+            let hint = weeks_s.map(|s| format!("--gnss-delay={}", given_s + s));
+            let clock = || {
+                "bring both to one clock: --gnss-delay S takes S seconds off the times of the fixes"
+                    .into()
+            };
+            Failure::from(apart).or_hint(hint.unwrap_or_else(clock))
         })?;
         self.gnss = earlier(&self.gnss, origin_s);
         Ok(Some(origin_s))

@@ -8,12 +8,12 @@ use super::table::{Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity
 use super::toml_file::Source;
 use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
 use chrono::{DateTime, NaiveDateTime};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use nav_sim_document::{Importance, Note};
 use nav_sim_logs::{Clock, Content, Fix, Stamp, in_seconds};
-use nav_sim_navigation::earth::{MAX_LATITUDE_DEG, geodetic_to_ecef};
+use nav_sim_navigation::earth::{MAX_LATITUDE_DEG, ecef_to_geodetic, geodetic_to_ecef};
 use nav_sim_navigation::ekf::InitialSettings;
-use nav_sim_navigation::frames::{NavState, RollPitchYaw};
+use nav_sim_navigation::frames::{NavState, RollPitchYaw, q_e_n};
 use nav_sim_navigation::fusion::{LONGEST_GAP_S, Start, WheelSpeed, bridged};
 use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
 use nav_sim_navigation::strapdown::MAX_ROTATION;
@@ -70,12 +70,9 @@ fn increasing(
     let Some((k, (from, to))) = steps.find(|(_, (from, to))| to <= from) else {
         return Ok(());
     };
-    let advice = match from - to > 500_000.0 {
-        true => "a new GPS week? Count the seconds on, in both files",
-        false => "sort the rows by time and remove repeated ones",
-    };
     let message = format!("time goes from {from} s to {to} s: it must increase");
-    Err(Failure::contents(path, line(k), message).or_hint(advice))
+    Err(Failure::contents(path, line(k), message)
+        .or_hint("sort the rows by time and remove repeated ones"))
 }
 
 // Recorded GNSS fixes.
@@ -86,34 +83,79 @@ pub(crate) const WEEK_S: f64 = 604_800.0;
 const MAX_SPEED: f64 = 8000.0;
 
 /// Quantities of fixes; a deviation up is one down.
-static FIX_QUANTITIES: [Quantity; 15] = [
-    Quantity::time("t time timestamp tow sow"),
+static FIX_QUANTITIES: [Quantity; 33] = [
+    Quantity::time("t time timestamp tow sow gpstime"),
     Quantity::angle("lat_deg", "lat latitude").within(LATITUDE),
     Quantity::angle("lon_deg", "lon lng longitude").within(LONGITUDE),
-    Quantity::length("h_m", "h height alt altitude"),
+    Quantity::length(
+        "h_m",
+        "h height alt altitude ellip_hgt h_ell ellipsoidal_height",
+    ),
     Quantity::length("sd_n_m", SD_N).positive(),
     Quantity::length("sd_e_m", SD_E).positive(),
     Quantity::length("sd_d_m", SD_D).positive(),
-    Quantity::speed("v_n_m_s", "v_n vn"),
-    Quantity::speed("v_e_m_s", "v_e ve"),
+    Quantity::speed("v_n_m_s", "v_n vn local_vn vnorth v_north"),
+    Quantity::speed("v_e_m_s", "v_e ve local_ve veast v_east"),
     V_D,
-    V_D.reversed("v_u vu"),
-    Quantity::speed("sd_vn_m_s", "sd_vn sd_v_n vel_std_n sdvn").positive(),
-    Quantity::speed("sd_ve_m_s", "sd_ve sd_v_e vel_std_e sdve").positive(),
-    Quantity::speed("sd_vd_m_s", "sd_vd sd_v_d vel_std_d sdvu").positive(),
-    Quantity::number("week", "week gps_week"),
+    V_D.reversed("v_u vu v_up vup local_vu"),
+    Quantity::speed(
+        "sd_vn_m_s",
+        "sd_vn sd_v_n vel_std_n sdvn northvel_std sd_vnorth",
+    )
+    .positive(),
+    Quantity::speed(
+        "sd_ve_m_s",
+        "sd_ve sd_v_e vel_std_e sdve eastvel_std sd_veast",
+    )
+    .positive(),
+    Quantity::speed("sd_vd_m_s", SD_VD).positive(),
+    Quantity::number("week", "week gps_week wnc_w gpstime_week"),
+    Quantity::length("x_ecef_m", "x_ecef ecef_x"),
+    Quantity::length("y_ecef_m", "y_ecef ecef_y"),
+    Quantity::length("z_ecef_m", "z_ecef ecef_z"),
+    Quantity::length("sd_x_m", "sd_x sdx").positive(),
+    Quantity::length("sd_y_m", "sd_y sdy").positive(),
+    Quantity::length("sd_z_m", "sd_z sdz").positive(),
+    Quantity::length("sd_xy_m", "sdxy"),
+    Quantity::length("sd_yz_m", "sdyz"),
+    Quantity::length("sd_zx_m", "sdzx"),
+    Quantity::speed("v_x_m_s", "v_x vx"),
+    Quantity::speed("v_y_m_s", "v_y vy"),
+    Quantity::speed("v_z_m_s", "v_z vz"),
+    Quantity::speed("sd_vx_m_s", "sd_vx sdvx").positive(),
+    Quantity::speed("sd_vy_m_s", "sd_vy sdvy").positive(),
+    Quantity::speed("sd_vz_m_s", "sd_vz sdvz").positive(),
+    Quantity::speed("sd_vxy_m_s", "sdvxy"),
+    Quantity::speed("sd_vyz_m_s", "sdvyz"),
+    Quantity::speed("sd_vzx_m_s", "sdvzx"),
 ];
-const SD_N: &str = "sd_n std_n sigma_n pos_std_n sd_north sd_lat sdn";
-const SD_E: &str = "sd_e std_e sigma_e pos_std_e sd_east sd_lon sde";
-const SD_D: &str = "sd_d std_d sigma_d pos_std_d sd_u std_u sd_h sdu";
+const SD_N: &str = "sd_n std_n sigma_n pos_std_n sd_north sd_lat sdn north_std sdnorth";
+const SD_E: &str = "sd_e std_e sigma_e pos_std_e sd_east sd_lon sde east_std sdeast";
+const SD_D: &str = "sd_d std_d sigma_d pos_std_d sd_u std_u sd_h sdu up_std sdheight";
+const SD_VD: &str = "sd_vd sd_v_d vel_std_d sdvu sd_vu sd_v_u upvel_std sd_vup sd_vh";
 const V_D: Quantity = Quantity::speed("v_d_m_s", "v_d vd");
-const PLACE: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
-const PLACE_SIGMA: [&str; 3] = ["sd_n_m", "sd_e_m", "sd_d_m"];
-const VELOCITY: [&str; 3] = ["v_n_m_s", "v_e_m_s", "v_d_m_s"];
-const VELOCITY_SIGMA: [&str; 3] = ["sd_vn_m_s", "sd_ve_m_s", "sd_vd_m_s"];
+/// Columns of position, its deviations, velocity and those.
+const GEODETIC: [[&str; 3]; 4] = [
+    ["lat_deg", "lon_deg", "h_m"],
+    ["sd_n_m", "sd_e_m", "sd_d_m"],
+    ["v_n_m_s", "v_e_m_s", "v_d_m_s"],
+    ["sd_vn_m_s", "sd_ve_m_s", "sd_vd_m_s"],
+];
+/// The same in axes fixed to the Earth.
+const ECEF: [[&str; 3]; 4] = [
+    ["x_ecef_m", "y_ecef_m", "z_ecef_m"],
+    ["sd_x_m", "sd_y_m", "sd_z_m"],
+    ["v_x_m_s", "v_y_m_s", "v_z_m_s"],
+    ["sd_vx_m_s", "sd_vy_m_s", "sd_vz_m_s"],
+];
+/// Square roots of the covariances between axes, with their signs, of position and velocity.
+const ECEF_COVARIANCE: [[&str; 3]; 2] = [
+    ["sd_xy_m", "sd_yz_m", "sd_zx_m"],
+    ["sd_vxy_m_s", "sd_vyz_m_s", "sd_vzx_m_s"],
+];
 
 /// Dictionary of fixes. Texts without a header are those of KF-GINS.
-const FIXES: Dictionary<'_> = Dictionary {
+pub(super) const FIXES: Dictionary<'_> = Dictionary {
     bare: &[
         "t_s lat_deg lon_deg h_m sd_n_m sd_e_m sd_d_m",
         "t_s lat_deg lon_deg h_m v_n_m_s v_e_m_s v_d_m_s sd_n_m sd_e_m sd_d_m sd_vn_m_s sd_ve_m_s sd_vd_m_s",
@@ -130,6 +172,7 @@ const FIXES: Dictionary<'_> = Dictionary {
 /// Dictionary of solutions, which have numbers that stand for none.
 const SOLUTION: Dictionary<'_> = Dictionary {
     is_partial: true,
+    advice: "let RTKLIB write latitude, longitude and height, or x, y, z (out-solformat = llh or xyz)",
     ..FIXES
 };
 
@@ -147,12 +190,15 @@ fn of_rows(
     mut remarks: Vec<Note>,
 ) -> Result<Fixes, Error> {
     let has = |names: [&str; 3]| names.into_iter().any(|name| table.has(name));
-    let has_velocity = has(VELOCITY) || has(VELOCITY_SIGMA);
-    let own = VELOCITY.into_iter().filter(|_| has_velocity);
-    table.require(["t_s"].into_iter().chain(PLACE).chain(own))?;
+    let is_ecef = has(ECEF[0]);
+    let names = if is_ecef { ECEF } else { GEODETIC };
+    let [place, place_sigma, velocity, velocity_sigma] = names;
+    let has_velocity = has(velocity) || has(velocity_sigma);
+    let own = velocity.into_iter().filter(|_| has_velocity);
+    table.require(["t_s"].into_iter().chain(place).chain(own))?;
     // what is missing in all of a position or velocity may be given for the whole file
     let is_unsaid = has_velocity && unsaid.is_none_or(|sigma| sigma.vel_m_s.is_none());
-    let sigmas = [(PLACE_SIGMA, unsaid.is_none()), (VELOCITY_SIGMA, is_unsaid)];
+    let sigmas = [(place_sigma, unsaid.is_none()), (velocity_sigma, is_unsaid)];
     let sigmas = sigmas
         .into_iter()
         .filter(|(names, is_needed)| *is_needed || has(*names));
@@ -160,10 +206,15 @@ fn of_rows(
     let found = table.require(sigmas.flat_map(|(names, _)| names));
     found.map_err(|e| e.or_option(help::FIX_SIGMA))?;
     let [time] = table.columns(["t_s"])?;
-    let groups = [PLACE, PLACE_SIGMA, VELOCITY, VELOCITY_SIGMA].map(|names| table.all(names));
+    let groups = names.map(|names| table.all(names));
+    let covariances = ECEF_COVARIANCE.map(|names| table.all(names));
     let fix = |row: usize| {
         let weeks = table.get("week").map_or(0.0, |week| week.si(row));
-        let stated = groups.map(|columns| Some(columns?.map(|column| column.si(row)).into()));
+        let three = |columns: Option<[&Column; 3]>| Some(columns?.map(|c| c.si(row)).into());
+        let mut stated = groups.map(three);
+        if is_ecef {
+            stated = in_geodetic(stated, covariances.map(three));
+        }
         (table.line(row), time.si(row) + weeks * WEEK_S, stated)
     };
     if !table.ignored.is_empty() {
@@ -171,7 +222,53 @@ fn of_rows(
         remarks.push(remark(text));
     }
     remarks.extend(table.assumptions.iter().map(remark));
+    remarks.extend(table.warnings.iter().map(doubt));
     Ok(((0..table.rows()).map(fix).collect(), remarks))
+}
+
+/// What a fix states in axes fixed to the Earth, as latitude, longitude, height and in the axes north, east, down.
+/// `covariances` are the signed roots of those between x and y, y and z, z and x, 0 where they are not stated.
+fn in_geodetic(
+    [place, sigma, velocity, velocity_sigma]: [Option<DVec3>; 4],
+    covariances: [Option<DVec3>; 2],
+) -> [Option<DVec3>; 4] {
+    let (lat, lon, h) = place.map_or((f64::NAN, f64::NAN, f64::NAN), ecef_to_geodetic);
+    let to_n = DMat3::from_quat(q_e_n(lat, lon));
+    let rotated = |(sigma, roots): (Option<DVec3>, Option<DVec3>)| {
+        let variance = sigma? * sigma?;
+        let roots = roots.filter(|roots| roots.is_finite()).unwrap_or_default();
+        let [xy, yz, zx] = (roots * roots.abs()).to_array();
+        let covariance = DMat3::from_cols(
+            DVec3::new(variance.x, xy, zx),
+            DVec3::new(xy, variance.y, yz),
+            DVec3::new(zx, yz, variance.z),
+        );
+        let of_n = to_n * covariance * to_n.transpose();
+        Some(DVec3::from([0, 1, 2].map(|k| of_n.col(k)[k].sqrt())))
+    };
+    let [of_place, of_velocity] = covariances;
+    [
+        place.map(|_| DVec3::new(lat, lon, h)),
+        rotated((sigma, of_place)),
+        velocity.map(|v| to_n * v),
+        rotated((velocity_sigma, of_velocity)),
+    ]
+}
+
+/// Brings fixes in seconds since GPS weeks are counted to the clock of the IMU, which begins and ends at `imu_s`, or to the
+/// seconds of their week; the name of that clock.
+fn to_clock_of_imu(fixes: &mut [Stated], imu_s: Option<(f64, f64)>) -> String {
+    let ends = fixes.first().zip(fixes.last());
+    let (first_s, last_s) = ends.map_or((0.0, 0.0), |(first, last)| (first.1, last.1));
+    let gps_s = gps_origin_s(first_s + GPS_EPOCH_S as f64);
+    let span_s = (first_s + gps_s, last_s + gps_s);
+    let [.., of_week] = clocks(span_s.0);
+    let clock = clock(span_s, imu_s).unwrap_or(of_week);
+    for (_, t_s, _) in fixes {
+        // the difference of two numbers of 1e9 keeps 0.2 µs
+        *t_s = (1e6 * (*t_s + gps_s - clock.origin_s)).round() / 1e6;
+    }
+    clock.name
 }
 
 /// The fix that is stated; `unsaid` are the standard deviations where it states none.
@@ -246,18 +343,27 @@ pub(crate) fn read_gnss(
             if is_nmea(&text) {
                 nmea::fixes(&shown, &text, unsaid, clock_s)?
             } else if let Some(header) = rtklib_header(&text) {
-                let (table, said) = rtklib(&shown, &text, header, clock_s)?;
-                of_rows(&table, unsaid, vec![remark(said)])?
+                let table = rtklib(&shown, &text, header)?;
+                let (mut fixes, mut remarks) = of_rows(&table, unsaid, Vec::new())?;
+                let name = to_clock_of_imu(&mut fixes, clock_s);
+                remarks.push(remark(format!("an RTKLIB solution, in {name}")));
+                (fixes, remarks)
             } else {
                 let table = table::parse(&shown, &text, &FIXES)?;
-                let velocity = match table.has(VELOCITY[0]) {
+                let velocity = match table.has(GEODETIC[2][0]) {
                     true => ", velocity",
                     false => "",
                 };
                 let text = "no header: read as KF-GINS text, position";
                 let text = format!("{text}{velocity} and standard deviations");
                 let remarks = table.is_bare.then(|| remark(text));
-                of_rows(&table, unsaid, remarks.into_iter().collect())?
+                let (mut fixes, mut remarks) =
+                    of_rows(&table, unsaid, remarks.into_iter().collect())?;
+                if table.has("week") {
+                    let name = to_clock_of_imu(&mut fixes, clock_s);
+                    remarks.push(remark(format!("times are {name}")));
+                }
+                (fixes, remarks)
             }
         }
     };
@@ -339,6 +445,7 @@ fn of_log(path: &Path, topic: Option<&str>, imu_s: Option<(f64, f64)>) -> Result
 #[cfg(test)]
 mod fix_tests {
     use super::*;
+    use glam::DVec2;
 
     #[test]
     fn a_quantity_in_two_columns_is_refused() {
@@ -353,6 +460,34 @@ mod fix_tests {
             "{e}"
         );
         assert_eq!(e.advice().unwrap(), "remove one of them");
+    }
+
+    /// Text of Inertial Explorer: units in a line of their own, week and second, velocities up. The IMU ran in seconds of the
+    /// week, of which 462797.3 is there.
+    #[test]
+    fn names_and_units_in_two_lines_are_read() {
+        let rows = "\
+  GPSTime   GPSTime   Latitude  Longitude Ellip-Hgt Local-VE Local-VN Local-VU East-Std North-Std Up-Std EastVel-Std NorthVel-Std UpVel-Std
+     week       (s)      (deg)      (deg)       (m)    (m/s)    (m/s)    (m/s)      (m)       (m)    (m)       (m/s)        (m/s)     (m/s)
+     2209 462797.30      30.53    114.356      18.0     1.92     1.11     0.01     0.01     0.012  0.037       0.037        0.043     0.103
+";
+        let file = tempfile::NamedTempFile::with_suffix(".posT").unwrap();
+        std::fs::write(file.path(), rows).unwrap();
+        let (fixes, notes) =
+            read_gnss(file.path(), None, Some((462_000.0, 463_000.0)), None).unwrap();
+        let fix = &fixes[0];
+        assert_eq!((fix.t_s, fix.h), (462_797.3, 18.0));
+        assert!((fix.lat - 30.53 * DEG).abs() < 1e-15);
+        assert_eq!(fix.pos_sigma_n, DVec3::new(0.012, 0.01, 0.037));
+        let velocity = fix.velocity.unwrap();
+        assert_eq!(velocity.horizontal, DVec2::new(1.11, 1.92));
+        assert_eq!(velocity.down, Some((-0.01, 0.103)));
+        assert_eq!(velocity.horizontal_sigma, DVec2::new(0.043, 0.037));
+        assert!(
+            notes
+                .iter()
+                .any(|n| n.text.ends_with("seconds of GPS week 2209"))
+        );
     }
 
     /// The sums are those of the independent writer of the file (`src/logs/tests/data/expected.csv`), in degrees and metres.
@@ -394,7 +529,8 @@ fn rtklib_header(text: &str) -> Option<(usize, &str)> {
         .lines()
         .enumerate()
         .take_while(|(_, l)| l.starts_with('%') || l.trim().is_empty());
-    comments.filter(|(_, l)| l.contains("sdn(m)")).last()
+    let is_header = |l: &str| l.contains("sdn(m)") || l.contains("sdx(m)");
+    comments.filter(|(_, l)| is_header(l)).last()
 }
 
 /// Clock that an IMU may run in.
@@ -435,73 +571,83 @@ fn clock(span_s: (f64, f64), imu_s: Option<(f64, f64)>) -> Option<ClockOfImu> {
         .find(|clock| first_s <= span_s.1 - clock.origin_s && span_s.0 - clock.origin_s <= last_s)
 }
 
-/// The fixes of a solution, in the clock of the IMU, which begins and ends at `imu_s`, else in seconds of the GPS week.
-fn rtklib(
-    path: &str,
-    text: &str,
-    (at, names): (usize, &str),
-    imu_s: Option<(f64, f64)>,
-) -> Result<(Table, String), Error> {
+/// Clocks that a solution may be in, and how far they are ahead of UTC (s); GPS time is by its leap seconds.
+const ZONES: [(&str, Option<f64>); 3] =
+    [("GPST", None), ("UTC", Some(0.0)), ("JST", Some(32_400.0))];
+
+/// The rows of a solution, their times in seconds since GPS weeks are counted.
+fn rtklib(path: &str, text: &str, (at, names): (usize, &str)) -> Result<Table, Error> {
     let refuse = |line: usize, message: &str, advice: &'static str| {
         Error::contents(path, line + 1, message).or_hint(advice)
     };
-    if !names.contains("GPST") {
-        let advice = "write the solution in GPS time, as the IMU's clock is";
-        return Err(refuse(at, "times that are not GPST", advice));
-    }
+    let Some((_, ahead_s)) = ZONES.iter().find(|(zone, _)| names.contains(zone)) else {
+        let advice = "write the solution in GPS time (out-timesys = gpst)";
+        return Err(refuse(at, "times that are not GPST, UTC or JST", advice));
+    };
+    // angles in degrees, minutes and seconds take three columns each
+    let is_dms = names.contains("d'\"");
     // the time, which takes two columns, in one
     let (mut whole, mut count) = (String::new(), 0);
     for (i, line) in text.lines().enumerate() {
-        let cells = line.split([' ', ',', '\t', '%']);
+        let cells = line.split([' ', ',', ';', '\t', '%']);
         let cells: Vec<&str> = cells.filter(|cell| !cell.is_empty()).collect();
         let is_row = !(line.starts_with('%') || cells.is_empty());
         match cells[..] {
             [_, ref names @ ..] if i == at => {
                 count = names.len();
-                whole += &format!("t_s {}", names.join(" "));
+                whole += &format!("t_s {}", names.join(" ")).replace("d'\"", "deg");
             }
             [first, second, ref rest @ ..] if is_row => {
-                let t_s = gps_time_s(first, second).ok_or_else(|| {
+                let angles = [rest.get(..3), rest.get(3..6)].map(|dms| dms.and_then(degrees));
+                let angles = is_dms.then_some(angles).and_then(|[lat, lon]| lat.zip(lon));
+                let row = gps_time_s(first, second, *ahead_s).map(|t_s| match angles {
+                    Some((lat, lon)) => format!("{t_s} {lat} {lon} {}", rest[6..].join(" ")),
+                    None => format!("{t_s} {}", rest[..count.min(rest.len())].join(" ")),
+                });
+                whole += &row.ok_or_else(|| {
                     let message = "not a row of time, position, quality, satellites and standard deviations";
                     let advice = "2021/03/01 00:00:01.000 (or 2147 86401.000), latitude, longitude, height, Q, ns, sdn, sde, sdu";
                     refuse(i, message, advice)
                 })?;
-                whole += &format!("{t_s} {}", rest[..count.min(rest.len())].join(" "));
             }
             _ => {}
         }
         whole.push('\n');
     }
     let mut table = table::parse(path, &whole, &SOLUTION)?;
-    let Some(time) = table.columns.iter_mut().find(|c| c.quantity.name == "t_s") else {
-        return Err(table.refused("no time"));
-    };
-    let t_s = &mut time.values;
-    let span = t_s.first().copied().zip(t_s.last().copied());
-    let (first_s, last_s) = span.unwrap_or_default();
-    let gps_s = gps_origin_s(first_s + GPS_EPOCH_S as f64);
-    let span_s = (first_s + gps_s, last_s + gps_s);
-    let [.., of_week] = clocks(span_s.0);
-    let clock = clock(span_s, imu_s).unwrap_or(of_week);
-    // the difference of two numbers of 1e9 keeps 0.2 µs
-    let on_clock = |t_s: f64| (1e6 * (t_s + gps_s - clock.origin_s)).round() / 1e6;
-    t_s.iter_mut().for_each(|t_s| *t_s = on_clock(*t_s));
     table.ignored.clear();
-    Ok((table, format!("an RTKLIB solution, in {}", clock.name)))
+    Ok(table)
 }
 
-/// Seconds since GPS weeks are counted, of a date and a time of day or of a week and its second.
-fn gps_time_s(first: &str, second: &str) -> Option<f64> {
-    if !first.contains('/') {
-        return Some(
-            first.parse::<u32>().map(f64::from).ok()? * WEEK_S + second.parse::<f64>().ok()?,
-        );
-    }
-    let time =
-        NaiveDateTime::parse_from_str(&format!("{first} {second}"), "%Y/%m/%d %H:%M:%S%.f").ok()?;
-    // GPST has no leap seconds, and neither has this count
-    let since = time.and_utc() - DateTime::from_timestamp(GPS_EPOCH_S, 0)?;
-    Some(since.num_seconds() as f64 + 1e-9 * f64::from(since.subsec_nanos()))
+/// An angle of degrees, minutes and seconds.
+fn degrees(dms: &[&str]) -> Option<f64> {
+    let sixtieths = dms.iter().rev().try_fold(0.0, |below, part| {
+        Some(below / 60.0 + part.trim_start_matches('-').parse::<f64>().ok()?)
+    })?;
+    Some(if dms[0].starts_with('-') {
+        -sixtieths
+    } else {
+        sixtieths
+    })
+}
+
+/// Seconds since GPS weeks are counted, of a date and a time of day or of a week and its second, in GPS time or so far ahead of
+/// UTC (s).
+fn gps_time_s(first: &str, second: &str, ahead_s: Option<f64>) -> Option<f64> {
+    let t_s = if first.contains('/') {
+        let text = format!("{first} {second}");
+        let time = NaiveDateTime::parse_from_str(&text, "%Y/%m/%d %H:%M:%S%.f").ok()?;
+        // GPST has no leap seconds, and neither has this count
+        let since = time.and_utc() - DateTime::from_timestamp(GPS_EPOCH_S, 0)?;
+        since.num_seconds() as f64 + 1e-9 * f64::from(since.subsec_nanos())
+    } else {
+        first.parse::<u32>().map(f64::from).ok()? * WEEK_S + second.parse::<f64>().ok()?
+    };
+    let Some(ahead_s) = ahead_s else {
+        return Some(t_s);
+    };
+    let unix_s = t_s - ahead_s + GPS_EPOCH_S as f64;
+    Some(unix_s - gps_origin_s(unix_s))
 }
 
 #[cfg(test)]
@@ -510,15 +656,71 @@ mod rtklib_tests {
 
     const HEAD: &str = "% program : RTKLIB\n%  GPST  latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m)\n";
 
+    fn fixes(text: &str, imu_s: Option<(f64, f64)>) -> Result<(Vec<GnssFix>, Vec<Note>), Error> {
+        let file = tempfile::NamedTempFile::with_suffix(".pos").unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        read_gnss(file.path(), None, imu_s, None)
+    }
+
     fn read(text: &str, imu_s: Option<(f64, f64)>) -> Result<(Vec<f64>, String), Error> {
-        let header = rtklib_header(text).unwrap();
-        let (table, said) = rtklib("a.pos", text, header, imu_s)?;
-        assert_eq!(
-            (table.line(0), table.get("sd_d_m").unwrap().si(0)),
-            (3, 4.0)
+        let (fixes, notes) = fixes(text, imu_s)?;
+        assert_eq!(fixes[0].pos_sigma_n.z, 4.0);
+        let said = notes[0].text.split(": ").nth(1).unwrap_or_default();
+        Ok((fixes.iter().map(|fix| fix.t_s).collect(), said.to_owned()))
+    }
+
+    /// The other output settings of RTKLIB state the same track. Deviations along the axes of the Earth turn by the rotation
+    /// from them to north, east, down: at latitude 0 and longitude 45° north is z, east (y − x)/√2 and down −(x + y)/√2, so
+    /// that variances of 1, 4 and 9 m² with 2 m² between x and y are 9 north, (1 + 4)/2 − 2 east and (1 + 4)/2 + 2 down.
+    #[test]
+    fn other_formats_state_the_same_fixes() {
+        let row = |time: &str, place: &str| format!("{time} {place} 5 8 2.0 2.1 4.0\n");
+        let llh = format!(
+            "{HEAD}{}",
+            row("2021/03/01 00:00:01.250", "46.5 -6.50001 400.8")
         );
-        let t_s = table.get("t_s").unwrap().values.clone();
-        Ok((t_s, said))
+        let dms = HEAD.replace("(deg)", "(d'\")");
+        let dms = format!(
+            "{dms}{}",
+            row("2021/03/01 00:00:01.250", "46 30 00.0 -6 30 00.036 400.8")
+        );
+        let utc = HEAD.replace("GPST", "UTC");
+        let utc = format!(
+            "{utc}{}",
+            row("2021/03/01 00:00:01.250", "46.5 -6.50001 400.8")
+                .replace("00:00:01", "23:59:43")
+                .replace("03/01", "02/28")
+        );
+        let jst = HEAD.replace("GPST", "JST");
+        let jst = format!(
+            "{jst}{}",
+            row("2021/03/01 08:59:43.250", "46.5 -6.50001 400.8")
+        );
+        let expected = fixes(&llh, None).unwrap().0[0];
+        assert_eq!(expected.t_s, 86_401.25);
+        for text in [dms, utc, jst] {
+            let fix = fixes(&text, None).unwrap().0[0];
+            assert_eq!(fix.t_s, expected.t_s, "{text}");
+            assert!(
+                (fix.lat - expected.lat).abs() < 1e-15 && (fix.lon - expected.lon).abs() < 1e-15
+            );
+        }
+        let ecef = "% GPST x-ecef(m) y-ecef(m) z-ecef(m) Q ns sdx(m) sdy(m) sdz(m) sdxy(m) sdyz(m) sdzx(m) vx(m/s) vy(m/s) vz(m/s) sdvx sdvy sdvz\n\
+                    2021/03/01 00:00:01.250 4510094.634714941 4510094.634714941 0 5 8 1 2 3 1.4142135623730951 0 0 1 2 3 0.1 0.2 0.3\n";
+        let fix = fixes(ecef, None).unwrap().0[0];
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} {b}");
+        near(fix.lat, 0.0);
+        near(fix.lon, 45.0 * DEG);
+        near(fix.h, 100.0);
+        let sigma = fix.pos_sigma_n;
+        near(sigma.x, 3.0);
+        near(sigma.y, 0.5_f64.sqrt());
+        near(sigma.z, 4.5_f64.sqrt());
+        let velocity = fix.velocity.unwrap();
+        near(velocity.horizontal.x, 3.0);
+        near(velocity.horizontal.y, 0.5_f64.sqrt());
+        near(velocity.down.unwrap().0, -4.5_f64.sqrt());
+        near(velocity.down.unwrap().1, 0.025_f64.sqrt());
     }
 
     /// 2021-03-01 was a Monday, the second day of GPS week 2147.
@@ -592,11 +794,8 @@ mod rtklib_tests {
     fn what_is_not_such_a_row_is_refused_with_its_line() {
         let error = |text: &str| read(text, None).unwrap_err().to_string();
         let short = format!("{HEAD}2021/03/01 46.5 6.5\n");
-        assert!(error(&short).starts_with("a.pos, line 3: not a row of time, position"));
-        assert!(
-            error(&HEAD.replace("GPST", "UTC"))
-                .starts_with("a.pos, line 2: times that are not GPST")
-        );
+        assert!(error(&short).contains(", line 3: not a row of time, position"));
+        assert!(error(&HEAD.replace("GPST", "TAI")).contains(", line 2: times that are not GPST"));
     }
 }
 

@@ -42,7 +42,11 @@ struct Log {
 
 /// Whether a text is such a log: one of its first lines has a sentence of a receiver in it.
 pub(crate) fn is_nmea(text: &str) -> bool {
-    let is_address = |word: &str| word.len() == 5 && word.bytes().all(|b| b.is_ascii_uppercase());
+    // those of VectorNav are of an IMU
+    let is_address = |word: &str| {
+        let is_upper = word.bytes().all(|b| b.is_ascii_uppercase());
+        word.len() == 5 && is_upper && !word.starts_with("VN")
+    };
     let mut lines = text.lines().take(20).map(str::trim_end);
     lines.any(|line| body(line).is_ok_and(|body| body.split(',').next().is_some_and(is_address)))
 }

@@ -4,11 +4,12 @@
 //! what was assumed, is told in the [`Report`]. What cannot be right is refused with file and line
 //! ([`Failure`]).
 
+use super::fusion_files::FIXES;
 use super::input::listed;
 use super::logs::LogOptions;
 use super::table::{
-    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, Column, Dictionary, NO_COLUMN, Quantity, TIME, Table,
-    Units, is_oxts, unreadable,
+    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, Column, Dictionary, INSTANCE, NO_COLUMN, Quantity,
+    SENSOR_LOGGER, TICKS, TIME, Table, Units, find, is_oxts, unreadable,
 };
 use super::{Failure, Place, help, table};
 use crate::report::six_digits;
@@ -70,7 +71,8 @@ const GYRO_SI: &str = "angular_velocity field_angular_velocity w_rs_s omega";
 const INCREMENT: Units = &[("m_s", 1.0), ("mps", 1.0)];
 /// Time of measurement, preferred to the time of arrival beside it.
 pub(crate) const STAMP: &str = "field_header_stamp header_stamp stamp";
-pub(crate) const OF_CLOCK: &str = "t time timestamp time_stamp elapsed elapsed_time epoch";
+pub(crate) const OF_CLOCK: &str =
+    "t time timestamp time_stamp elapsed elapsed_time epoch time_since_start time_since_start_in";
 /// Time of a receiver, of the week or not: the last to be taken, because it may be that of its last fix.
 pub(crate) const OF_RECEIVER: &str = "tow gps_tow gpstow time_of_week gps_time_of_week sow gps_sow seconds_of_week second_of_week gps_seconds_of_week gps_seconds gps_time gpstime gps_timestamp";
 
@@ -115,7 +117,7 @@ const fn gyro(name: &'static str) -> [Quantity; 3] {
 }
 
 /// Quantities of a recording. A packet counter starts again at 0 after 65535.
-static QUANTITIES: [[Quantity; 3]; 8] = [
+static QUANTITIES: [[Quantity; 3]; 10] = [
     [
         time(STAMP, Bare::Unknown, 0),
         time(OF_CLOCK, Bare::Unknown, 1),
@@ -124,8 +126,14 @@ static QUANTITIES: [[Quantity; 3]; 8] = [
     [
         time("timeus", Bare::Is(1e-6), 1),
         time("timems itow", Bare::Is(1e-3), 1),
+        time(SENSOR_LOGGER, Bare::Is(1.0), 1),
+    ],
+    [
+        time("timestamp*", Bare::Not, 1),
+        time(TICKS, Bare::Unknown, 3),
         Quantity::number("counter", "packetcounter packet_counter"),
     ],
+    [Quantity::number(INSTANCE, "i"); 3],
     accel("accel.x"),
     accel("accel.y"),
     accel("accel.z"),
@@ -177,9 +185,40 @@ pub(crate) fn load(
     let mut table = table::read(path, dictionary)?;
     let is_wanted = |channel| wanted.is_none_or(|wanted| wanted.contains(&channel));
     table.warnings.extend(facts::misspelt(&table, is_wanted));
-    let is_gyro = |c: &&Column| c.factor.is_none() && c.quantity.name.starts_with("gyro");
-    if let Some(column) = table.columns.iter().find(is_gyro) {
+    let is_unclear = |c: &&Column| {
+        let is_ticks = || c.quantity.stems == TICKS && options.rate_hz.is_none();
+        c.factor.is_none() && (c.quantity.name.starts_with("gyro") || is_ticks())
+    };
+    if let Some(column) = table.columns.iter().find(is_unclear) {
         return Err(table.no_unit(column));
+    }
+    if let Some(instance) = table.take(INSTANCE) {
+        let first = instance.values[0];
+        for column in &mut table.columns {
+            let values = column.values.iter_mut().zip(&instance.values);
+            values
+                .filter(|(_, own)| **own != first)
+                .for_each(|(value, _)| *value = f64::NAN);
+        }
+        if table.keep_whole().is_some() {
+            let text = format!("of several IMUs that with {} = {first}", instance.name);
+            table.assumptions.push(text);
+        }
+    }
+    let name = file_name(path).to_lowercase();
+    let is_estimate = name.starts_with("accelerometer.") || name.starts_with("linear");
+    if is_estimate
+        && table
+            .get("t_s")
+            .is_some_and(|t| t.quantity.stems == SENSOR_LOGGER)
+    {
+        let text = "has accelerations without gravity, as the phone estimates them; TotalAcceleration.csv has those measured";
+        if path.with_file_name("TotalAcceleration.csv").exists() {
+            return Err(Failure::contents(&table.path, Place::Itself, text)
+                .or_hint("name TotalAcceleration.csv")
+                .passing_over("it is without gravity"));
+        }
+        table.warnings.push(text.to_owned());
     }
     if table.columns.iter().all(|c| c.quantity.axis.is_empty()) {
         let known = table.columns.iter().map(|c| &c.name);
@@ -188,6 +227,15 @@ pub(crate) fn load(
             .take(20)
             .map(|name| format!("\"{}\"", table::shown(name, 40)))
             .collect();
+        let is_place =
+            |name: &String| find(FIXES.quantities, name).is_some_and(|(q, _)| q.name == "lat_deg");
+        if table.ignored.iter().any(is_place) {
+            let message = "is a table of positions, no recording of an IMU";
+            let refusal = Failure::contents(&table.path, Place::Itself, message);
+            return Err(refusal.passing_over(NO_COLUMN).or_hint(
+                "name a file with accelerometers or gyroscopes; fuse takes positions as its second file",
+            ));
+        }
         let message = format!(
             "no accelerometer or gyroscope column among {}",
             names.join(", ")
@@ -206,7 +254,6 @@ fn too_short(path: &str, samples: usize, needed: usize) -> Failure {
     let message = format!("{samples} samples, but {needed} are needed");
     Failure::contents(path, Place::Within, message)
         .or_hint("record for longer, or ask for fewer scales")
-        .or_option(("skip-s", "a smaller --skip-s"))
 }
 
 /// Reads recordings; those of a directory in name order (numbers in names by value). All are held.
@@ -232,7 +279,7 @@ pub(crate) fn visit<T: Send>(
     tell: &dyn Fn(usize, usize),
 ) -> Result<(Vec<T>, Report), Failure> {
     let files = expand(paths)?;
-    let (mut looks, mut report) = (Vec::new(), Report::default());
+    let (mut looks, mut report, mut passed_over) = (Vec::new(), Report::default(), None);
     tell(0, files.len());
     let mut done = 0;
     for some in files.chunks(AT_ONCE) {
@@ -247,6 +294,7 @@ pub(crate) fn visit<T: Send>(
                     let (path, why) = (path.display(), e.passed_over().unwrap_or_default());
                     let text = format!("{path}: passed over, {why}");
                     report.warnings.push(text);
+                    passed_over = passed_over.or(Some(e));
                 }
                 outcome => {
                     let (of_file, held) = outcome?;
@@ -261,11 +309,8 @@ pub(crate) fn visit<T: Send>(
     same_rate(&report.files)?;
     report.warnings.extend(facts::compare(&report.files)?);
     if looks.is_empty() {
-        let path = paths
-            .first()
-            .map(|p| p.display().to_string())
-            .unwrap_or_default();
-        return Err(no_files(path));
+        let path = paths.first().map(|p| p.display().to_string());
+        return Err(passed_over.unwrap_or_else(|| no_files(path.unwrap_or_default())));
     }
     Ok((looks, report))
 }
@@ -619,7 +664,11 @@ fn pieces(
     let longest = all().map(|p| p.len()).max().unwrap_or(0);
     let needed = options.min_samples.max(2);
     if longest < needed {
-        return Err(too_short(path, longest, needed));
+        let refusal = too_short(path, longest, needed);
+        return Err(match skip > 0 {
+            true => refusal.or_option(("skip-s", "a smaller --skip-s")),
+            false => refusal,
+        });
     }
     // A short one would cost all others their long scales.
     let needed = needed.max(longest / LONGEST_OVER_SHORTEST);

@@ -300,7 +300,7 @@ fn bad_cells_are_named() {
     );
     let (message, hint) = refusal_with(
         "a.csv",
-        "t_s\tgyro_x_rad_s\n0,00\t1\n",
+        "t_s,gyro_x_rad_s\n\"0,00\",1\n",
         &ReadOptions::default(),
     );
     assert_eq!(
@@ -318,7 +318,11 @@ fn headers_that_do_not_help() {
     );
     assert_eq!(
         refusal("time,lat_deg\n0,1\n"),
-        "a.csv, line 1: no accelerometer or gyroscope column among \"time\", \"lat_deg\""
+        "a.csv is a table of positions, no recording of an IMU"
+    );
+    assert_eq!(
+        refusal("time,ticks\n0,1\n"),
+        "a.csv, line 1: no accelerometer or gyroscope column among \"time\", \"ticks\""
     );
     assert_eq!(
         refusal("t_s,gx,gy\n0,1,2\n"),

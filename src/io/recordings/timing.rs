@@ -1,7 +1,7 @@
 //! Sample rate, unit of time, gaps and duplicates, from the time column or the packet counter.
 
 use super::{FileReport, Gaps, ReadOptions, too_short};
-use crate::io::table::{Column, Table};
+use crate::io::table::{Column, TICKS, Table};
 use crate::io::{Failure, Place, help};
 use crate::report::six_digits;
 
@@ -29,6 +29,8 @@ pub(super) fn timing(
         return wrong_rate(format!("{rate_hz} Hz is not a sample rate"));
     }
     let known = options.rate_hz.map(|rate_hz| (rate_hz, "given"));
+    let is_rate_known = known.or(raw.rate_hz).is_some();
+    let time = time.filter(|t| !(is_rate_known && t.quantity.stems == TICKS));
     let clock = match (time, known.or(raw.rate_hz)) {
         (Some(time), _) => {
             let mut clock = Clock::new(time, options.gaps, "time column".to_owned());
@@ -167,8 +169,9 @@ impl Clock {
             let error = refused(format!(
                 "column \"{name}\" does not advance: its median step is 0"
             ));
+            let ignore = "take the samples as evenly spaced: --gaps ignore";
             return Err(match *end > 0.0 {
-                true => error.or_option(help::GAPS).or_without(help::GAPS_ELSEWHERE),
+                true => error.or_option(("gaps", ignore)),
                 false => error,
             });
         }

@@ -2,6 +2,7 @@
 //!
 //! A reader is `read(path, &DICTIONARY)`: columns with a factor to SI and the line of each row.
 
+use super::recordings::timing::median_step;
 use super::suggest::nearest;
 use super::{Failure, Place, help, logs, source};
 use crate::failure::is_damage;
@@ -116,6 +117,7 @@ pub(crate) fn read(path: &Path, dictionary: &Dictionary<'_>) -> Result<Table, Fa
     };
     let name = path.display().to_string();
     let of = |columns| of_columns(&name, columns, dictionary);
+    source::open(path).map_err(|e| unreadable(path, e))?;
     let table = match logs::kind_of(path) {
         #[cfg(feature = "npz")]
         Some(LogKind::Npz) => {
@@ -159,9 +161,19 @@ pub(crate) fn parse(name: &str, text: &str, dictionary: &Dictionary<'_>) -> Resu
     read_text(name, reader, dictionary)?.filled()
 }
 
+/// Quantities of a dictionary that the header of a text names.
+pub(crate) fn quantities(text: &str, dictionary: &Dictionary<'_>) -> Vec<&'static Quantity> {
+    let reader = Box::new(Cursor::new(text.to_owned()));
+    let head = Head::read(&mut Lines::new("", reader), dictionary);
+    let names = head.map(|head| head.names).unwrap_or_default();
+    let known = names.iter().map(|name| find(dictionary.quantities, name));
+    known.flatten().map(|(quantity, _)| quantity).collect()
+}
+
 /// Error of the system on a table, with a hint.
 pub(crate) fn unreadable(path: &Path, e: std::io::Error) -> Failure {
-    let is_cut = is_damage(e.kind()) && e.kind() != std::io::ErrorKind::FileTooLarge;
+    use std::io::ErrorKind as K;
+    let is_cut = is_damage(e.kind()) && !matches!(e.kind(), K::FileTooLarge | K::Unsupported);
     let failure = Failure::io(path, e);
     match is_cut {
         true => failure.hint(
@@ -194,9 +206,37 @@ fn empty(path: &str) -> Failure {
     Failure::contents(path, Place::Within, "no rows in it").passing_over(IS_EMPTY)
 }
 
+/// Columns beside which rates and accelerations are in SI: of ArduPilot and of Sensor Logger.
+const IN_SI: [&str; 3] = ["timeus", "timems", SENSOR_LOGGER];
+pub(crate) const SENSOR_LOGGER: &str = "seconds_elapsed";
+/// Number of the IMU, of several in one file of ArduPilot.
+pub(crate) const INSTANCE: &str = "instance";
+/// Counter of Xsens, in ticks of 0.1 ms where MT Manager writes it, in other units elsewhere.
+pub(crate) const TICKS: &str = "sampletimefine";
+
+/// The sensor that a file is named after, as those of phones are.
+fn sensor_of(path: &str) -> Option<&'static str> {
+    let name = Path::new(path).file_name()?.to_str()?.to_lowercase();
+    let sensors = [("gyr", "gyro"), ("acc", "accel")];
+    let found = sensors.iter().find(|(part, _)| name.contains(part));
+    found.map(|(_, sensor)| *sensor)
+}
+
 /// Beyond this a number is no measurement, and its square may be no number.
 const LARGEST: f64 = 1e100;
 const BEYOND: &str = "is beyond 1e100, no measurement";
+/// Numbers at which counters of time start again: of 16 and 32 bits, the latter also of microseconds and milliseconds told in
+/// seconds, and of the GPS week (s, ms).
+const TURNS: [f64; 6] = [
+    65_536.0,
+    4_294_967_296.0,
+    4_294.967_296,
+    4_294_967.296,
+    604_800.0,
+    604_800_000.0,
+];
+/// Steps that may be missing where one does.
+const MOST_MISSED: f64 = 100.0;
 /// Rows from one look at the memory to the next.
 const BETWEEN: usize = 1 << 16;
 
@@ -207,7 +247,7 @@ impl Table {
         header_line: u64,
         names: &[String],
         dictionary: &Dictionary<'_>,
-        is_si: bool,
+        is_xsens: bool,
     ) -> Result<Self, Failure> {
         let mut table = Self {
             path: path.to_owned(),
@@ -216,14 +256,28 @@ impl Table {
             ..Self::default()
         };
         let unwanted = |quantity: &Quantity| dictionary.unwanted.is_some_and(|is| is(quantity));
+        let is_si = is_xsens || names.iter().any(|name| IN_SI.contains(&&*normalised(name)));
+        let found = |name: &str| quantity::find(dictionary.quantities, name);
+        let is_axis = |name: &String| found(name).is_some_and(|(q, _)| !q.axis.is_empty());
+        let sensor = match names.iter().any(is_axis) {
+            true => None,
+            false => sensor_of(path),
+        };
+        let of_sensor = |name: &str| {
+            let is_axis = name.starts_with(['x', 'y', 'z', 'X', 'Y', 'Z']);
+            found(&format!("{}_{name}", sensor.filter(|_| is_axis)?))
+        };
         for (place, name) in names.iter().enumerate() {
             let name = name.trim().to_owned();
-            match quantity::find(dictionary.quantities, &name) {
+            let known = found(&name).or_else(|| of_sensor(&name));
+            match known.filter(|(q, _)| is_si || q.name != INSTANCE) {
                 Some((quantity, _)) if unwanted(quantity) => table.ignored.push(name),
                 Some((quantity, factor)) => {
                     let values = Vec::new();
                     let is_signal = quantity.rank.is_none();
-                    let factor = factor.or((is_si && is_signal).then_some(1.0));
+                    let factor = factor
+                        .or((is_si && is_signal).then_some(1.0))
+                        .or((is_xsens && quantity.stems == TICKS).then_some(1e-4));
                     table.columns.push(Column {
                         name,
                         quantity,
@@ -276,27 +330,31 @@ impl Table {
             };
             if let Some(quantity) = dictionary.quantities.iter().find(is_meant) {
                 let problem = "is in a unit that is not known";
-                return Err(self.unit(name, quantity, problem).or_option(help::CHANNELS));
+                let other = quantity.name.replace('.', "_");
+                let advice = format!("convert it, and end {other}");
+                let refusal = self.unit(name, quantity, problem, &advice);
+                return Err(refusal.or_option(help::CHANNELS));
             }
         }
         Ok(())
     }
 
     /// The refusal of the unit of a column.
-    fn unit(&self, name: &str, quantity: &Quantity, problem: &str) -> Failure {
+    fn unit(&self, name: &str, quantity: &Quantity, problem: &str, advice: &str) -> Failure {
         let endings = quantity
             .units
             .iter()
             .filter_map(|(names, _)| Some(format!("_{}", names.split(' ').next()?)));
         let endings: Vec<String> = endings.collect();
         self.refused(format!("column \"{name}\" {problem}"))
-            .or_hint(format!("end its name in one of {}", endings.join(", ")))
+            .or_hint(format!("{advice} in one of {}", endings.join(", ")))
             .or_option(help::COLUMN_NAMES)
     }
 
     /// The refusal of a column whose unit cannot be known.
     pub(crate) fn no_unit(&self, column: &Column) -> Failure {
-        self.unit(&column.name, column.quantity, "has no unit in its name")
+        let problem = "has no unit in its name";
+        self.unit(&column.name, column.quantity, problem, "end its name")
     }
 
     /// Appends a number to a column; `written`: as the file has it.
@@ -355,7 +413,7 @@ impl Table {
     }
 
     /// Refuses a table without rows, or whose rows end before others.
-    fn filled(self) -> Result<Self, Failure> {
+    fn filled(mut self) -> Result<Self, Failure> {
         let uneven = |c: &&Column| c.values.len() != self.columns[0].values.len();
         if let Some(other) = self.columns.iter().find(uneven) {
             let (rows, first) = (other.values.len(), &self.columns[0]);
@@ -370,7 +428,36 @@ impl Table {
         if self.columns.first().is_some_and(|c| c.values.is_empty()) {
             return Err(empty(&self.path));
         }
+        self.count_on();
         Ok(self)
+    }
+
+    /// Counts the time on where its counter starts again.
+    fn count_on(&mut self) {
+        let is_in_week = self.has("week");
+        let mut time = self.columns.iter_mut().find(|c| c.quantity.name == "t_s");
+        let Some(time) = time.as_mut().filter(|_| !is_in_week) else {
+            return;
+        };
+        let (mut step, mut added, mut count) = (f64::NAN, 0.0, 0);
+        for row in 1..time.values.len() {
+            let back = time.values[row - 1] - added - time.values[row];
+            if back > 0.0 {
+                if step.is_nan() {
+                    step = median_step(&time.values);
+                }
+                let is_turn = |turn: &&f64| (0.0..=MOST_MISSED * step).contains(&(**turn - back));
+                if let Some(turn) = TURNS.iter().find(is_turn) {
+                    (added, count) = (added + turn, count + 1);
+                }
+            }
+            time.values[row] += added;
+        }
+        if count > 0 {
+            let name = &time.name;
+            let text = format!("column \"{name}\" starts again {count} times: counted on");
+            self.warnings.push(text);
+        }
     }
 
     /// Refuses columns whose rows, so many or more, do not fit into the memory that is free.
@@ -507,7 +594,17 @@ struct Lines<'a> {
     bytes: u64,
 }
 
-impl Lines<'_> {
+impl<'a> Lines<'a> {
+    const fn new(path: &'a str, reader: Box<dyn BufRead>) -> Self {
+        Self {
+            path,
+            reader,
+            line: Vec::new(),
+            number: 0,
+            bytes: 0,
+        }
+    }
+
     /// Appends a line to the last one; false at the end.
     fn more(&mut self) -> Result<bool, Failure> {
         let mut reader = self.reader.by_ref().take(LONGEST);
@@ -524,10 +621,18 @@ impl Lines<'_> {
         self.more()
     }
 
-    /// True if a quote is open at the end of the line.
-    fn is_open(&self) -> bool {
-        let quotes = || self.line.iter().filter(|b| **b == b'"').count();
-        self.line.contains(&b'"') && quotes() % 2 > 0 && !self.line.starts_with(b"#")
+    /// True if a quote that begins a cell is open at the end of the line.
+    fn is_open(&self, delimiter: u8) -> bool {
+        if !self.line.contains(&b'"') || self.line.starts_with(b"#") {
+            return false;
+        }
+        let (mut is_open, mut before) = (false, delimiter);
+        let is_blank = |byte: u8| byte == b' ' && delimiter != b' ';
+        for byte in &self.line {
+            is_open ^= is_quote(*byte, is_open, before, delimiter);
+            before = if is_blank(*byte) { before } else { *byte };
+        }
+        is_open
     }
 }
 
@@ -537,13 +642,7 @@ fn read_text(
     reader: Box<dyn BufRead>,
     dictionary: &Dictionary<'_>,
 ) -> Result<Table, Failure> {
-    let mut lines = Lines {
-        path,
-        reader,
-        line: Vec::new(),
-        number: 0,
-        bytes: 0,
-    };
+    let mut lines = Lines::new(path, reader);
     let head = Head::read(&mut lines, dictionary)?;
     let mut table = Table::new(path, head.line, &head.names, dictionary, head.is_xsens)?;
     table.rate_hz = head.rate_hz.map(|rate_hz| (rate_hz, "head of the file"));
@@ -552,6 +651,8 @@ fn read_text(
         let text = "header not in UTF-8, taken as ISO-8859-1";
         table.assumptions.push(text.to_owned());
     }
+    let units = head.units_line.map(|line| format!("units by line {line}"));
+    table.assumptions.extend(units);
     if !table.columns.is_empty() {
         head.rows(&mut table, lines, dictionary)?;
     }
@@ -576,7 +677,19 @@ struct Head {
     is_bare: bool,
     /// True if the header is no UTF-8: `²` and `°` are one byte each then.
     is_latin_1: bool,
+    /// True if the rows are sentences, which end in a checksum.
+    is_sentences: bool,
+    /// Line of the units, where they have one of their own.
+    units_line: Option<u64>,
 }
+
+/// Columns of the sentences of an IMU, by their first cells ([VectorNav VN-100 manual](https://www.vectornav.com/)).
+const SENTENCES: [(&str, &str); 3] = [
+    ("$VNIMU", "mag_x mag_y mag_z"),
+    ("$VNYMR", "yaw pitch roll mag_x mag_y mag_z"),
+    ("$VNQMR", "q_0 q_1 q_2 q_3 mag_x mag_y mag_z"),
+];
+const OF_SENTENCE: &str = "accel_x_m_s2 accel_y_m_s2 accel_z_m_s2 gyro_x_rad_s gyro_y_rad_s gyro_z_rad_s temperature pressure";
 
 impl Head {
     fn read(lines: &mut Lines<'_>, dictionary: &Dictionary<'_>) -> Result<Self, Failure> {
@@ -584,8 +697,8 @@ impl Head {
             delimiter: b',',
             ..Self::default()
         };
-        // the first line of words, which is the header where none names a quantity
-        let mut words: Option<(u64, Vec<String>)> = None;
+        // lines of words, of which one is the header where none names a quantity
+        let mut words: Vec<(u64, Vec<String>)> = Vec::new();
         while lines.next()? && lines.number <= MOST_BEFORE {
             let line = lines.number;
             if let Some(what) = no_text(&lines.line) {
@@ -610,51 +723,105 @@ impl Head {
             }
             let inside = text.trim_start_matches(['#', '%']).trim();
             let delimiter = delimiter_of(inside, dictionary);
-            let cell = |cell: &Cow<'_, [u8]>| String::from_utf8_lossy(cell).trim().to_owned();
-            let mut cells: Vec<String> = split(inside.as_bytes(), delimiter)
-                .iter()
-                .map(cell)
-                .collect();
-            cells.truncate(
-                cells
-                    .iter()
-                    .rposition(|cell| !cell.is_empty())
-                    .map_or(0, |at| at + 1),
-            );
+            let cells = words_of(inside, delimiter);
+            if cells.is_empty() {
+                continue;
+            }
+            if let Some(first) = cells.first().filter(|cell| cell.starts_with('$')) {
+                return head.of_sentences(lines.path, line, first, cells.len(), dictionary);
+            }
             let known = |cell: &&String| {
                 find(dictionary.quantities, cell).is_some_and(|(q, _)| q.rank.is_none())
             };
             let known = cells.iter().filter(known).count();
+            let is_number = |cell: &&String| number(cell.as_bytes(), delimiter).is_some();
+            let numbers = cells.iter().filter(is_number).count();
+            // words between blanks may be those of a sentence
+            let is_header =
+                known > 0 && numbers == 0 && (delimiter != b' ' || 2 * known + 1 >= cells.len());
             if inside.len() < text.len() {
                 head.comments.push(inside.to_owned());
-                // words between blanks may be those of a sentence
-                if known == 0 || delimiter == b' ' && 2 * known + 1 < cells.len() {
+                if !is_header {
                     continue;
                 }
             }
             (head.delimiter, head.line) = (delimiter, line);
-            let is_number = |cell: &String| number(cell.as_bytes(), delimiter).is_some();
-            head.has_row = cells.iter().all(is_number);
-            if head.has_row && words.is_some() {
-                break;
-            }
-            if head.has_row {
+            if 2 * numbers > cells.len() {
+                head.has_row = true;
+                let is_one = |(_, names): &&(u64, Vec<String>)| names.len() == cells.len();
+                let mut fitting = words.iter().filter(is_one);
+                if let (Some((line, names)), None) = (fitting.next(), dictionary.names) {
+                    (head.line, head.names) = (*line, names.clone());
+                    if let Some((line, units)) = fitting.next() {
+                        head.name_units(*line, units, dictionary);
+                    }
+                    return Ok(head);
+                }
+                if !words.is_empty() && dictionary.names.is_none() {
+                    break;
+                }
                 head.is_bare = dictionary.names.is_none();
                 let names = dictionary.names.map(<[String]>::to_vec);
                 let names = names.or_else(|| layout(dictionary.bare, cells.len()));
-                head.names = names.ok_or_else(|| no_header(lines.path, line, text, dictionary))?;
+                let no_header = || no_header(lines.path, line, text, cells.len(), dictionary);
+                head.names = names.ok_or_else(no_header)?;
                 return Ok(head);
             }
-            let names = dictionary.names.map_or(cells, <[String]>::to_vec);
-            if known > 0 || dictionary.names.is_some() {
-                head.names = names;
+            if is_header && dictionary.names.is_none() {
+                head.names = cells;
+                while lines.next()? && lines.line.trim_ascii().is_empty() {}
+                let below = split(&lines.line, delimiter);
+                head.has_row =
+                    !(lines.line.is_empty() || below.len() >= head.names.len() && is_words(&below));
+                if !head.has_row && !lines.line.is_empty() {
+                    let text = String::from_utf8_lossy(&lines.line);
+                    let units = words_of(text.trim(), delimiter);
+                    head.name_units(lines.number, &units, dictionary);
+                }
                 return Ok(head);
             }
-            words.get_or_insert((line, names));
+            words.push((line, cells));
         }
         // what names no quantity is the header all the same: its reader says what it lacks
-        (head.line, head.names) = words.ok_or_else(|| empty(lines.path))?;
+        let first = words.into_iter().next();
+        (head.line, head.names) = first.ok_or_else(|| empty(lines.path))?;
         Ok(head)
+    }
+
+    /// Puts the units that stand in a line of their own behind the names.
+    fn name_units(&mut self, line: u64, units: &[String], dictionary: &Dictionary<'_>) {
+        self.units_line = Some(line);
+        for (name, unit) in self.names.iter_mut().zip(units) {
+            let whole = format!("{name} {unit}");
+            let is_without = find(dictionary.quantities, name).is_some_and(|(_, f)| f.is_none());
+            if is_without && !unit.is_empty() || find(dictionary.quantities, &whole).is_some() {
+                *name = whole;
+            }
+        }
+    }
+
+    /// Rows that are sentences, with such a first cell.
+    fn of_sentences(
+        self,
+        path: &str,
+        line: u64,
+        first: &str,
+        count: usize,
+        dictionary: &Dictionary<'_>,
+    ) -> Result<Self, Failure> {
+        let Some((_, names)) = SENTENCES.iter().find(|(address, _)| *address == first) else {
+            let message = format!("sentences ({}), no table", shown(first, 20));
+            return Err(Failure::contents(path, line, message).or_hint(dictionary.advice));
+        };
+        let names = ["address", names, OF_SENTENCE].join(" ");
+        let names = names.split(' ').take(count).map(str::to_owned);
+        Ok(Self {
+            names: names.collect(),
+            line,
+            has_row: true,
+            is_sentences: true,
+            ..self
+        })
     }
 
     /// Appends the rows; what is passed over becomes a note.
@@ -667,11 +834,24 @@ impl Head {
         let path = lines.path;
         // of a packed file no more than what is read is known
         let length = std::fs::metadata(path).map_or(0, |m| m.len());
-        let (expected, mut row, mut has_units) = (self.names.len(), 0, false);
+        let (expected, mut row) = (self.names.len(), 0);
         let mut is_there = self.has_row || lines.next()?;
         while is_there {
             let line = lines.number;
-            while lines.is_open() && lines.line.len() < LONGEST as usize && lines.more()? {}
+            let mut is_open = lines.is_open(self.delimiter);
+            while is_open && lines.line.len() < LONGEST as usize && lines.more()? {
+                is_open = lines.is_open(self.delimiter);
+            }
+            if is_open {
+                return Err(Failure::contents(path, line, "a quote is not closed")
+                    .or_hint("close it, or remove it"));
+            }
+            let sum = self
+                .is_sentences
+                .then(|| lines.line.iter().rposition(|b| *b == b'*'));
+            lines
+                .line
+                .truncate(sum.flatten().unwrap_or(lines.line.len()));
             let cells = split(&lines.line, self.delimiter);
             let first = cells
                 .first()
@@ -682,16 +862,8 @@ impl Head {
                 let inside = text.trim_start_matches(['#', '%', ' ']).trim_end();
                 table.comments.push(inside.to_owned());
             } else if cells.iter().all(is_empty) {
-            } else if row == 0 && !has_units && cells.len() == expected && is_words(&cells) {
-                has_units = true;
-                let text = format!("line {line} has words and no numbers: passed over");
-                table.assumptions.push(text);
             } else if cells.len() < expected || !cells[expected..].iter().all(is_empty) {
                 let found = cells.len();
-                if lines.is_open() {
-                    return Err(Failure::contents(path, line, "a quote is not closed")
-                        .or_hint("close it, or remove it"));
-                }
                 while lines.next()? && lines.line.trim_ascii().is_empty() {}
                 // a logger that lost its power within a row
                 if found < expected && row > 0 && lines.line.is_empty() {
@@ -733,12 +905,32 @@ fn layout(headers: &[&str], columns: usize) -> Option<Vec<String>> {
     Some(found.map(str::to_owned).collect())
 }
 
-fn no_header(path: &str, line: u64, text: &str, dictionary: &Dictionary<'_>) -> Failure {
+fn no_header(
+    path: &str,
+    line: u64,
+    text: &str,
+    count: usize,
+    dictionary: &Dictionary<'_>,
+) -> Failure {
     let found = shown(text, 60);
     let message = format!("a header that names the columns is missing, found \"{found}\"");
+    let names = layout(dictionary.array, count).map(|names| names.join(","));
+    let option = format!(
+        "name its {count} columns: --columns {}",
+        names.unwrap_or_else(|| "t_s,accel_x_m_s2,…".to_owned())
+    );
     Failure::contents(path, line, message)
         .or_hint(dictionary.advice)
-        .or_option(help::COLUMN_NAMES)
+        .or_option(("columns", option))
+}
+
+/// The cells of a line as words, without empty ones at its end.
+fn words_of(line: &str, delimiter: u8) -> Vec<String> {
+    let cells = split(line.as_bytes(), delimiter);
+    let is_full = |cell: &Cow<'_, [u8]>| !cell.trim_ascii().is_empty();
+    let count = cells.iter().rposition(is_full).map_or(0, |at| at + 1);
+    let word = |cell: &Cow<'_, [u8]>| String::from_utf8_lossy(cell).trim().to_owned();
+    cells[..count].iter().map(word).collect()
 }
 
 /// The rate in a comment such as `Update Rate: 100.0Hz`.
@@ -753,14 +945,20 @@ fn rate_in(comment: &str) -> Option<f64> {
     digits.parse().ok().filter(|r: &f64| *r > 0.0)
 }
 
-/// The separator of the cells of a line: of equals the last. Blanks do only where nothing else does and they are not inside
+/// The separator of the cells of a line: the most frequent of comma, semicolon and tab, of equals the last; but of n cells
+/// between semicolons or tabs each may have a decimal comma. Blanks do only where nothing else does and they are not inside
 /// one name.
 fn delimiter_of(line: &str, dictionary: &Dictionary<'_>) -> u8 {
     let count = |d: u8| line.bytes().filter(|b| *b == d).count();
-    let most = [b',', b';', b'\t'].into_iter().max_by_key(|d| count(*d));
+    let [commas, semicolons, tabs] = [b',', b';', b'\t'].map(count);
+    let others = semicolons.max(tabs);
     let is_spaced = count(b' ') > 0 && find(dictionary.quantities, line).is_none();
-    most.filter(|d| count(*d) > 0)
-        .unwrap_or(if is_spaced { b' ' } else { b',' })
+    match () {
+        () if others > 0 && tabs >= semicolons && commas <= others + 1 => b'\t',
+        () if others > 0 && commas <= others + 1 => b';',
+        () if commas == 0 && is_spaced => b' ',
+        () => b',',
+    }
 }
 
 /// The cells of a line, quotes removed.
@@ -768,17 +966,19 @@ fn split(line: &[u8], delimiter: u8) -> Vec<Cow<'_, [u8]>> {
     let is_end = |b: &u8| b"\r\n".contains(b);
     let line = &line[..line.iter().rposition(|b| !is_end(b)).map_or(0, |at| at + 1)];
     if line.contains(&b'"') {
-        let mut reader = csv::ReaderBuilder::new();
-        let mut reader = reader
-            .has_headers(false)
-            .delimiter(delimiter)
-            .from_reader(line);
-        let record = reader
-            .byte_records()
-            .next()
-            .and_then(Result::ok)
-            .unwrap_or_default();
-        return record.iter().map(|cell| cell.to_vec().into()).collect();
+        let (mut cells, mut start) = (Vec::with_capacity(16), 0);
+        let (mut is_open, mut before) = (false, delimiter);
+        let is_blank = |byte: u8| byte == b' ' && delimiter != b' ';
+        for (k, byte) in line.iter().chain([&delimiter]).enumerate() {
+            let is_end = *byte == delimiter && !is_open || k == line.len();
+            if is_end && (delimiter != b' ' || start < k) {
+                cells.push(unquoted(&line[start..k]));
+            }
+            start = if is_end { k + 1 } else { start };
+            is_open ^= is_quote(*byte, is_open, before, delimiter);
+            before = if is_blank(*byte) { before } else { *byte };
+        }
+        return cells;
     }
     // Large tables spend their time here: the vector does not grow, and a cell costs one comparison a byte.
     let mut cells = Vec::with_capacity(16);
@@ -790,6 +990,26 @@ fn split(line: &[u8], delimiter: u8) -> Vec<Cow<'_, [u8]>> {
         _ => cells.extend(line.split(|b| *b == delimiter).map(Cow::Borrowed)),
     }
     cells
+}
+
+/// True if a byte is a quote that begins or ends a quoted cell, or one of two that stand for one.
+const fn is_quote(byte: u8, is_open: bool, before: u8, delimiter: u8) -> bool {
+    byte == b'"' && (is_open || before == delimiter || before == b'"')
+}
+
+/// What a cell says, without the quotes around it.
+fn unquoted(cell: &[u8]) -> Cow<'_, [u8]> {
+    let inside = cell
+        .trim_ascii()
+        .strip_prefix(b"\"")
+        .and_then(|c| c.strip_suffix(b"\""));
+    match inside {
+        Some(inside) if inside.contains(&b'"') => {
+            let text = String::from_utf8_lossy(inside);
+            text.replace("\"\"", "\"").into_bytes().into()
+        }
+        _ => inside.unwrap_or(cell).into(),
+    }
 }
 
 /// True if a row has units, say, below the names: no cell begins as a number does.
@@ -818,13 +1038,13 @@ fn no_text(bytes: &[u8]) -> Option<&'static str> {
     has_lone.then_some("its lines end in a carriage return only")
 }
 
-/// A number; with a decimal comma where semicolons separate.
+/// A number; with a decimal comma where something else separates.
 #[inline]
 pub(super) fn number(cell: &[u8], delimiter: u8) -> Option<f64> {
     let text = std::str::from_utf8(cell.trim_ascii()).ok()?;
     let comma = || text.replacen(',', ".", 1).parse().ok();
     let parsed = text.parse().ok();
-    parsed.or_else(|| if delimiter == b';' { comma() } else { None })
+    parsed.or_else(|| if delimiter == b',' { None } else { comma() })
 }
 
 // Tables that are no text: arrays of NumPy, Parquet, directories of KITTI, logs.

@@ -9,7 +9,9 @@
 //! | gnss-ins-sim | `accel_x (m/s^2)`, `gyro_x (deg/s)` |
 //! | Xsens MT Manager | `PacketCounter`, `SampleTimeFine`, `Acc_X`, `Gyr_X` below a `//` head: SI |
 //! | GNSS/INS units | `gps_week`, `tow_s`; `iTOW`; `gps_time` |
-//! | ArduPilot | `TimeUS` |
+//! | ArduPilot | `TimeUS`, `GyrX`, `AccX`: SI |
+//! | Sensor Logger | `time`, `seconds_elapsed`, `z`, `y`, `x` in `Gyroscope.csv`: SI |
+//! | Nav Sensor Recorder | `TimestampAcc [ns]`, `AccX [m/s^2]` |
 //! | loggers | `ax_mps2`, `gx_radps`, `gyro_x_dps`, `acc_x [mg]`, … |
 
 use nav_sim_navigation::earth::MAX_LATITUDE_DEG;
@@ -21,9 +23,9 @@ pub(crate) type Units = &'static [(&'static str, f64)];
 pub(crate) const NONE: Units = &[];
 pub(crate) const TIME: Units = &[
     ("s sec secs second seconds", 1.0),
-    ("ms msec millis milliseconds", 1e-3),
-    ("us usec micros microseconds", 1e-6),
-    ("ns nsec nanos nanoseconds", 1e-9),
+    ("ms msec millis millisec milliseconds 0_001_s", 1e-3),
+    ("us usec micros microsec microseconds", 1e-6),
+    ("ns nsec nanos nanosec nanoseconds", 1e-9),
 ];
 pub(crate) const ACCELERATION: Units = &[
     ("m_s2 m_s_2 m_s_s mps2 ms2 ms_2 m_sec2 m_sec_2", 1.0),
@@ -67,10 +69,10 @@ pub(crate) const LATITUDE: Range = (
 pub(crate) const LONGITUDE: Range = (-180.0, 360.0, "is not a longitude");
 
 /// A quantity that a column may hold.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Quantity {
     pub(crate) name: &'static str,
-    /// Names without their unit and axis, between blanks.
+    /// Names without their unit and axis, between blanks; `stamp*` is all that begins so.
     pub(crate) stems: &'static str,
     /// Last part of the name before the unit, with or without an underscore: x, y, z.
     pub(crate) axis: &'static str,
@@ -173,7 +175,11 @@ impl Quantity {
             return false;
         };
         let is_axis = !self.axis.is_empty();
-        let has = |stem: &str| self.stems.split(' ').any(|own| own == stem);
+        let is = |own: &str, stem: &str| {
+            let begin = own.strip_suffix('*');
+            own == stem || begin.is_some_and(|begin| stem.starts_with(begin))
+        };
+        let has = |stem: &str| self.stems.split(' ').any(|own| is(own, stem));
         has(stem) || is_axis && has(stem.trim_end_matches('_'))
     }
 

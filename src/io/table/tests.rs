@@ -133,16 +133,22 @@ fn lines_before_the_header_and_decimal_commas_are_read() {
 /// A quote that is not closed takes all lines behind it, which is no last line that was cut off.
 #[test]
 fn an_open_quote_is_refused_where_it_stands() {
-    let refusal = |row: &str| {
-        let text = format!("t_s,gyro_x_rad_s\n0,1\n1,2\n{row}\n3,4\n4,5\n");
-        parse("a.csv", &text, &DICTIONARY).unwrap_err().to_string()
+    let read = |row: &str| {
+        let text = format!("t_s,gyro_x_rad_s,note\n0,1,a\n1,2,b\n{row}\n3,4,d\n4,5,e\n");
+        parse("a.csv", &text, &DICTIONARY)
     };
-    assert_eq!(refusal("\"2,3"), "a.csv, line 4: a quote is not closed");
-    let number = refusal("2,\"3");
-    assert!(
-        number.starts_with("a.csv, line 4: column \"gyro_x_rad_s\": \"3"),
-        "{number}"
-    );
+    for row in ["\"2,3,c", "2,\"3,c", "2,3,\"c", "2,3,\"c\"\",d"] {
+        let refusal = read(row).unwrap_err().to_string();
+        assert_eq!(refusal, "a.csv, line 4: a quote is not closed");
+    }
+    for row in [
+        "2,3,5\" pipe",
+        "2,3,\"5\"\" pipe\"",
+        "2,3, \"a, b\" ",
+        "2,3,\"a,\nb\"",
+    ] {
+        assert_eq!(read(row).unwrap().rows(), 5, "{row}");
+    }
 }
 
 #[test]

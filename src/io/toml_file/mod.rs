@@ -105,8 +105,14 @@ impl Source {
         let span = e.span().unwrap_or_default();
         let line = self.line(span.start);
         let written = self.text.get(span).unwrap_or_default().trim();
+        let digits = written.trim_start_matches(['+', '-']);
+        let is_number = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit());
+        let message = match is_number {
+            true => "beyond 9223372036854775807, the largest whole number",
+            false => e.message(),
+        };
         let written = shown(written, 40);
-        self.at(line, format!("{}: \"{written}\"", e.message()))
+        self.at(line, format!("{message}: \"{written}\""))
     }
 
     /// The line (from 1) a byte stands in.
@@ -190,6 +196,9 @@ impl Source {
             .or_else(|| nearest(name, legal.clone()));
         let hint = match meant {
             Some(meant) => format!("did you mean \"{meant}\"?"),
+            None if name.starts_with("v_u") => {
+                "down is positive: v_d_m_s, of the other sign".into()
+            }
             None => format!("legal here: {}", legal.collect::<Vec<_>>().join(", ")),
         };
         self.error(key, format!("unknown key \"{key}\""))
@@ -259,7 +268,8 @@ impl<'a> Checker<'a> {
                 is("number") || is("integer") || is("string") && words(schema).next().is_some()
             }
             Value::Float(_) => is("number"),
-            Value::String(_) | Value::Datetime(_) => is("string"),
+            Value::String(_) => is("string"),
+            Value::Datetime(_) => false,
             Value::Boolean(_) => is("boolean"),
             Value::Array(_) => is("array"),
             Value::Table(_) => is("object"),

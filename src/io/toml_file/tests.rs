@@ -107,6 +107,22 @@ fn refusals_name_file_line_key_and_value() {
             "line 2: \"parts[1].x\" is missing | add x to parts[1]",
         ),
         (
+            "count = 1\nwords = [2026-11-27]",
+            "line 2: \"words\" = 2026-11-27 is not a text in quotes | ",
+        ),
+        (
+            "count = 1\nplace = 2026-11-27",
+            "line 2: \"place\" = 2026-11-27 is not a text in quotes | ",
+        ),
+        (
+            "count = 99999999999999999999",
+            "line 1: beyond 9223372036854775807, the largest whole number: \"99999999999999999999\" | ",
+        ),
+        (
+            "count = 170141183460469231731687303715884105728",
+            "line 1: beyond 9223372036854775807, the largest whole number: \"170141183460469231731687303715884105728\" | ",
+        ),
+        (
             "count = 1\nconut = 1",
             "line 2: unknown key \"conut\" | did you mean \"count\"?",
         ),

@@ -123,7 +123,7 @@ const D: Quantity = Quantity::length("d_m", "d down").with_unit();
 const V_D: Quantity = Quantity::speed("v_d_m_s", "v_d vd v_down").with_unit();
 
 /// Dictionary of trajectories.
-const DICTIONARY: Dictionary<'_> = Dictionary {
+pub(super) const DICTIONARY: Dictionary<'_> = Dictionary {
     bad_cell: "write numbers; angles are in degrees: latitude within ±89.9, longitude and yaw in (−180, 180] or [0, 360), pitch within ±90",
     ..Dictionary::new(
         &QUANTITIES,
@@ -324,7 +324,7 @@ fn rows(
     let axes = "axes taken as ROS has them: position east, north, up; body forward, left, up";
     let path = "no attitude columns: heading and pitch follow the path, roll is 0";
     let doubts = left_out.into_iter().chain(unused);
-    let doubts = doubts.chain(table.assumptions.iter().cloned());
+    let doubts = doubts.chain(table.assumptions.iter().chain(&table.warnings).cloned());
     let doubts = doubts.chain(is_enu.then(|| axes.to_owned()));
     for text in doubts.chain(rows.follows_path.then(|| path.to_owned())) {
         rows.doubt(None, text);

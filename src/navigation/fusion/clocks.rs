@@ -5,9 +5,10 @@
 
 use super::alignment::{Moving, coarse, courses, steps};
 use super::{Recorded, Settings, Solution, check_clocks, displaced, fuse};
+use crate::earth::ned_difference;
 use crate::ekf::Belief;
 use crate::frames::wrap_angle;
-use crate::gnss::GnssFix;
+use crate::gnss::{GnssFix, GnssVelocity};
 use crate::imu::ImuIncrement;
 use crate::linalg::{by_value, mean};
 use glam::DVec3;
@@ -166,6 +167,8 @@ impl Turned {
 /// Delays that are tried about the one at which the turns agree, and how far apart (s): the course of what walks is ahead
 /// of the turns of its body by half a step.
 const TRIED: (i32, f64) = (5, 0.2);
+/// Time from one position to the next where positions alone tell the turns (s).
+const BASELINE_S: f64 = 2.0;
 /// Most of a recording that is looked at (s).
 const MOST_S: f64 = 1200.0;
 /// NIS per component of a fix that contradicts, however much, and of one before the start: a wrong delay makes some starts
@@ -177,8 +180,37 @@ const CONTRADICTS: f64 = 16.0;
 pub fn rough_origin(recorded: &Recorded<'_>) -> Option<f64> {
     let begins_s = check_clocks(recorded).err()?.delay_s()?;
     let gnss = earlier(recorded.gnss, begins_s);
-    let [lag_s, ..] = agreement(&recorded.with_gnss(&gnss))?;
+    let of_turns = |gnss: &[GnssFix]| agreement(&recorded.with_gnss(gnss));
+    let [lag_s, ..] = of_turns(&gnss).or_else(|| of_turns(&with_velocities(&gnss)))?;
     Some(begins_s - lag_s)
+}
+
+/// Every other of fixes a baseline apart, with the velocities from the one before to the one after: over a second the course of
+/// positions is mostly noise, and velocities that share positions are no two.
+fn with_velocities(gnss: &[GnssFix]) -> Vec<GnssFix> {
+    let mut kept: Vec<GnssFix> = Vec::new();
+    for fix in gnss {
+        let is_near = |last: &GnssFix| fix.t_s - last.t_s < BASELINE_S - 1e-6;
+        if !kept.last().is_some_and(is_near) {
+            kept.push(*fix);
+        }
+    }
+    let centred = |three: &[GnssFix]| {
+        let (before, after) = (&three[0], &three[2]);
+        let seconds = after.t_s - before.t_s;
+        let v_n = ned_difference(before.place(), after.place()) / seconds;
+        let sigma_n = before.pos_sigma_n.powf(2.0) + after.pos_sigma_n.powf(2.0);
+        let velocity = GnssVelocity {
+            horizontal: v_n.truncate(),
+            horizontal_sigma: sigma_n.powf(0.5).truncate() / seconds,
+            down: None,
+        };
+        GnssFix {
+            velocity: Some(velocity),
+            ..three[1]
+        }
+    };
+    kept.windows(3).step_by(2).map(centred).collect()
 }
 
 /// The rest of a delay that was found roughly (s): the one at which the innovations are smallest.
@@ -199,15 +231,24 @@ pub fn rest_of_origin(recorded: &Recorded<'_>, belief: &Belief, settings: &Setti
         .into_par_iter()
         .filter_map(tried)
         .collect();
-    let Some((delay_s, _, start)) = all.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) else {
+    let least = (0..all.len()).min_by(|a, b| all[*a].1.total_cmp(&all[*b].1));
+    let Some(((delay_s, _, start), least)) = least.map(|least| (&all[least], least)) else {
         return 0.0;
     };
-    let gnss = earlier(fixes, delay_s);
-    let found = displaced(&recorded.with_gnss(&gnss), belief, &start, &settings);
-    delay_s
-        + found
-            .and_then(|found| found.delay_s)
-            .map_or(0.0, |[rest_s, _]| rest_s)
+    let gnss = earlier(fixes, *delay_s);
+    let found = displaced(&recorded.with_gnss(&gnss), belief, start, &settings);
+    let rest_s = found.and_then(|found| found.delay_s);
+    delay_s + rest_s.map_or_else(|| vertex(&all, least), |[rest_s, _]| rest_s)
+}
+
+/// How far behind a step the parabola through it and its neighbours is least (s): a delay that the innovations hardly tell.
+fn vertex<T>(tried: &[(f64, f64, T)], least: usize) -> f64 {
+    let three = least.checked_sub(1).and_then(|k| tried.get(k..k + 3));
+    let Some([(_, before, _), (_, at, _), (_, after, _)]) = three else {
+        return 0.0;
+    };
+    let bend = (before - 2.0 * at + after).max(f64::MIN_POSITIVE);
+    0.5 * TRIED.1 * (before - after) / bend
 }
 
 /// Mean NIS per component of so many fixes, those before the start among them.
@@ -235,11 +276,11 @@ pub fn earlier(gnss: &[GnssFix], seconds: f64) -> Vec<GnssFix> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::earth::moved;
 
     fn turns_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
         clocks_apart(recorded, |_| None)
     }
-    use crate::gnss::{GnssFix, GnssVelocity};
 
     /// A drive of ten minutes at 10 m/s whose course turns by `rate(t)`, an IMU at 50 Hz in any attitude, and fixes whose
     /// clock is `late_s` ahead of the IMU's.
@@ -288,6 +329,31 @@ mod tests {
     /// Turns that never come again in the same order.
     fn winding(t_s: f64) -> f64 {
         0.2 * (t_s / 7.0).sin() * (t_s / 11.3).sin() + 0.1 * (t_s / 31.7).sin()
+    }
+
+    /// Positions alone, 2 m off to any side, that begin 20 s after the IMU on a clock of their own: the origin is found to the
+    /// second that `rest_of_origin` looks at.
+    #[test]
+    fn positions_tell_the_origin_of_their_clock() {
+        let late_s = 50_400.0;
+        let (imu, mut gnss) = drive(late_s, winding);
+        let (mut place, mut state) = ([0.8, 0.1, 0.0], 1_u32);
+        for fix in &mut gnss {
+            let mut off_m = || {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                4.0 * (f64::from(state >> 8) / f64::from(1 << 24)) - 2.0
+            };
+            place = moved(place, fix.velocity.unwrap().v_n());
+            [fix.lat, fix.lon, fix.h] = moved(place, DVec3::new(off_m(), off_m(), 0.0));
+            (fix.pos_sigma_n, fix.velocity) = (DVec3::splat(2.0), None);
+        }
+        let found_s = rough_origin(&Recorded {
+            imu: &imu,
+            gnss: &gnss[20..],
+            aids: &[],
+        });
+        let off_s = found_s.unwrap() - late_s;
+        assert!(off_s.abs() < 1.0, "{off_s}");
     }
 
     #[test]

@@ -98,7 +98,7 @@ fn check_recording(recording: &Recording, imu_hz: f64, needs: usize) -> Result<(
         .find(|c| recording.signal(*c).is_none())
     {
         return refused(format!(
-            "{}: channel {channel} is missing; all six are needed",
+            "{}: channel {channel} is missing; all six are needed, in one file",
             recording.name
         ));
     }
@@ -379,7 +379,7 @@ mod tests {
         partial.signals.remove(4);
         assert_eq!(
             refused(partial),
-            "r.csv: channel gyro.y is missing; all six are needed"
+            "r.csv: channel gyro.y is missing; all six are needed, in one file"
         );
         assert!(Truth::Static(&[]).check(100.0, 1).is_err());
     }

@@ -286,10 +286,29 @@ fn clocks_of_receivers_and_loggers_are_known() {
 /// An hour back, or the end of a GPS week.
 #[test]
 fn a_clock_that_was_set_back_is_refused() {
-    for (from, back) in [(7200.0, 3600.0), (604_799.5, 604_800.0)] {
-        let at = |k: usize| from + 0.01 * k as f64 - if k < 50 { 0.0 } else { back };
-        let refused = refusal(stamped("t_s", 100, |k| format!("{:.2}", at(k))));
-        assert!(refused.contains("time goes back"), "{refused}");
+    let at = |k: usize| 7200.0 + 0.01 * k as f64 - if k < 50 { 0.0 } else { 3600.0 };
+    let refused = refusal(stamped("t_s", 100, |k| format!("{:.2}", at(k))));
+    assert!(refused.contains("time goes back"), "{refused}");
+}
+
+/// Counters of 16 and 32 bits and the GPS week: the time goes on as if they had not started again, here after 51 samples.
+#[test]
+fn counters_that_start_again_are_counted_on() {
+    for (name, turn, step) in [
+        ("t_us", 4_294_967_296.0, 10_000.0),
+        ("t_s", 4_294.967_296, 0.01),
+        ("t_ms", 65_536.0, 10.0),
+        ("tow_s", 604_800.0, 0.01),
+    ] {
+        let at = |k: usize| (turn + step * (k as f64 - 50.5)) % turn;
+        let text = stamped(name, 100, |k| format!("{:.6}", at(k)));
+        let (_files, path) = Files::with("a.csv", text);
+        let (recordings, report) = read(&[path], &ReadOptions::default()).unwrap();
+        assert!((recordings[0].rate_hz - 100.0).abs() < 0.01);
+        assert_eq!(
+            report.files[0].warnings[0],
+            format!("column \"{name}\" starts again 1 times: counted on")
+        );
     }
 }
 
