@@ -58,7 +58,7 @@ impl Command for DatasheetArgs {
         if self.list {
             let units = CATALOGUE.iter().map(|(name, _)| catalogued_unit(name));
             let units = units.collect::<Result<Vec<_>>>()?;
-            let document = Document::new("Data sheets", Tone::Good, units.iter().map(text));
+            let document = Document::new("Data sheets", Tone::Good, units.iter().flat_map(lines));
             let json = json!({ "schema_version": 1, "units": units });
             return Ok(PlainAnswer::new(json, document));
         }
@@ -211,7 +211,7 @@ fn catalogued_unit(name: &str) -> Result<Value> {
 }
 
 /// The unit, and a line of figures for each sensor.
-fn text(unit: &Value) -> String {
+fn lines(unit: &Value) -> [String; 3] {
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let figures = |sensor: Sensor| {
         let own = unit["figures"].as_array().into_iter().flatten();
@@ -222,8 +222,9 @@ fn text(unit: &Value) -> String {
                 text(&f["figure"]) + " " + &text(&f["given"]) + grade
             })
             .collect();
-        format!("\n  {sensor:<5} {}", shown.join(", "))
+        format!("  {sensor:<5} {}", shown.join(", "))
     };
     let [name, class, title] = ["unit", "class", "name"].map(|key| text(&unit[key]));
-    format!("{name:<12} {class:<12} {title}") + &Sensor::ALL.map(figures).concat()
+    let [accel, gyro] = Sensor::ALL.map(figures);
+    [format!("{name:<12} {class:<12} {title}"), accel, gyro]
 }

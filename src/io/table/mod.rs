@@ -6,6 +6,7 @@ use super::suggest::nearest;
 use super::{Failure, Place, help, logs, source};
 use crate::failure::is_damage;
 use chrono::NaiveDateTime;
+use nav_sim_document::one_line;
 use nav_sim_logs::npy::Array;
 use nav_sim_logs::{Channel, Clock, Content, Kind as LogKind, in_seconds, npy};
 pub(crate) use quantity::find;
@@ -173,11 +174,8 @@ pub(crate) fn unreadable(path: &Path, e: std::io::Error) -> Failure {
 
 /// At most `longest` characters of what a file holds, safe to print.
 pub(crate) fn shown(text: &str, longest: usize) -> String {
-    let escaped = |c: char| match c.is_control() {
-        true => c.escape_default().collect(),
-        false => vec![c],
-    };
-    let short: String = text.chars().take(longest).flat_map(escaped).collect();
+    let short: String = text.chars().take(longest).collect();
+    let short = one_line(&short);
     if text.chars().nth(longest).is_some() {
         short + "…"
     } else {
