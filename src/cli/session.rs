@@ -4,6 +4,7 @@
 use super::Failure;
 use crate::app::{Answer, Context, Front};
 use crate::failure::system_words;
+use crate::io::atomic::remove_unfinished;
 use crate::parse;
 use crate::report::{WIDTH, json};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
@@ -93,6 +94,7 @@ impl Session {
             Err(e) if e.kind() != ErrorKind::BrokenPipe => {
                 let failure = Failure::could_not(format!("standard output: {}", system_words(&e)));
                 self.failure(&failure);
+                remove_unfinished();
                 std::process::exit(failure.code().into());
             }
             _ => {}

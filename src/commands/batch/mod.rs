@@ -143,7 +143,7 @@ impl BatchRequest {
         let changed = adopt(&place, &cells, self.dry_run, context);
         if let (Some((name, what)), false) = (changed.first(), self.force || self.dry_run) {
             return refused(
-                format!("cell {name} is of another study: {what}"),
+                format!("cell {name} {what}"),
                 "choose another directory with --out, or compute it again with --force",
             );
         }
@@ -248,15 +248,16 @@ fn adopt(
     cells.iter().filter_map(changed).collect()
 }
 
-/// The first setting or input in which two requests differ.
+/// What a cell is that was asked for otherwise: the first setting or input that differs.
 fn difference(there: &Manifest, wanted: &Manifest) -> String {
     let keys = there.options.keys().chain(wanted.options.keys());
     let shown =
-        |values: Option<&Vec<String>>| values.map_or("not given".to_owned(), |v| v.join(" "));
+        |values: Option<&Vec<String>>| values.map_or("the default".to_owned(), |v| v.join(" "));
     for key in keys {
         let [old, new] = [there, wanted].map(|manifest| manifest.options.get(key));
         if old != new {
-            return format!("its \"{key}\" is {}, not {}", shown(old), shown(new));
+            let (old, new) = (shown(old), shown(new));
+            return format!("is of another study: its \"{key}\" is {old}, not {new}");
         }
     }
     let differs = |input: &&crate::app::Input| {
@@ -266,8 +267,11 @@ fn difference(there: &Manifest, wanted: &Manifest) -> String {
             .any(|old| old.role == input.role && old.blake3 == input.blake3)
     };
     match wanted.inputs.iter().find(differs) {
-        Some(input) => format!("{} has changed", input.path),
-        None => "it is of another version of the figures".to_owned(),
+        Some(input) => format!("is of another study: {} has changed", input.path),
+        None => format!(
+            "was made by version {}, whose figures differ",
+            there.version
+        ),
     }
 }
 
