@@ -255,7 +255,7 @@ fn bad_studies_are_refused_before_anything_is_written() {
         (
             "runs = 77",
             "rns = 77",
-            "cell length_s=2_imu: run: there is no option rns",
+            "study.toml, line 6: cell length_s=2_imu: run: there is no option rns",
             "did you mean runs?",
         ),
         (
@@ -289,6 +289,18 @@ fn bad_studies_are_refused_before_anything_is_written() {
             "-o",
         ),
         ("seed = 5", "seed = 5\ngnss.rate = 5", "rate", "gnss"),
+        (
+            "runs = 77",
+            "runs = {}",
+            "study.toml, line 6: cell length_s=2_imu: \"run.runs\" = {} has no value",
+            "",
+        ),
+        (
+            "runs = 77",
+            "runs = [77, -1]",
+            "study.toml, line 6: cell length_s=2_imu_runs=-1: --runs='-1'",
+            "not a whole number",
+        ),
         (
             "seed = 5",
             "seed = 5\ngnss.rate_hz = [1, nan]",

@@ -977,11 +977,9 @@ fn parquet(path: &Path) -> Result<Columns, Failure> {
                 Field::Decimal(value) => {
                     let bytes = value.data();
                     let negative = bytes.first().is_some_and(|b| *b >= 128);
-                    let whole = bytes
-                        .iter()
-                        .fold(f64::from(u8::from(negative)) * -1.0, |x, b| {
-                            x * 256.0 + f64::from(*b)
-                        });
+                    let whole = bytes.iter().fold(-f64::from(u8::from(negative)), |x, b| {
+                        x * 256.0 + f64::from(*b)
+                    });
                     whole / 10_f64.powi(value.scale())
                 }
                 // of no such type is a measurement: NaN, which is refused where one is wanted
