@@ -258,6 +258,15 @@ impl Failure {
         }
     }
 
+    /// In a line of a file.
+    pub(crate) fn at(self, path: &str, line: u64) -> Self {
+        Self {
+            message: format!("{path}, line {line}: {}", self.message),
+            place: Some((path.to_owned(), Some(line))),
+            ..self
+        }
+    }
+
     /// With advice, in the place of other advice.
     pub fn hint(mut self, hint: impl Into<Cow<'static, str>>) -> Self {
         self.help.clear();

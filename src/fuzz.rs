@@ -18,7 +18,7 @@ use tempfile::TempDir;
 pub type Target = (&'static str, &'static str, fn(&Path));
 
 /// All readers: recordings, drives, trajectories, then the program's own files.
-pub const TARGETS: [Target; 29] = [
+pub const TARGETS: [Target; 30] = [
     ("recording_csv", "a.csv", recording),
     ("recording_gz", "a.csv.gz", recording),
     ("recording_npy", "a.npy", recording),
@@ -43,6 +43,9 @@ pub const TARGETS: [Target; 29] = [
     ("motion", "a.toml", trajectory),
     ("model", "a.toml", |path| _ = model_file::read(path)),
     ("datasheet", "a.toml", |path| _ = datasheet::read(path)),
+    ("figures", "a.yaml", |path| {
+        _ = datasheet::measured(path, Some(100.0))
+    }),
     ("contamination", "a.toml", |path| {
         _ = contamination_file::find(&path.display().to_string(), 100.0)
     }),

@@ -79,24 +79,29 @@ class Model:
         unit: str | None = None,
         *,
         entry: StrPath | Mapping[str, Any] | None = None,
-        rate_hz: float = 100.0,
+        measured: StrPath | None = None,
+        rate_hz: float | None = None,
         vrw: str | None = None,
         arw: str | None = None,
         accel_bias: str | None = None,
         gyro_bias: str | None = None,
+        accel_rrw: str | None = None,
+        gyro_rrw: str | None = None,
         corr_time: str | None = None,
         accel_turn_on: str | None = None,
         gyro_turn_on: str | None = None,
     ) -> Model:
         """A model from the figures of a data sheet: an assumption, not a calibration (`nav-sim datasheet`).
 
-        `unit` is a name of `nav_sim.catalogue()`, `entry` one's own (TOML, or its tables as a dict). Figures are texts with
-        their units and go over these: `vrw` and `arw` (noise densities, "0.15 deg/sqrt(h)"), `accel_bias` and `gyro_bias`
-        (instabilities, "0.5 deg/h"), `corr_time` (their correlation time, "100 s"), `accel_turn_on` and `gyro_turn_on`
-        (standard deviations, "2 mg"). `rate_hz` is that of the model.
+        `unit` is a name of `nav_sim.catalogue()`, `entry` one's own (TOML, or its tables as a dict), `measured` a file of Kalibr,
+        allan_variance_ros or imu_utils (YAML). Figures are texts with their units and go over these: `vrw` and `arw` (noise
+        densities, "0.15 deg/sqrt(h)"), `accel_bias` and `gyro_bias` (instabilities, "0.5 deg/h"), `accel_rrw` and `gyro_rrw`
+        (rate random walks, "2 deg/h/sqrt(h)"), `corr_time` (correlation time of the instabilities, "100 s"), `accel_turn_on` and
+        `gyro_turn_on` (standard deviations, "2 mg"). `rate_hz` is that of the model: that of the file, else 100 Hz.
         """
         figures: dict[str, Any] = {"vrw": vrw, "arw": arw, "corr_time": corr_time}
         figures |= {"accel_bias": accel_bias, "gyro_bias": gyro_bias}
+        figures |= {"accel_rrw": accel_rrw, "gyro_rrw": gyro_rrw, "from": None if measured is None else path(measured, "measured")}
         figures |= {"accel_turn_on": accel_turn_on, "gyro_turn_on": gyro_turn_on}
         with Staging() as staging:
             own = None if entry is None else staging.settings(entry, "entry")

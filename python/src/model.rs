@@ -6,7 +6,6 @@ use nav_sim::app::Front;
 use nav_sim::io::contamination_file;
 use nav_sim::io::model_file::{self, ModelFile};
 use nav_sim::prelude::{AxisParameters, Channel, Composite, Horizon, Policy, Sensor};
-use nav_sim::signal::noise::practical::Minimum;
 use nav_sim::signal::noise::{ReplicateError, VirtualImu};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -150,6 +149,6 @@ fn figures(sensor: Sensor, found: &AxisParameters) -> Value {
         format!("walk_{rate}_per_sqrt_hz"): pair.walk,
         format!("bias_sigma_{unit}"): markov.map(|m| m.sigma),
         "bias_correlation_time_s": markov.map(|m| m.t_corr_s),
-        format!("bias_instability_{unit}"): found.minimum.as_ref().map(Minimum::bias_instability),
+        format!("bias_instability_{unit}"): found.minimum.as_ref().map(|m| m.deviation),
     })
 }

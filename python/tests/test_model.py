@@ -176,3 +176,19 @@ def test_what_is_no_process_is_refused(given: Any, words: str) -> None:
         Model(100.0, gyro=given)
     assert refused.value.message.startswith(words), refused.value.message
     assert Model(100.0, gyro={"type": "WN", "sigma2": 1.0}) == Model(100.0, gyro=[{"type": "WN", "sigma2": 1.0}])
+
+
+def test_figures_of_imu_utils_need_the_rate_and_are_per_sample(tmp_path: Path) -> None:
+    file = tmp_path / "imu.yaml"
+    file.write_text('%YAML:1.0\nGyr:\n   unit: " rad/s"\n   avg-axis:\n      gyr_n: 2e-3\n      gyr_w: 3e-5\n')
+    with pytest.raises(NavSimError) as refused:
+        Model.from_datasheet(measured=file)
+    assert refused.value.line == 5 and "rate_hz=" in (refused.value.hint or ""), refused.value
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", nav_sim.NavSimWarning)
+        model = Model.from_datasheet(measured=file, rate_hz=400.0, gyro_rrw="2 deg/h/sqrt(h)")
+    processes = model.processes["gyro.x"]
+    assert model.rate_hz == 400.0
+    # a sample has the variance that the file states; K²/rate is the variance of an increment
+    assert processes[0] == {"type": "WN", "sigma2": pytest.approx(4e-6)}
+    assert processes[-1] == {"type": "RW", "gamma2": pytest.approx(np.radians(2.0 / 3600.0 / 60.0) ** 2 / 400.0)}

@@ -7,6 +7,7 @@ use crate::io::{atomic, input, suggest};
 use crate::parse;
 use crate::report::json;
 use clap::builder::ValueParser;
+use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, FromArgMatches};
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -293,7 +294,8 @@ impl<C: Command> FromArgMatches for Asked<C> {
     }
 }
 
-/// Options that decide the result, defaults included, without those that are files.
+/// Options that decide the result, without those that are files, and without defaults: a later version that knows one option
+/// more recognises the results of this one.
 fn options<C: Command>(matches: &ArgMatches) -> BTreeMap<String, Vec<String>> {
     let command = C::augment_args(clap::Command::new(C::NAME));
     let deciding = command
@@ -302,11 +304,12 @@ fn options<C: Command>(matches: &ArgMatches) -> BTreeMap<String, Vec<String>> {
     let values = |arg: &Arg| {
         let id = arg.get_id().as_str();
         let raw = matches.try_get_raw(id).ok().flatten()?;
-        Some((
-            id.to_owned(),
-            raw.map(|value| canonical(&value.to_string_lossy()))
-                .collect(),
-        ))
+        let canonical = |value: &OsStr| canonical(&value.to_string_lossy());
+        let given: Vec<String> = raw.map(canonical).collect();
+        let defaults = arg.get_default_values().iter();
+        let is_given = matches.value_source(id) == Some(ValueSource::CommandLine)
+            && !defaults.map(|value| canonical(value)).eq(given.clone());
+        is_given.then(|| (id.to_owned(), given))
     };
     deciding.filter_map(values).collect()
 }
@@ -531,6 +534,14 @@ impl Claims {
         self.missing.extend(missing.map(Path::to_owned));
         self.missing.sort();
     }
+
+    /// A warning where nothing keeps another nav-sim from writing the same.
+    pub(crate) fn warning(&self) -> Option<&'static str> {
+        let is_shared = self.own.iter().any(Claim::is_shared);
+        is_shared.then_some(
+            "the disk has no locks: let no other nav-sim write the same output meanwhile",
+        )
+    }
 }
 
 impl Drop for Claims {
@@ -635,7 +646,8 @@ impl<C: Command> Asked<C> {
         mut manifest: Manifest,
         context: &Context<'_>,
     ) -> Result<Vec<PathBuf>> {
-        let mut written = Vec::new();
+        // all are on the disk before any has its name
+        let (mut written, mut filled) = (Vec::new(), Vec::new());
         match (C::OUT, &self.out) {
             (Out::Directory { .. }, Some(out)) => {
                 let before = std::fs::read_to_string(out.join(MANIFEST)).unwrap_or_default();
@@ -655,15 +667,11 @@ impl<C: Command> Asked<C> {
                 written.push(out.clone());
             }
             (Out::File { .. }, Some(out)) => {
-                // All are on the disk before any has its name.
-                let filled = answer.files().into_iter().map(|file| {
+                for file in answer.files() {
                     let path = beside(out, &file.name);
                     let text: String = file.parts.collect();
                     let bytes = packed(&path, text).map_err(|e| Failure::io(&path, e))?;
-                    Ok((atomic::filled(&path, &bytes)?, path))
-                });
-                for (file, path) in filled.collect::<Result<Vec<_>>>()? {
-                    file.commit()?;
+                    filled.push(atomic::filled(&path, &bytes)?);
                     written.push(path);
                 }
             }
@@ -675,9 +683,10 @@ impl<C: Command> Asked<C> {
                 true => document.html().into(),
                 false => encode(document.svg(), &form).map_err(Failure::could_not)?,
             };
-            atomic::write(path, bytes)?;
+            filled.push(atomic::filled(path, &bytes)?);
             written.push(path.clone());
         }
+        atomic::commit(filled)?;
         Ok(written)
     }
 }

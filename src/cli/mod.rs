@@ -403,8 +403,9 @@ fn init(args: &InitArgs, session: &Session) -> Result<String, Failure> {
 fn drive<C: crate::app::Command>(asked: &Asked<C>, session: &Session) -> Result<()> {
     let mut manifest = asked.manifest(session.common.seed)?;
     manifest.command.clone_from(&session.given);
-    let _claims = asked.claim(&manifest, session.common.force)?;
+    let claims = asked.claim(&manifest, session.common.force)?;
     let context = session.context().reading(manifest.inputs.clone());
+    context.warn_each(claims.warning());
     let answer = asked.request.run(&context)?;
     let document = answer.document();
     let file = answer.files().into_iter().next();

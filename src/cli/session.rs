@@ -4,10 +4,11 @@
 use super::Failure;
 use crate::app::{Answer, Context, Front};
 use crate::failure::system_words;
+use crate::io::atomic::remove_unfinished;
 use crate::parse;
 use crate::report::{WIDTH, json};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
-use nav_sim_document::{Document, Importance, Note, turns};
+use nav_sim_document::{Document, Importance, Note, one_line};
 use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -93,6 +94,7 @@ impl Session {
             Err(e) if e.kind() != ErrorKind::BrokenPipe => {
                 let failure = Failure::could_not(format!("standard output: {}", system_words(&e)));
                 self.failure(&failure);
+                remove_unfinished();
                 std::process::exit(failure.code().into());
             }
             _ => {}
@@ -118,7 +120,7 @@ impl Session {
     /// Says what is done, on stderr.
     pub(crate) fn say(&self, text: impl Display) {
         if !self.common.quiet {
-            let _ = writeln!(std::io::stderr(), "{}", safe(&text.to_string()));
+            let _ = writeln!(std::io::stderr(), "{}", one_line(&text.to_string()));
         }
     }
 
@@ -138,8 +140,8 @@ impl Session {
             always => always == Color::Always,
         };
         match is_painted {
-            true => format!("\x1b[{style}m{word}\x1b[0m {}", safe(text)),
-            false => format!("{word} {}", safe(text)),
+            true => format!("\x1b[{style}m{word}\x1b[0m {}", one_line(text)),
+            false => format!("{word} {}", one_line(text)),
         }
     }
 
@@ -210,12 +212,12 @@ fn line(bar: &ProgressBar) -> String {
 
 /// A text whose control characters (of file names, say) do nothing to a terminal; lines and tabulators stay.
 fn safe(text: &str) -> String {
-    let is_unsafe = |c: char| turns(c) || c.is_control() && c != '\n' && c != '\t';
-    let shown = |c: char| match is_unsafe(c) {
-        true => c.escape_default().to_string(),
-        false => c.to_string(),
+    let parts = text.split_inclusive(['\n', '\t']);
+    let shown = |part: &str| {
+        let words = part.trim_end_matches(['\n', '\t']);
+        one_line(words) + &part[words.len()..]
     };
-    text.chars().map(shown).collect()
+    parts.map(shown).collect()
 }
 
 #[cfg(test)]

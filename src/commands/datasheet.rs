@@ -1,7 +1,9 @@
 //! `nav-sim datasheet`: models from data sheets, and the catalogue of IMUs.
 
 use crate::app::{Command, Context, Failure, Out, PlainAnswer, Refuse, Result};
-use crate::io::datasheet::{CATALOGUE, Datasheet, Entry, Figure, Quantity, catalogued, read};
+use crate::io::datasheet::{
+    CATALOGUE, Datasheet, Entry, Figure, GRADE, Quantity, catalogued, measured, read,
+};
 use crate::io::model_file;
 use crate::io::suggest::nearest;
 use crate::parse;
@@ -14,7 +16,7 @@ use std::path::PathBuf;
 ///
 /// The model has white noise of the given density, Gauss-Markov processes whose Allan deviation has the bias
 /// instability as its minimum, and a random walk. [provenance] of the model file holds every figure as given and the
-/// parameters that follow from it. Flags override the entry of the catalogue.
+/// parameters that follow from it. Flags override the entry of the catalogue, and the file of --from.
 #[derive(clap::Args, Debug, Clone)]
 #[command(before_help = "\
 Examples:
@@ -28,15 +30,18 @@ pub struct DatasheetArgs {
     /// Catalogue entry by name (see --list)
     #[arg(long, value_name = "NAME")]
     unit: Option<String>,
+    /// Figures that Kalibr, allan_variance_ros or imu_utils measured (YAML)
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["entry", "unit"])]
+    from: Option<PathBuf>,
     /// Figures in the place of the entry's.
     #[command(flatten)]
     figures: Figures,
     /// List the catalogue
     #[arg(long)]
     list: bool,
-    /// Sample rate of the model
-    #[arg(long, value_name = "HZ", value_parser = parse::rate_hz, default_value = "100")]
-    rate_hz: f64,
+    /// Sample rate of the model [default: that of --from, else 100]
+    #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
+    rate_hz: Option<f64>,
 }
 
 impl Command for DatasheetArgs {
@@ -53,17 +58,24 @@ impl Command for DatasheetArgs {
         if self.list {
             let units = CATALOGUE.iter().map(|(name, _)| catalogued_unit(name));
             let units = units.collect::<Result<Vec<_>>>()?;
-            let document = Document::new("Data sheets", Tone::Good, units.iter().map(text));
+            let document = Document::new("Data sheets", Tone::Good, units.iter().flat_map(lines));
             let json = json!({ "schema_version": 1, "units": units });
             return Ok(PlainAnswer::new(json, document));
         }
-        let mut sheet = match (&self.entry, &self.unit) {
-            (Some(path), _) => read(path)?,
-            (None, Some(name)) => named(name)?,
-            (None, None) => Datasheet::default(),
+        let (mut sheet, rate_hz) = match (&self.entry, &self.unit, &self.from) {
+            (Some(path), ..) => (read(path)?, None),
+            (_, Some(name), _) => (named(name)?, None),
+            (.., Some(path)) => measured(path, self.rate_hz)?,
+            _ => (Datasheet::default(), None),
         };
+        if self.from.is_some() {
+            for assumption in &sheet.assumptions {
+                context.remark(assumption);
+            }
+        }
         self.figures.over(&mut sheet);
-        let made = sheet.model_file(self.rate_hz).map_err(Failure::input)?;
+        let rate_hz = self.rate_hz.or(rate_hz).unwrap_or(100.0);
+        let made = sheet.model_file(rate_hz).map_err(Failure::input)?;
         if made.file.missing.len() == made.file.model.axes.len() {
             return Err(
                 Failure::input("no figure is given that makes a noise model")
@@ -100,6 +112,12 @@ pub struct Figures {
     /// Bias instability of the gyroscopes: deg/h, deg/s, rad/s
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Bias))]
     gyro_bias: Option<Quantity>,
+    /// Rate random walk K of the accelerometers: m/s²/sqrt(h), m/s³/sqrt(Hz), …
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Walk))]
+    accel_rrw: Option<Quantity>,
+    /// Rate random walk K of the gyroscopes: deg/h/sqrt(h), rad/s²/sqrt(Hz), …
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Walk))]
+    gyro_rrw: Option<Quantity>,
     /// Longest correlation time of both biases: s, min, h [default: 300 s, with a warning]
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::CorrelationTime))]
     corr_time: Option<Quantity>,
@@ -124,6 +142,8 @@ impl Figures {
             (Sensor::Gyro, Figure::Noise, &self.arw),
             (Sensor::Accel, Figure::Bias, &self.accel_bias),
             (Sensor::Gyro, Figure::Bias, &self.gyro_bias),
+            (Sensor::Accel, Figure::Walk, &self.accel_rrw),
+            (Sensor::Gyro, Figure::Walk, &self.gyro_rrw),
             (Sensor::Accel, Figure::CorrelationTime, &self.corr_time),
             (Sensor::Gyro, Figure::CorrelationTime, &self.corr_time),
             (Sensor::Accel, Figure::TurnOn, &self.accel_turn_on),
@@ -158,19 +178,21 @@ fn named(name: &str) -> Result<Datasheet> {
 }
 
 fn lacking(sheet: &Datasheet, sensor: Sensor) -> impl Iterator<Item = String> {
-    let flag = match sensor {
-        Sensor::Accel => "vrw",
-        Sensor::Gyro => "arw",
-    };
-    let figures = [
-        (Figure::Noise, "white noise", flag.to_owned()),
-        (Figure::Bias, "bias instability", format!("{sensor}-bias")),
-        (Figure::TurnOn, "turn-on bias", format!("{sensor}-turn-on")),
-    ];
-    figures
-        .into_iter()
-        .filter(move |f| sheet.value(sensor, f.0).is_none())
-        .map(move |(_, name, flag)| format!("{sensor}: no {name} is given (--{flag})"))
+    sheet.lacking(sensor).map(move |(figure, entry)| {
+        let (name, flag) = match (figure, sensor) {
+            (Figure::Noise, Sensor::Accel) => ("white noise", "vrw".to_owned()),
+            (Figure::Noise, Sensor::Gyro) => ("white noise", "arw".to_owned()),
+            (Figure::Bias, _) => ("bias instability", format!("{sensor}-bias")),
+            _ => ("turn-on bias", format!("{sensor}-turn-on")),
+        };
+        match entry {
+            Some(entry) => {
+                let given = &entry.quantity.given;
+                format!("{sensor}: {name} {given} by grade, the data sheet states none (--{flag})")
+            }
+            None => format!("{sensor}: no {name} is given (--{flag})"),
+        }
+    })
 }
 
 /// A catalogued unit with the figures of its data sheet.
@@ -189,16 +211,20 @@ fn catalogued_unit(name: &str) -> Result<Value> {
 }
 
 /// The unit, and a line of figures for each sensor.
-fn text(unit: &Value) -> String {
+fn lines(unit: &Value) -> [String; 3] {
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let figures = |sensor: Sensor| {
         let own = unit["figures"].as_array().into_iter().flatten();
         let own = own.filter(|f| f["sensor"] == sensor.name());
         let shown: Vec<_> = own
-            .map(|f| text(&f["figure"]) + " " + &text(&f["given"]))
+            .map(|f| {
+                let grade = if f["source"] == GRADE { " (grade)" } else { "" };
+                text(&f["figure"]) + " " + &text(&f["given"]) + grade
+            })
             .collect();
-        format!("\n  {sensor:<5} {}", shown.join(", "))
+        format!("  {sensor:<5} {}", shown.join(", "))
     };
     let [name, class, title] = ["unit", "class", "name"].map(|key| text(&unit[key]));
-    format!("{name:<12} {class:<12} {title}") + &Sensor::ALL.map(figures).concat()
+    let [accel, gyro] = Sensor::ALL.map(figures);
+    [format!("{name:<12} {class:<12} {title}"), accel, gyro]
 }

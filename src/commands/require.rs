@@ -191,7 +191,7 @@ impl Requirements {
         let missing = missing(&file.not_stated());
         if !missing.is_empty() {
             context.warn(format!(
-                "{}: what is not stated counts as none: {missing}",
+                "{}: what is not stated counts as none, unless by grade: {missing}",
                 path.display()
             ));
         }
@@ -940,12 +940,12 @@ struct Judgement {
 // Units of a catalogue against a limit.
 
 /// What a ranking takes for granted.
-const RULE: &str = "A figure that is missing counts as none: open means that the limit would be kept then. Turn-on bias is the repeatability from one switching-on to the next; an initial tolerance of the zero offset counts as removed before use. Figures named without a sensor are missing for both.";
+const RULE: &str = "A figure that is missing counts as none: open means that the limit would be kept then. Turn-on bias is the repeatability from one switching-on to the next, or that of the grade; an initial tolerance of the zero offset counts as removed before use. Figures named without a sensor are missing for both.";
 
 /// `bias, accel turn-on`: figures that both sensors lack are named once.
 fn missing(not_stated: &[String]) -> String {
     let mut words = not_stated.join(", ").replace('_', "-");
-    for figure in ["noise", "bias", "turn-on"] {
+    for figure in ["noise", "bias", "turn-on", "turn-on by grade"] {
         words = words.replace(&format!("accel {figure}, gyro {figure}"), figure);
     }
     words

@@ -287,6 +287,21 @@ fn reaches(
             "replicates are counted from 1; more of them with --replicates",
         );
     }
+    // the named ones are of as many recordings as in the paper
+    let is_named = contamination_file::names().contains(&name.as_str());
+    let beyond = |rule: &&Rule| rule.replicate.is_some_and(|k| k > replicates);
+    if let Some(Rule {
+        place,
+        replicate: Some(k),
+        ..
+    }) = rules.iter().find(beyond)
+        && !is_named
+    {
+        return refused(
+            format!("{place}: corrupts replicate {k}, of which only {replicates} are made"),
+            "more of them with --replicates, or leave it out of the list",
+        );
+    }
     let made = |rule: &Rule| channels.iter().any(|c| c.sensor == rule.sensor);
     let Some(Rule { sensor, place, .. }) = rules.iter().find(|rule| !made(rule)) else {
         return Ok(());

@@ -216,9 +216,10 @@ impl Command for CheckTrajectory {
             ("attitude (rad)", "closure/attitude_rad bounds/attitude_rad"),
         ];
         let (start_s, points) = (trajectory.start_s(), places.len());
-        let text = format!(
-            "{name}: {} s from {start_s} s, {points} points\nclosure at {} Hz over {} s: {}\n{}",
-            trajectory.end_s() - start_s,
+        let length_s = trajectory.end_s() - start_s;
+        let path = format!("{name}: {length_s} s from {start_s} s, {points} points");
+        let closes = format!(
+            "closure at {} Hz over {} s: {}",
             closure.rate_hz,
             closure.duration_s,
             if is_within {
@@ -226,8 +227,9 @@ impl Command for CheckTrajectory {
             } else {
                 "BEYOND A BOUND"
             },
-            Table::of_keys(&json, &["", "largest", "limit"], &rows).columns(usize::MAX)
         );
+        let table = Table::of_keys(&json, &["", "largest", "limit"], &rows).columns(usize::MAX);
+        let table = table.lines().map(str::to_owned);
         let (mut missed, mut hints) = (Vec::new(), Vec::new());
         if !is_within {
             let (c, b) = (&closure, &bounds);
@@ -253,7 +255,8 @@ impl Command for CheckTrajectory {
         }
         let message = format!("{name}: {}", missed.join("; "));
         let unmet = (!missed.is_empty()).then(|| Failure::bound(message).hint(hints.join("; ")));
-        let document = Document::new("Trajectory", Tone::Good, [text]);
+        let lines = [path, closes].into_iter().chain(table);
+        let document = Document::new("Trajectory", Tone::Good, lines);
         Ok(PlainAnswer::new(json, document).judged(unmet))
     }
 }

@@ -1,7 +1,7 @@
 //! A result as a document, before it is rendered.
 
 use crate::chart::{Chart, Size};
-use crate::draw::{Canvas, NARROW, SMALL, WIDE, draw, escape};
+use crate::draw::{Canvas, NARROW, SMALL, WIDE, draw, escape, one_line};
 use crate::picture::{CHART_STYLE, COLOURS, svg};
 use crate::table::{Cell, Table};
 use std::fmt::Write as _;
@@ -186,7 +186,7 @@ impl Document {
     /// The verdict, and as much of the lead table as a screen has room for.
     #[must_use]
     pub fn terminal(&self, width: usize) -> String {
-        let verdict = self.verdict.join("\n");
+        let verdict = self.verdict_lines();
         let first = self.blocks.iter().find_map(|block| match block {
             Block::Table(table) => Some(table),
             _ => None,
@@ -211,9 +211,14 @@ impl Document {
     /// All that can be said without figures.
     #[must_use]
     pub fn verbose(&self, width: usize) -> String {
-        let mut text = self.verdict.join("\n") + "\n";
+        let mut text = self.verdict_lines() + "\n";
         blocks(&self.blocks, width, &mut text);
         text
+    }
+
+    fn verdict_lines(&self) -> String {
+        let lines: Vec<String> = self.verdict.iter().map(|line| one_line(line)).collect();
+        lines.join("\n")
     }
 
     /// The notes that a terminal shows, the most important first; all of them to those who ask for more.

@@ -496,15 +496,25 @@ pub(crate) fn text(svg: &mut String, class: &str, (x, y): (f64, f64), anchor: &s
 /// Text made safe inside HTML and SVG.
 #[must_use]
 pub fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
+    one_line(text)
+        .replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
         .replace('"', "&quot;")
 }
 
-/// Whether a character turns the direction of what follows, and so shows a name as another (Unicode TR 36, sec. 2.1).
+/// Text of names, of files say, that neither begins a line, nor does anything to a terminal, nor is shown as another.
 #[must_use]
-pub const fn turns(c: char) -> bool {
+pub fn one_line(text: &str) -> String {
+    let shown = |c: char| match turns(c) || c.is_control() {
+        true => c.escape_default().to_string(),
+        false => c.to_string(),
+    };
+    text.chars().map(shown).collect()
+}
+
+/// Whether a character turns the direction of what follows, and so shows a name as another (Unicode TR 36, sec. 2.1).
+const fn turns(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 

@@ -30,7 +30,7 @@ mod document;
 
 pub use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Series, Size, Stroke};
 pub use document::{Block, Document, Importance, NOTES, Note, Tone};
-pub use draw::{escape, turns};
+pub use draw::{escape, one_line};
 pub use number::{readable, seconds, short_names, shortest, six_digits, window};
 pub use picture::{FORMS, encode, svg};
 pub use table::{Cell, Table};

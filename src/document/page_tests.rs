@@ -184,7 +184,7 @@ fn a_legend_stays_within_its_picture() {
 #[cfg(feature = "pictures")]
 #[test]
 fn a_character_that_no_picture_can_hold_is_an_error() {
-    let refused = encode(svg("a\u{1}b", &[chart()]), "png").unwrap_err();
+    let refused = encode(svg("a\u{fffe}b", &[chart()]), "png").unwrap_err();
     assert!(
         refused.starts_with("the picture cannot be drawn as PNG: "),
         "{refused}"

@@ -1,5 +1,6 @@
 //! Tables: their cells keep where a number stands in the result.
 
+use crate::draw::one_line;
 use crate::number::{readable, seconds};
 use serde::Serialize;
 use serde_json::Value;
@@ -273,7 +274,7 @@ impl Table {
         let rows = self
             .rows
             .iter()
-            .map(|row| row.iter().map(|cell| cell.text.clone()).collect());
+            .map(|row| row.iter().map(|cell| one_line(&cell.text)).collect());
         std::iter::once(self.head.clone()).chain(rows).collect()
     }
 
@@ -331,11 +332,7 @@ impl Table {
     /// A table in Markdown.
     #[must_use]
     pub fn markdown(&self) -> String {
-        let escaped = |text: &String| {
-            text.replace('|', "\\|")
-                .replace('<', "&lt;")
-                .replace(['\n', '\r'], " ")
-        };
+        let escaped = |text: &String| text.replace('|', "\\|").replace('<', "&lt;");
         let lines: Vec<Vec<String>> = self
             .lines()
             .iter()
@@ -430,7 +427,7 @@ mod tests {
         let markdown = table(&[vec!["run"], vec!["a|b\n<script>"]]).markdown();
         assert_eq!(
             markdown,
-            "| run              |\n|------------------|\n| a\\|b &lt;script> |"
+            "| run               |\n|-------------------|\n| a\\|b\\n&lt;script> |"
         );
     }
 

@@ -53,7 +53,7 @@ fn remove(path: &Path) {
 struct Temporary {
     path: PathBuf,
     /// Locked until it is closed, where it is a marker.
-    _lock: Option<File>,
+    lock: Option<File>,
 }
 
 /// Ending of what is being written.
@@ -62,7 +62,7 @@ pub(crate) const PARTIAL: &str = ".partial";
 impl Temporary {
     fn new(path: PathBuf, lock: Option<File>) -> Self {
         locked(&UNFINISHED).insert(path.clone());
-        Self { path, _lock: lock }
+        Self { path, lock }
     }
 
     /// Makes something beside the destination: hidden, and with an ending that no reader takes for data.
@@ -105,8 +105,7 @@ impl Temporary {
     }
 
     /// Gives it its name.
-    fn rename(&mut self, to: &Path) -> io::Result<()> {
-        let mut unfinished = locked(&UNFINISHED);
+    fn rename(&self, to: &Path, unfinished: &mut BTreeSet<PathBuf>) -> io::Result<()> {
         fs::rename(&self.path, to)?;
         unfinished.remove(&self.path);
         Ok(())
@@ -168,24 +167,46 @@ pub(crate) fn remove_abandoned(path: &Path) {
 /// Writes a whole file.
 ///
 /// # Errors
-/// As [`filled`] and [`AtomicFile::commit`].
+/// As [`filled`] and [`commit`].
 pub(crate) fn write(destination: &Path, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
-    filled(destination, contents.as_ref())?.commit()
+    commit([filled(destination, contents.as_ref())?])
 }
 
-/// A file that is written but does not have its name yet.
+/// Gives files their names, one after the other and without an interrupt between.
+///
+/// # Errors
+/// When a rename is refused; those without their names are gone then.
+pub(crate) fn commit(files: impl IntoIterator<Item = AtomicFile>) -> Result<(), Failure> {
+    let mut unfinished = locked(&UNFINISHED);
+    let files: Vec<AtomicFile> = files.into_iter().collect();
+    let renamed = files.iter().try_for_each(|file| {
+        let temporary = file.temporary.iter();
+        let mut renamed = temporary.map(|t| t.rename(&file.destination, &mut unfinished));
+        renamed
+            .next()
+            .unwrap_or(Ok(()))
+            .map_err(|e| Failure::io(&file.destination, e))
+    });
+    drop(unfinished);
+    renamed
+}
+
+/// A file that is written, to the disk, but does not have its name yet.
 ///
 /// # Errors
 /// When the directory cannot be made or written to, or the disk is full.
 pub(crate) fn filled(destination: &Path, contents: &[u8]) -> Result<AtomicFile, Failure> {
     let opened = AtomicFile::open(destination);
     let mut file = opened.map_err(|e| Failure::unwritable(destination, e))?;
-    let written = file.file.write_all(contents);
+    let mut written = file.file.write_all(contents);
+    if file.temporary.is_some() {
+        written = written.and_then(|()| file.file.sync_all());
+    }
     written.map_err(|e| Failure::io(destination, e))?;
     Ok(file)
 }
 
-/// A file under a temporary name until [`AtomicFile::commit`]; dropped before that, it leaves nothing.
+/// A file under a temporary name until [`commit`]; dropped before that, it leaves nothing.
 ///
 /// A destination that exists and is no regular file (a pipe, `/dev/null`) is written directly; a symbolic
 /// link is followed. Missing parent directories are made.
@@ -219,19 +240,6 @@ impl AtomicFile {
             temporary,
             file,
         })
-    }
-
-    /// Flushes to the disk and gives the file its name.
-    ///
-    /// # Errors
-    /// When the disk is full or the rename is refused; nothing is left then.
-    pub(crate) fn commit(mut self) -> Result<(), Failure> {
-        let Some(temporary) = &mut self.temporary else {
-            return Ok(());
-        };
-        let synced = self.file.sync_all();
-        let finished = synced.and_then(|()| temporary.rename(&self.destination));
-        finished.map_err(|e| Failure::io(&self.destination, e))
     }
 }
 
@@ -298,10 +306,12 @@ impl AtomicDir {
     ///
     /// # Errors
     /// When a rename is refused.
-    pub(crate) fn commit(mut self) -> Result<(), Failure> {
+    pub(crate) fn commit(self) -> Result<(), Failure> {
         let moved = match self.destination.is_dir() {
             true => self.replace(),
-            false => self.staging.rename(&self.destination),
+            false => self
+                .staging
+                .rename(&self.destination, &mut locked(&UNFINISHED)),
         };
         moved.map_err(|e| Failure::io(&self.destination, e))
     }
@@ -325,7 +335,7 @@ impl AtomicDir {
 #[must_use = "another command may write there as soon as this is dropped"]
 pub(crate) struct Claim {
     outputs: Vec<PathBuf>,
-    _marker: Option<Temporary>,
+    marker: Option<Temporary>,
     /// True if a process was killed that had claimed the same.
     is_left: bool,
 }
@@ -334,6 +344,13 @@ pub(crate) struct Claim {
 const MARKER: &str = ".claim";
 
 impl Claim {
+    /// True if another nav-sim may write there: the disk has no locks.
+    pub(crate) fn is_shared(&self) -> bool {
+        self.marker
+            .as_ref()
+            .is_some_and(|marker| marker.lock.is_none())
+    }
+
     /// Claims outputs in the place that `shown` names.
     fn new(shown: &Path, marker: &Path, outputs: Vec<PathBuf>) -> Result<Self, Failure> {
         let mut claimed = locked(&CLAIMED);
@@ -350,7 +367,7 @@ impl Claim {
         claimed.extend(outputs.iter().cloned());
         Ok(Self {
             outputs,
-            _marker: Some(marker),
+            marker: Some(marker),
             is_left,
         })
     }
@@ -412,7 +429,7 @@ pub(crate) fn claim_file<'a>(
     if fs::metadata(output).is_ok_and(|m| !m.is_file()) {
         return Ok(Claim {
             outputs: Vec::new(),
-            _marker: None,
+            marker: None,
             is_left: false,
         });
     }

@@ -17,7 +17,7 @@ fn a_file_appears_at_commit_only() {
     let path = dir.path().join("deep/er/model.toml");
     let file = filled(&path, b"whole").unwrap();
     assert!(!path.exists());
-    file.commit().unwrap();
+    commit([file]).unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"whole");
     assert_eq!(listing(path.parent().unwrap()), ["model.toml"]);
 }

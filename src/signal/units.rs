@@ -77,6 +77,26 @@ pub type Probability = Between<0, 1, true>;
 /// Coefficients of a stationary AR(1), as [`Process::ar1`](crate::noise::Process::ar1) takes them.
 pub type Stationary = Between<-1, 1, true>;
 
+/// A number ≥ 0 that a sensor can have, in its unit.
+pub type Amount = Between<0, 1_000_000_000, false>;
+
+/// A number > 0 that a sensor can have, in its unit: with others a filter divides by nothing, or by what is no number.
+pub struct Measurable;
+
+impl JsonSchema for Measurable {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Measurable".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "number", "minimum": 1e-6, "maximum": 1e9 })
+    }
+}
+
 impl<const LOW: i64, const HIGH: i64, const OPEN: bool> From<Between<LOW, HIGH, OPEN>> for f64 {
     fn from(value: Between<LOW, HIGH, OPEN>) -> Self {
         value.0

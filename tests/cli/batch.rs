@@ -75,6 +75,21 @@ fn cells_are_known_by_what_they_hold() {
     ended(dir, "batch study.toml -o out --force", 0);
     ended(dir, "batch study.toml -o fresh", 0);
     assert_eq!(results(&dir.join("out")), results(&dir.join("fresh")));
+    // another version with the same figures goes on, one with others says so
+    let manifest = dir.join("fresh/cells/length_s=2_wrong/manifest.json");
+    let of_other = |from: &str, to: &str| {
+        let text = fs::read_to_string(&manifest).unwrap();
+        assert!(text.contains(from), "{text}");
+        fs::write(&manifest, text.replacen(from, to, 1)).unwrap();
+    };
+    let own = format!("\"version\": \"{}\"", env!("CARGO_PKG_VERSION"));
+    of_other(&own, "\"version\": \"0.0.9\"");
+    let said = ended(dir, "batch study.toml -o fresh", 0);
+    assert!(!said.contains("runs,"), "{said}");
+    of_other("\"key\": \"", "\"key\": \"0");
+    let said = ended(dir, "batch study.toml -o fresh", 2);
+    let words = "cell length_s=2_wrong was made by version 0.0.9, whose figures differ";
+    assert!(said.contains(words), "{said}");
     // cells of another study are named and left
     fs::write(dir.join("study.toml"), more.replace("[2, 3, 4,", "[2, 4,")).unwrap();
     let said = ended(dir, "batch study.toml -o out", 0);
@@ -240,7 +255,7 @@ fn bad_studies_are_refused_before_anything_is_written() {
         (
             "runs = 77",
             "rns = 77",
-            "cell length_s=2_imu: run: there is no option rns",
+            "study.toml, line 6: cell length_s=2_imu: run: there is no option rns",
             "did you mean runs?",
         ),
         (
@@ -274,6 +289,18 @@ fn bad_studies_are_refused_before_anything_is_written() {
             "-o",
         ),
         ("seed = 5", "seed = 5\ngnss.rate = 5", "rate", "gnss"),
+        (
+            "runs = 77",
+            "runs = {}",
+            "study.toml, line 6: cell length_s=2_imu: \"run.runs\" = {} has no value",
+            "",
+        ),
+        (
+            "runs = 77",
+            "runs = [77, -1]",
+            "study.toml, line 6: cell length_s=2_imu_runs=-1: --runs='-1'",
+            "not a whole number",
+        ),
         (
             "seed = 5",
             "seed = 5\ngnss.rate_hz = [1, nan]",

@@ -212,3 +212,49 @@ fn a_run_takes_the_turn_on_bias_of_the_model_file() {
     );
     assert_eq!(used["imu"]["turn_on_bias_gyro_rad_s"], 0.0);
 }
+
+/// Figures of Kalibr become a model, its export is read as the same figures, and again.
+#[test]
+fn figures_of_kalibr_come_back_from_an_export() {
+    let place = tempfile::tempdir().unwrap();
+    let yaml = "accelerometer_noise_density: 0.0025\naccelerometer_random_walk: 7.1e-05\ngyroscope_noise_density: 1.9e-4\n\
+         gyroscope_random_walk: 2.6e-06\nupdate_rate: 200.0\n";
+    fs::write(place.path().join("imu.yaml"), yaml).unwrap();
+    let ran = done(place.path(), "datasheet --from imu.yaml -o a.toml");
+    assert!(
+        ran.stderr
+            .contains("gyro: no turn-on bias is given (--gyro-turn-on)"),
+        "{}",
+        ran.stderr
+    );
+    done(place.path(), "export a.toml --target kalibr -o back.yaml");
+    done(place.path(), "datasheet --from back.yaml -o b.toml");
+    let flags = "--vrw 0.15m/s/sqrt(h) --accel-rrw 4.26e-3m/s^2/sqrt(h) --arw 1.9e-4rad/s/sqrt(Hz) --gyro-rrw 2.6e-6rad/s^2/sqrt(Hz)";
+    done(
+        place.path(),
+        &format!("datasheet {flags} --rate-hz 200 -o c.toml"),
+    );
+    let [a, b, c] = ["a", "b", "c"].map(|name| {
+        model_file::read(&place.path().join(format!("{name}.toml")))
+            .unwrap()
+            .model
+    });
+    assert_eq!((a.rate_hz, b.rate_hz), (200.0, 200.0));
+    for (axis, expected) in a.axes.iter().enumerate() {
+        for other in [&b, &c].map(|model| &model.axes[axis]) {
+            let values = |noise: &nav_sim::signal::noise::Composite| -> Vec<(&str, f64)> {
+                noise
+                    .processes
+                    .iter()
+                    .flat_map(|p| p.parameters())
+                    .collect()
+            };
+            for ((name, x), (other_name, y)) in values(expected).into_iter().zip(values(other)) {
+                assert!(
+                    name == other_name && (x / y - 1.0).abs() < 1e-12,
+                    "{name} {x:e} {y:e}"
+                );
+            }
+        }
+    }
+}

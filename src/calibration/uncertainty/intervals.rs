@@ -341,7 +341,7 @@ pub(crate) fn practical_intervals(
         let curve = Curve::largest(&[model], rate_hz, Horizon::default()).ok()?;
         let pair = curve.pair(Policy::Matched, Bias::Walk);
         let minimum = Minimum::of(&[model], rate_hz, range_s);
-        let instability = minimum.map(|m| m.bias_instability());
+        let instability = minimum.map(|m| m.deviation);
         Some([Some(pair.density), Some(pair.walk), instability])
     };
     let own = read(&outcome.fit.composite);

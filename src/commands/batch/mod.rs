@@ -143,7 +143,7 @@ impl BatchRequest {
         let changed = adopt(&place, &cells, self.dry_run, context);
         if let (Some((name, what)), false) = (changed.first(), self.force || self.dry_run) {
             return refused(
-                format!("cell {name} is of another study: {what}"),
+                format!("cell {name} {what}"),
                 "choose another directory with --out, or compute it again with --force",
             );
         }
@@ -248,15 +248,16 @@ fn adopt(
     cells.iter().filter_map(changed).collect()
 }
 
-/// The first setting or input in which two requests differ.
+/// What a cell is that was asked for otherwise: the first setting or input that differs.
 fn difference(there: &Manifest, wanted: &Manifest) -> String {
     let keys = there.options.keys().chain(wanted.options.keys());
     let shown =
-        |values: Option<&Vec<String>>| values.map_or("not given".to_owned(), |v| v.join(" "));
+        |values: Option<&Vec<String>>| values.map_or("the default".to_owned(), |v| v.join(" "));
     for key in keys {
         let [old, new] = [there, wanted].map(|manifest| manifest.options.get(key));
         if old != new {
-            return format!("its \"{key}\" is {}, not {}", shown(old), shown(new));
+            let (old, new) = (shown(old), shown(new));
+            return format!("is of another study: its \"{key}\" is {old}, not {new}");
         }
     }
     let differs = |input: &&crate::app::Input| {
@@ -266,8 +267,11 @@ fn difference(there: &Manifest, wanted: &Manifest) -> String {
             .any(|old| old.role == input.role && old.blake3 == input.blake3)
     };
     match wanted.inputs.iter().find(differs) {
-        Some(input) => format!("{} has changed", input.path),
-        None => "it is of another version of the figures".to_owned(),
+        Some(input) => format!("is of another study: {} has changed", input.path),
+        None => format!(
+            "was made by version {}, whose figures differ",
+            there.version
+        ),
     }
 }
 
@@ -355,6 +359,9 @@ pub(crate) struct Study {
     /// Labels of the reference, by axis (default: the first model)
     #[schemars(with = "Map<String, serde_json::Value>")]
     reference: Table,
+    /// Its file, where a refusal stands in one of its lines.
+    #[serde(skip)]
+    source: Option<Source>,
 }
 
 /// Axis and label, `[vary]` first, then lists, as written.
@@ -385,7 +392,11 @@ impl Study {
             let text = source::text(path).map_err(|e| Failure::io(path, e))?;
             serde_json::from_str(&text).refuse_within(path.display())?
         } else {
-            Source::read(path)?.get()?
+            let source = Source::read(path)?;
+            Self {
+                source: Some(source).filter(|_| set.is_empty()),
+                ..Source::read(path)?.get()?
+            }
         };
         for assignment in set {
             let Some((key, value)) = assignment.split_once('=') else {
@@ -407,7 +418,7 @@ impl Study {
     pub(crate) fn cells(&self, beside: &Path) -> Result<Vec<Cell>> {
         let mut requests = vec![(Labels::new(), self.run.clone())];
         for (axis, values) in &self.vary {
-            let values = named(axis, values)?;
+            let values = named(axis, values).map_err(|e| self.at(&format!("vary.{axis}"), e))?;
             let product = |(labels, run): &(Labels, Table)| -> Vec<(Labels, Table)> {
                 let with = |(label, keys): &(String, Table)| {
                     let mut run = run.clone();
@@ -436,10 +447,30 @@ impl Study {
                     "name the values under [vary], a table of keys each",
                 );
             }
-            door.cell(name.clone(), labels, run)
-                .map_err(|e| e.within(&format!("cell {name}")))
+            door.cell(name.clone(), labels, run.clone()).map_err(|e| {
+                let leaves = leaves(&run, "");
+                let is_refused = |(path, value): &(String, &Value)| {
+                    ["out", "plot"].contains(&path.as_str())
+                        || value.is_table()
+                        || !is_finite(value)
+                        || !door.takes(path, value)
+                };
+                let refused = leaves.into_iter().find(is_refused);
+                let e = e.within(&format!("cell {name}"));
+                refused.map_or(e.clone(), |(path, _)| self.at(&format!("run.{path}"), e))
+            })
         });
         cells.collect()
+    }
+
+    /// A refusal in the line of a key.
+    fn at(&self, key: &str, failure: Failure) -> Failure {
+        match &self.source {
+            Some(source) if failure.file().is_none() => {
+                failure.at(source.path(), source.line_of(key) as u64)
+            }
+            _ => failure,
+        }
     }
 
     /// The labels that references have: those of the study, else the first model.
@@ -473,7 +504,8 @@ impl Study {
                     true => format!("there is no axis {axis}"),
                     false => format!("labels: {}", known.join(", ")),
                 };
-                return refused(message, hint);
+                let failure = Failure::input(message).hint(hint);
+                return Err(self.at(&format!("reference.{axis}"), failure));
             }
         }
         Ok(())
@@ -715,7 +747,7 @@ fn fill(value: &mut Value, labels: &Labels) -> Result<()> {
 /// Values that are no tables, with their paths: `gnss.rate_hz`.
 fn leaves<'a>(table: &'a Table, prefix: &str) -> Vec<(String, &'a Value)> {
     let of_key = |(key, value): (&String, &'a Value)| match value {
-        Value::Table(inner) => leaves(inner, &format!("{prefix}{key}.")),
+        Value::Table(inner) if !inner.is_empty() => leaves(inner, &format!("{prefix}{key}.")),
         value => vec![(format!("{prefix}{key}"), value)],
     };
     table.iter().flat_map(of_key).collect()
@@ -733,6 +765,11 @@ fn named_request(run: &Table) -> Result<Map<String, serde_json::Value>> {
     if let Some((key, value)) = run.iter().find(|(_, value)| !is_finite(value)) {
         let message = format!("\"run.{key}\" = {value} is not finite");
         return Err(Failure::input(message));
+    }
+    if let Some((path, _)) = leaves(run, "").iter().find(|(_, value)| value.is_table()) {
+        return Err(Failure::input(format!(
+            "\"run.{path}\" = {{}} has no value"
+        )));
     }
     serde_json::to_value(run)
         .and_then(serde_json::from_value)

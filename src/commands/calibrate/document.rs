@@ -219,7 +219,7 @@ fn parameters(outcome: &Outcome) -> Table {
 
 /// Caption of [`chart`].
 const CAPTION: &str = "Allan deviation with its 95 % band, the recordings, the model and its processes, and what is exported: N is \
-     read at 1 s, K at 3 s, 0.664 B at the floor; below: wavelet variance, data over model.";
+     read at 1 s, K at 3 s, B at the floor; below: wavelet variance, data over model.";
 
 /// `Accelerometer x`, or `Gyroscope, all axes`.
 fn group_name(fitted: &FittedCurve) -> String {
@@ -265,7 +265,7 @@ fn chart(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_
             practical
                 .walk_is_observed()
                 .then_some(("K", 3.0, pair.walk)),
-            minimum.map(|m| ("0.664 B", m.tau_s, m.deviation)),
+            minimum.map(|m| ("B", m.tau_s, m.deviation)),
         ];
         upper.extend(
             read.into_iter()
@@ -844,7 +844,7 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
         let from = crossover.map_or(none.clone(), |t| format!("from {t}{until}"));
         let minimum = practical.parameters.minimum;
         let floor = minimum.map_or(none, |m| format!("floor at {}", duration(m.tau_s)));
-        let b = minimum.map(|m| m.bias_instability());
+        let b = minimum.map(|m| m.deviation);
         let k = practical.walk_is_observed().then_some(pair.walk);
         let unit = |quantity: Quantity| quantity.sheet(sensor);
         let (n, to) = (Some(pair.density), to.unwrap_or_default());

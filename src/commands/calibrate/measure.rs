@@ -121,7 +121,7 @@ pub(crate) fn measure(
     shortest(&report, scales, context);
     // a file for each sensor, as phones write them, is no more than one recording of each
     let of = |channel: &Channel| {
-        let has = |look: &&MeasuredRecording| look.signals.iter().any(|(own, _)| own == channel);
+        let has = |look: &&MeasuredRecording| look.replicates.iter().any(|(own, _)| own == channel);
         looks.iter().filter(has).count()
     };
     let estimators = estimators.estimators(Channel::ALL.iter().map(of).max().unwrap_or(0))?;

@@ -439,7 +439,7 @@ impl SensorExport {
         let floor = match self.largest.minimum {
             None => "B not reached".to_owned(),
             Some(m) => {
-                let floor = figure(Quantity::Bias, m.bias_instability());
+                let floor = figure(Quantity::Bias, m.deviation);
                 format!("B {floor} at {}", seconds(m.tau_s))
             }
         };

@@ -6,6 +6,7 @@
 //! range, `else` stands for what is not finite. `{=}` repeats the last value, `{unit}` its unit; `{head OPEN|CLOSE}` is the head of comments.
 
 use super::{Entry, Export, SensorExport};
+use nav_sim_document::one_line;
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_signal::names::UnknownName;
 use nav_sim_signal::noise::practical::{Bias, Markov};
@@ -411,17 +412,7 @@ pub(super) fn number(value: f64) -> String {
 
 /// A text that stays within its comment, whatever a file is called: no line of its own, no control sequence, no end of XML.
 fn comment(text: &str) -> String {
-    let shown = |c: char| {
-        if c.is_control() {
-            c.escape_default().to_string()
-        } else {
-            c.to_string()
-        }
-    };
-    text.chars()
-        .map(shown)
-        .collect::<String>()
-        .replace("--", "- -")
+    one_line(text).replace("--", "- -")
 }
 
 impl Export {

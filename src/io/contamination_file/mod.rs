@@ -90,8 +90,11 @@ fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, Failure> {
             let values = named[sensor.name()][number - 1].as_table();
             for (name, value) in values.into_iter().flatten() {
                 let count = value.as_array().map_or(listed, Vec::len);
-                if count != listed {
-                    let reason = format!("has {count} values for {listed} replicates");
+                if count != listed || value.is_array() && replicates.is_none() {
+                    let reason = match replicates {
+                        Some(_) => format!("has {count} values for {listed} replicates"),
+                        None => "is a list, where no \"replicates\" are listed".to_owned(),
+                    };
                     return Err(source.refused(&format!("{key}.{name}"), reason));
                 }
             }
@@ -166,9 +169,9 @@ fn operation(
                 None => Extent::Samples(samples),
             };
             Operation::Bursts {
-                count: count.unwrap_or(5),
-                length: extent(length_samples.unwrap_or(500)),
-                spacing: extent(spacing_samples.unwrap_or(90_000)),
+                count: count.map_or(5, NonZero::get),
+                length: extent(length_samples.map_or(500, NonZero::get)),
+                spacing: extent(spacing_samples.map_or(90_000, NonZero::get)),
                 amplitude: amplitude.of(i),
                 frequency_hz: frequency_hz.as_ref().map_or(5.0, |hz| hz.of(i)),
             }
@@ -352,6 +355,14 @@ mod tests {
             "c.toml, line 3: \"accel[1].amplitude\" = [1, 2] has 2 values for 3 replicates | "
         );
         assert_eq!(
+            step("amplitude = [1.0]"),
+            "c.toml, line 3: \"accel[1].amplitude\" = [1.0] is a list, where no \"replicates\" are listed | "
+        );
+        assert_eq!(
+            refusal("[[gyro]]\noperation = \"bursts\"\namplitude = 1\ncount = 0\n"),
+            "c.toml, line 4: \"gyro[1].count\" = 0 is refused: it must be a finite number ≥ 1 | "
+        );
+        assert_eq!(
             step("amplitude = 1\nreplicates = [0]"),
             "c.toml, line 4: \"accel[1].replicates\" = 0 is refused: it must be a finite number ≥ 1 | "
         );
@@ -443,11 +454,11 @@ enum Described {
     /// Bursts of vibration
     Bursts {
         /// Number of bursts (default: 5)
-        count: Option<u64>,
+        count: Option<NonZero<u64>>,
         /// Length of a burst (samples; default: 500)
-        length_samples: Option<u64>,
+        length_samples: Option<NonZero<u64>>,
         /// From one burst to the next (samples; default: 90000)
-        spacing_samples: Option<u64>,
+        spacing_samples: Option<NonZero<u64>>,
         /// Length of the record that these are meant for (samples; default: as it is)
         of_samples: Option<OneOrEach<AtLeastOne>>,
         /// Amplitude (units of the signal)

@@ -18,9 +18,10 @@
 //! Farrell, Silva, Rahman, Wendel: *IMU error modeling tutorial*, IEEE Control Systems 42(6), 2022, is below B at every
 //! other averaging time: errors after an outage come out up to two times too small.)
 
-use super::Failure;
 use super::model_file::{ModelFile, NOT_STATED, PROGRAM, SCHEMA, TurnOn, known};
 use super::toml_file::Source;
+use super::{Failure, Place, source};
+use crate::parse;
 use crate::report::readable;
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::noise::{Composite, Flicker, Model, ParameterError, Process, continuous};
@@ -81,15 +82,36 @@ impl Datasheet {
         Some(entry.quantity.value)
     }
 
-    /// The figures that decide an outage and the datasheet does not state: the model has no such error.
-    pub(crate) fn not_stated(&self) -> Vec<String> {
+    /// The figures of a sensor that decide an outage and are not stated: the model has no such error, or that of the grade.
+    pub(crate) fn lacking(&self, sensor: Sensor) -> impl Iterator<Item = (Figure, Option<&Entry>)> {
         // A tolerance of the zero offset stands for no turn-on bias: once removed, it says nothing of the next switching-on.
         let figures = [Figure::Noise, Figure::Bias, Figure::TurnOn].into_iter();
-        let needed = figures.flat_map(|figure| Sensor::ALL.map(|sensor| (sensor, figure)));
-        let lacking = needed.filter(|(sensor, figure)| self.value(*sensor, *figure).is_none());
-        lacking
-            .map(|(sensor, figure)| format!("{} {}", sensor.name(), figure.name()))
-            .collect()
+        let of = move |figure| {
+            let mut entries = self.entries.iter();
+            (
+                figure,
+                entries.find(|e| e.sensor == sensor && e.figure == figure),
+            )
+        };
+        // N and K have a lowest point of the Allan deviation, as the floor has
+        let has_floor =
+            move |figure| figure == Figure::Bias && self.value(sensor, Figure::Walk).is_some();
+        let found = figures.map(of);
+        found.filter(move |(f, entry)| !has_floor(*f) && entry.is_none_or(Entry::is_of_grade))
+    }
+
+    /// The same of both sensors, in words.
+    pub(crate) fn not_stated(&self) -> Vec<String> {
+        let both = Sensor::ALL.into_iter();
+        let lacking =
+            both.flat_map(|sensor| self.lacking(sensor).map(move |lacking| (sensor, lacking)));
+        let mut lacking: Vec<_> = lacking.collect();
+        lacking.sort_by_key(|(sensor, (figure, _))| (*figure as usize, *sensor as usize));
+        let words = lacking.into_iter().map(|(sensor, (figure, entry))| {
+            let grade = if entry.is_some() { " by grade" } else { "" };
+            format!("{} {}{grade}", sensor.name(), figure.name())
+        });
+        words.collect()
     }
 
     /// Puts a figure in the place of what was known of it.
@@ -168,6 +190,11 @@ impl Datasheet {
 }
 
 impl Entry {
+    /// True of a figure that no document states.
+    pub(crate) fn is_of_grade(&self) -> bool {
+        self.source.as_deref() == Some(GRADE)
+    }
+
     fn provenance(&self) -> Table {
         known(json!({
             "figure": format!("{}.{}", self.sensor.name(), self.figure.name()),
@@ -271,8 +298,9 @@ const RATE: Units = &[
     ("rad/s", 1.0),
 ];
 const ACCEL_WALK: Units = &[
-    ("m/s²/sqrt(s)", 1.0),
     ("m/s²/sqrt(h)", 1.0 / 60.0),
+    ("m/s/h/sqrt(h)", 1.0 / 3600.0 / 60.0),
+    ("m/s²/sqrt(s)", 1.0),
     ("m/s³/sqrt(Hz)", 1.0),
     ("mg/sqrt(h)", 1e-3 * STANDARD_GRAVITY / 60.0),
     ("ug/sqrt(h)", 1e-6 * STANDARD_GRAVITY / 60.0),
@@ -540,6 +568,18 @@ pub(crate) const CATALOGUE: &[(&str, &str)] = catalogue![
     "vn100",
 ];
 
+/// Source of a turn-on bias that the data sheet does not state.
+pub(crate) const GRADE: &str = "grade";
+
+/// Turn-on biases of a grade, accelerometer and gyroscope, where a data sheet states none: from Groves 2013, table 4.1 (tactical
+/// 1 to 10 mg and 1 to 100 deg/h, in its middle; automotive above that; aviation 0.03 to 0.1 mg, 0.01 deg/h).
+const GRADES: [(&str, &str, &str); 4] = [
+    ("consumer", "10 mg", "0.1 deg/s"),
+    ("industrial", "5 mg", "100 deg/h"),
+    ("tactical", "3 mg", "10 deg/h"),
+    ("navigation", "0.05 mg", "0.01 deg/h"),
+];
+
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -594,6 +634,25 @@ pub(super) fn parse(source: &Source) -> Result<Datasheet, Failure> {
         }
     }
     let name = Some(format!("{} {}", file.unit.manufacturer, file.unit.name));
+    let of_grade = GRADES.iter().find(|(class, ..)| *class == file.unit.class);
+    for (sensor, given) in of_grade
+        .into_iter()
+        .flat_map(|(_, accel, gyro)| [(Sensor::Accel, accel), (Sensor::Gyro, gyro)])
+    {
+        let figure = Figure::TurnOn;
+        if !entries
+            .iter()
+            .any(|e: &Entry| (e.sensor, e.figure) == (sensor, figure))
+        {
+            entries.push(Entry {
+                sensor,
+                figure,
+                quantity: Quantity::parse(given, figure.units(sensor)).expect("a turn-on bias"),
+                source: Some(GRADE.to_owned()),
+                quote: None,
+            });
+        }
+    }
     Ok(Datasheet {
         name,
         class: Some(file.unit.class),
@@ -616,4 +675,127 @@ fn entry(source: &Source, sensor: Sensor, key: &str, given: Given) -> Result<Ent
         source: Some(given.source),
         quote: given.quote,
     })
+}
+
+// Figures that other programs measured: YAML of Kalibr, allan_variance_ros and imu_utils. Their files are `key: value` line by line.
+
+/// Keys, and what they are. Kalibr's random walk is K. Of imu_utils `_n` is the Allan deviation at 1 s times √rate, that of a
+/// sample, and `_w` the lowest Allan deviation (`getWhiteNoise`, `getBiasInstability` of its `fitallan_gyr.cpp`).
+const MEASURED: [(&str, Sensor, Figure, &str); 8] = [
+    (
+        "accelerometer_noise_density",
+        Sensor::Accel,
+        Figure::Noise,
+        "m/s²/sqrt(Hz)",
+    ),
+    (
+        "accelerometer_random_walk",
+        Sensor::Accel,
+        Figure::Walk,
+        "m/s³/sqrt(Hz)",
+    ),
+    (
+        "gyroscope_noise_density",
+        Sensor::Gyro,
+        Figure::Noise,
+        "rad/s/sqrt(Hz)",
+    ),
+    (
+        "gyroscope_random_walk",
+        Sensor::Gyro,
+        Figure::Walk,
+        "rad/s²/sqrt(Hz)",
+    ),
+    ("acc_n", Sensor::Accel, Figure::Noise, "m/s²/sqrt(Hz)"),
+    ("acc_w", Sensor::Accel, Figure::Bias, "m/s²"),
+    ("gyr_n", Sensor::Gyro, Figure::Noise, "rad/s/sqrt(Hz)"),
+    ("gyr_w", Sensor::Gyro, Figure::Bias, "rad/s"),
+];
+
+/// Reads figures that another program measured; with the rate of its file (Hz), or `rate_hz` in its place.
+///
+/// # Errors
+/// Line, key and value of what is refused, or no such figure.
+pub fn measured(path: &Path, rate_hz: Option<f64>) -> Result<(Datasheet, Option<f64>), Failure> {
+    let text = source::text(path).map_err(|e| Failure::io(path, e))?;
+    let name = path.display();
+    let (mut sheet, mut rate_hz, is_rate_given) =
+        (Datasheet::default(), rate_hz, rate_hz.is_some());
+    let mut section = "";
+    for (line, written) in (1_u64..).zip(text.lines()) {
+        let written = written.split('#').next().unwrap_or_default();
+        let Some((key, value)) = written.split_once(':') else {
+            continue;
+        };
+        let (key, value) = (key.trim(), value.trim().trim_matches(['"', '\'']).trim());
+        // NumPy 2 writes its numbers so
+        let value = value
+            .trim_start_matches("np.float64(")
+            .trim_end_matches(')');
+        let refused =
+            |reason: &str| Failure::contents(&name, line, format!("\"{key}\" = {value} {reason}"));
+        match key {
+            _ if value.is_empty() => section = key,
+            "update_rate" | "rate_hz" if !is_rate_given => {
+                rate_hz = Some(parse::rate_hz(value).map_err(|e| refused(&format!("is {e}")))?);
+            }
+            "unit" if !["rad/s", "m/s^2"].contains(&value) => {
+                let hint =
+                    "give the figures with their units: --arw, --gyro-bias, --vrw, --accel-bias";
+                return Err(refused("is not the unit of imu_utils").hint(hint));
+            }
+            _ => {}
+        }
+        let mut keys = MEASURED.into_iter();
+        let Some((_, sensor, figure, unit)) = keys.find(|(known, ..)| *known == key) else {
+            continue;
+        };
+        let is_of_sample = key.ends_with("_n");
+        // axes, beside their mean
+        if value.is_empty() || key.len() == "acc_n".len() && section != "avg-axis" {
+            continue;
+        }
+        if sheet.value(sensor, figure).is_some() {
+            return Err(refused("is given twice").hint("one file for each IMU"));
+        }
+        // a walk of 0 is none
+        if value.parse() == Ok(0.0) {
+            continue;
+        }
+        let mut quantity = Quantity::parse(&format!("{value} {unit}"), figure.units(sensor))
+            .map_err(|e| refused(&e))?;
+        if is_of_sample {
+            let Some(rate_hz) = rate_hz else {
+                return Err(
+                    refused("is that of a sample: the rate of the recording is needed")
+                        .hint("give it with --rate-hz HZ"),
+                );
+            };
+            quantity.value /= rate_hz.sqrt();
+            quantity.given = format!(
+                "{} {unit}: {key} {value} at {rate_hz} Hz",
+                readable(quantity.value)
+            );
+            sheet.assumptions = [
+                "imu_utils: _n is the Allan deviation at 1 s times the root of the rate, _w the lowest Allan deviation",
+                "imu_utils: some versions write _n as a density: give that with --arw and --vrw",
+            ]
+            .map(str::to_owned)
+            .into();
+        }
+        sheet.set(Entry {
+            sensor,
+            figure,
+            quantity,
+            source: Some(format!("{name}, line {line}")),
+            quote: Some(written.trim().to_owned()),
+        });
+    }
+    if sheet.entries.is_empty() {
+        let message =
+            "no figure of Kalibr (gyroscope_noise_density, …) or imu_utils (gyr_n, … of avg-axis)";
+        return Err(Failure::contents(&name, Place::Within, message)
+            .hint("give the figures with their units: --arw, --gyro-bias, --gyro-rrw, --vrw, --accel-bias, --accel-rrw"));
+    }
+    Ok((sheet, rate_hz))
 }

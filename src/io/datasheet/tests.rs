@@ -1,6 +1,7 @@
 use super::*;
 use crate::io::model_file;
 use crate::io::toml_file::Source;
+use nav_sim_signal::noise::practical::Minimum;
 use std::path::Path;
 
 const CLASSES: [&str; 4] = ["consumer", "industrial", "tactical", "navigation"];
@@ -157,7 +158,7 @@ fn the_catalogue_is_sound() {
         assert_eq!(catalogued(&name.to_uppercase()).unwrap().unwrap(), sheet);
         assert!(CLASSES.contains(&sheet.class.as_deref().unwrap()), "{name}");
         assert!(!sheet.assumptions.is_empty(), "{name}");
-        for entry in &sheet.entries {
+        for entry in sheet.entries.iter().filter(|e| !e.is_of_grade()) {
             let place = format!("{name} {:?}", entry.figure);
             assert!(entry.quantity.value > 0.0, "{place}");
             assert!(
@@ -175,7 +176,8 @@ fn the_catalogue_is_sound() {
             assert!(sheet.value(sensor, Figure::Noise).is_some(), "{name}");
             // one rule for all: what is removed before use is no turn-on bias, and the entry says so
             if sheet.value(sensor, Figure::Offset).is_some() {
-                assert!(sheet.value(sensor, Figure::TurnOn).is_none(), "{name}");
+                let mut turn_on = sheet.entries.iter().filter(|e| e.figure == Figure::TurnOn);
+                assert!(turn_on.all(Entry::is_of_grade), "{name}");
                 assert!(
                     sheet
                         .assumptions
@@ -218,5 +220,140 @@ fn entries_are_refused_with_line_key_and_value() {
     );
     assert!(
         refused("[gyro]\nnoise = { value = \"1 deg/sqrt(h)\" }\n").contains("source\" is missing")
+    );
+}
+
+/// The figures and the rate of a file of another program.
+fn read_measured(text: &str, rate_hz: Option<f64>) -> Result<(Datasheet, Option<f64>), Failure> {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("imu.yaml");
+    std::fs::write(&path, text).unwrap();
+    measured(&path, rate_hz)
+}
+
+const KALIBR: &str = "%YAML:1.0 # of a chain\nimu0:\n  T_i_b:\n    - [1.0, 0.0, 0.0, 0.0]\n  accelerometer_noise_density: 0.0025 # m/s^2/sqrt(Hz)\n  \
+     accelerometer_random_walk: 7e-05\n  gyroscope_noise_density: np.float64(0.00019)\n  gyroscope_random_walk: 0.0\n  \
+     rostopic: \"/imu: raw\"\n  update_rate: 256.0\n";
+const IMU_UTILS: &str = "%YAML:1.0\n---\ntype: IMU\nname: A3\nGyr:\n   unit: \" rad/s\"\n   avg-axis:\n      gyr_n: 2e-3\n      gyr_w: 3e-5\n   x-axis:\n      \
+     gyr_n: 9e-3\n      gyr_w: 9e-5\nAcc:\n   unit: \" m/s^2\"\n   avg-axis:\n      acc_n: 2e-2\n      acc_w: 4e-4\n";
+
+/// Kalibr reads N off the Allan deviation at 1 s and K at 3 s (of K²τ/3); both are there again, N exactly.
+#[test]
+fn figures_of_kalibr_are_where_it_reads_them() {
+    let (sheet, rate_hz) = read_measured(KALIBR, None).unwrap();
+    assert_eq!(rate_hz, Some(256.0));
+    assert_eq!(sheet.value(Sensor::Gyro, Figure::Walk), None);
+    assert_eq!(sheet.value(Sensor::Gyro, Figure::Noise), Some(0.00019));
+    assert_eq!(
+        sheet.not_stated(),
+        ["gyro bias", "accel turn_on", "gyro turn_on"]
+    );
+    let model = sheet.model_file(256.0).unwrap().file.model;
+    let of =
+        |axis: usize, process: usize| Composite::new(vec![model.axes[axis].processes[process]]);
+    let near = |value: f64, expected: f64, error: f64| {
+        assert!(
+            (value / expected - 1.0).abs() < error,
+            "{value:e} {expected:e}"
+        );
+    };
+    near(of(0, 0).allan_variance(256).sqrt(), 0.0025, 1e-12);
+    near(of(3, 0).allan_variance(256).sqrt(), 0.00019, 1e-12);
+    // sampled, a share 1/(2·768²) more than K²τ/3
+    near(of(0, 1).allan_variance(768).sqrt(), 7e-5, 1e-6);
+}
+
+/// imu_utils states the Allan deviation at 1 s times √rate, and the lowest: the model's at 1 s is N or more by its bias, and
+/// its lowest is between the floor and what [`no_model_of_a_datasheet_is_below_its_bias_instability`] derives.
+#[test]
+fn figures_of_imu_utils_are_those_of_a_sample_and_the_lowest() {
+    let (sheet, rate_hz) = read_measured(IMU_UTILS, Some(400.0)).unwrap();
+    assert_eq!(rate_hz, Some(400.0));
+    assert_eq!(sheet.value(Sensor::Accel, Figure::Noise), Some(2e-2 / 20.0));
+    assert_eq!(sheet.value(Sensor::Gyro, Figure::Noise), Some(2e-3 / 20.0));
+    let model = sheet.model_file(400.0).unwrap().file.model;
+    assert_eq!(
+        model.axes[3].amplitude_of(nav_sim_signal::noise::Kind::White),
+        2e-3 * 2e-3
+    );
+    for (axis, floor, density) in [(0, 4e-4, 1e-3), (3, 3e-5, 1e-4)] {
+        let minimum = Minimum::of(&[&model.axes[axis]], 400.0, 1e4).unwrap();
+        let most = 1.08 * (density / floor / 567.8_f64.sqrt()).hypot(1.0);
+        let lowest = minimum.deviation / floor;
+        assert!((0.999..most).contains(&lowest), "{lowest}");
+    }
+    let said = sheet.assumptions.join(" ");
+    assert!(said.contains("_w the lowest Allan deviation"), "{said}");
+}
+
+#[test]
+fn figures_of_others_are_refused_with_line_key_and_value() {
+    let refused = |text: &str, rate_hz| {
+        let failure = read_measured(text, rate_hz).unwrap_err().to_string();
+        failure.rsplit_once("imu.yaml").unwrap().1.to_owned()
+    };
+    let of_sample =
+        ", line 8: \"gyr_n\" = 2e-3 is that of a sample: the rate of the recording is needed";
+    assert_eq!(refused(IMU_UTILS, None), of_sample);
+    let unit = IMU_UTILS.replace(" m/s^2", "g");
+    assert_eq!(
+        refused(&unit, Some(1.0)),
+        ", line 14: \"unit\" = g is not the unit of imu_utils"
+    );
+    let twice = format!("{KALIBR}imu1:\n  gyroscope_noise_density: 1e-3\n");
+    assert_eq!(
+        refused(&twice, None),
+        ", line 12: \"gyroscope_noise_density\" = 1e-3 is given twice"
+    );
+    for (text, reason) in [
+        (
+            "-1",
+            "does not begin with a number > 0, such as 0.1 m/s²/sqrt(h)",
+        ),
+        ("1e30", "is more than 1e12 in SI units, which no sensor has"),
+    ] {
+        let text = KALIBR.replace("7e-05", text);
+        assert!(
+            refused(&text, None).ends_with(reason),
+            "{}",
+            refused(&text, None)
+        );
+    }
+    let rate = KALIBR.replace("256.0", "fast");
+    assert_eq!(
+        refused(&rate, None),
+        ", line 10: \"update_rate\" = fast is not a finite number > 0"
+    );
+    // of VINS, whose figures are other ones
+    assert!(refused("gyr_n: 0.01\nacc_n: 0.1\n", Some(200.0)).contains("no figure of Kalibr"));
+}
+
+/// A turn-on bias that no document states is that of the grade, and said to be; a grade that nobody knows has none.
+#[test]
+fn a_turn_on_bias_is_by_grade_where_a_sheet_has_none() {
+    let sheet_of = |class: &str, more: &str| {
+        let text =
+            format!("[unit]\nmanufacturer = \"A\"\nname = \"B\"\nclass = \"{class}\"\n{more}");
+        parse(&Source::new("u.toml", &text)).unwrap()
+    };
+    let stated = "[accel]\nturn_on = { value = \"2 mg\", source = \"s\" }\n";
+    let sheet = sheet_of("tactical", stated);
+    assert_eq!(
+        sheet.value(Sensor::Accel, Figure::TurnOn),
+        Some(2e-3 * 9.806_65)
+    );
+    let gyro = sheet.value(Sensor::Gyro, Figure::TurnOn).unwrap();
+    assert!((gyro / (10.0_f64.to_radians() / 3600.0) - 1.0).abs() < 1e-12);
+    let lacking = [
+        "accel noise",
+        "gyro noise",
+        "accel bias",
+        "gyro bias",
+        "gyro turn_on by grade",
+    ];
+    assert_eq!(sheet.not_stated(), lacking);
+    assert_eq!(
+        sheet_of("toy", "").value(Sensor::Gyro, Figure::TurnOn),
+        None
     );
 }

@@ -964,6 +964,9 @@ fn doubt_units(
 
 // An initial state (TOML).
 
+/// Largest velocity (m/s): beyond that of the Earth's surface and of orbits.
+const MAX_SPEED_M_S: f64 = 1e4;
+
 /// Where and how a drive begins: nav-sim fuse --initial
 #[derive(Deserialize, JsonSchema)]
 #[schemars(title = "Initial state", deny_unknown_fields)]
@@ -976,15 +979,19 @@ struct Description {
     /// Longitude of the IMU (degrees)
     lon_deg: Between<-360, 360, false>,
     /// Height of the IMU above the ellipsoid (m)
+    #[schemars(range(min = -1e5, max = 1e6))]
     h_m: f64,
     /// Velocity north (m/s; default: 0)
     #[serde(default)]
+    #[schemars(range(min = -MAX_SPEED_M_S, max = MAX_SPEED_M_S))]
     v_n_m_s: f64,
     /// Velocity east (m/s; default: 0)
     #[serde(default)]
+    #[schemars(range(min = -MAX_SPEED_M_S, max = MAX_SPEED_M_S))]
     v_e_m_s: f64,
     /// Velocity down (m/s; default: 0)
     #[serde(default)]
+    #[schemars(range(min = -MAX_SPEED_M_S, max = MAX_SPEED_M_S))]
     v_d_m_s: f64,
     /// Roll of the vehicle (degrees)
     roll_deg: Between<-180, 180, false>,
@@ -1062,7 +1069,7 @@ mod initial_tests {
             (
                 "= 400",
                 "= inf",
-                "i.toml, line 4: \"h_m\" = inf is refused: it must be a finite number | ",
+                "i.toml, line 4: \"h_m\" = inf is refused: it must be a finite number ≥ -100000 and ≤ 1000000 | ",
             ),
             (
                 "h_m = 400\n",

@@ -192,7 +192,7 @@ pub struct Interval {
     pub parameter: String,
     /// Lower end (units of the parameter; −∞ if unbounded).
     pub low: f64,
-    /// Upper end (units of the parameter; ∞ if unbounded).
+    /// Upper end (units of the parameter).
     pub high: f64,
 }
 
@@ -289,7 +289,14 @@ impl JsonSchema for ProcessTable {
                 ) {
                     schema.insert(HINT.to_owned(), hint.into());
                 }
-                let ends = json!({ "type": "array", "minItems": 2, "maxItems": 2 });
+                let end = match parameter {
+                    Parameter::Phi | Parameter::Theta => {
+                        generator.subschema_for::<Between<-1, 1, false>>()
+                    }
+                    Parameter::Slope => json_schema!({ "type": "number" }),
+                    _ => generator.subschema_for::<NonNegative>(),
+                };
+                let ends = json!({ "type": "array", "minItems": 2, "maxItems": 2, "items": end });
                 let name = parameter.name();
                 properties.insert(format!("{name}{CI}"), ends);
                 properties.insert(name.to_owned(), schema.to_value());

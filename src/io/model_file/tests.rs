@@ -64,7 +64,7 @@ fn what_is_written_reads_back_to_the_same_bits() {
         process: "AR1_2".into(),
         parameter: "phi".into(),
         low: 0.999,
-        high: f64::INFINITY,
+        high: 1.0,
     });
     let beta = Law::Beta {
         a: 6.0,
@@ -182,6 +182,14 @@ fn wrong_values_are_refused_with_line_key_and_value() {
         process_refusal("type = \"WN\", sigma2 = \"1\""),
         "m.toml, line 4: \"accel.processes[1].sigma2\" = \"1\" is not a number | "
     );
+    for ends in ["[-1, 2]", "[0.5, inf]"] {
+        let refusal = process_refusal(&format!("type = \"WN\", sigma2 = 1, sigma2_ci95 = {ends}"));
+        assert!(refusal.contains("sigma2_ci95\" = "), "{refusal}");
+        assert!(
+            refusal.contains("is refused: it must be a finite number ≥ 0"),
+            "{refusal}"
+        );
+    }
     assert_eq!(
         process_refusal("type = \"WN\", sigma2 = 1, sigma2_ci95 = [1]"),
         "m.toml, line 4: \"accel.processes[1].sigma2_ci95\" = [1] is not a list of 2 | "

@@ -7,6 +7,7 @@ use super::suggest::nearest;
 use super::{Failure, Place, help, logs, source};
 use crate::failure::is_damage;
 use chrono::NaiveDateTime;
+use nav_sim_document::one_line;
 use nav_sim_logs::npy::Array;
 use nav_sim_logs::{Channel, Clock, Content, Kind as LogKind, in_seconds, npy};
 pub(crate) use quantity::find;
@@ -185,11 +186,8 @@ pub(crate) fn unreadable(path: &Path, e: std::io::Error) -> Failure {
 
 /// At most `longest` characters of what a file holds, safe to print.
 pub(crate) fn shown(text: &str, longest: usize) -> String {
-    let escaped = |c: char| match c.is_control() {
-        true => c.escape_default().collect(),
-        false => vec![c],
-    };
-    let short: String = text.chars().take(longest).flat_map(escaped).collect();
+    let short: String = text.chars().take(longest).collect();
+    let short = one_line(&short);
     if text.chars().nth(longest).is_some() {
         short + "…"
     } else {
@@ -1158,6 +1156,7 @@ fn of_axis(name: &str, axis: usize) -> String {
 /// Reads Apache Parquet: columns by their names; what is no number is NaN.
 #[cfg(feature = "parquet")]
 fn parquet(path: &Path) -> Result<Columns, Failure> {
+    use parquet::basic::{ConvertedType, LogicalType, TimeUnit};
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use parquet::record::Field;
     let damaged = |e: parquet::errors::ParquetError| {
@@ -1166,8 +1165,21 @@ fn parquet(path: &Path) -> Result<Columns, Failure> {
     let file = std::fs::File::open(path).map_err(|e| unreadable(path, e))?;
     let reader = SerializedFileReader::new(file).map_err(damaged)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
-    let named = schema.columns().iter();
-    let named = named.map(|column| (column.name().to_owned(), Vec::new()));
+    // the type of a time stamp has its unit, whatever its name says
+    let named = schema.root_schema().get_fields().iter().map(|column| {
+        let column = column.get_basic_info();
+        let name = match (column.logical_type_ref(), column.converted_type()) {
+            (Some(LogicalType::Timestamp(of)), _) => match of.unit {
+                TimeUnit::MILLIS => "t_ms",
+                TimeUnit::MICROS => "t_us",
+                TimeUnit::NANOS => "t_ns",
+            },
+            (_, ConvertedType::TIMESTAMP_MILLIS) => "t_ms",
+            (_, ConvertedType::TIMESTAMP_MICROS) => "t_us",
+            _ => column.name(),
+        };
+        (name.to_owned(), Vec::new())
+    });
     let mut columns: Columns = named.collect();
     for row in reader.get_row_iter(None).map_err(damaged)? {
         let row = row.map_err(damaged)?;
@@ -1175,8 +1187,27 @@ fn parquet(path: &Path) -> Result<Columns, Failure> {
             values.push(match field {
                 Field::Double(value) => *value,
                 Field::Float(value) => f64::from(*value),
+                Field::Float16(value) => f64::from(*value),
+                Field::Byte(value) => f64::from(*value),
+                Field::Short(value) => f64::from(*value),
                 Field::Int(value) => f64::from(*value),
-                Field::Long(value) => *value as f64,
+                Field::UByte(value) => f64::from(*value),
+                Field::UShort(value) => f64::from(*value),
+                Field::UInt(value) => f64::from(*value),
+                Field::ULong(value) => *value as f64,
+                Field::Long(value)
+                | Field::TimestampMillis(value)
+                | Field::TimestampMicros(value) => *value as f64,
+                // two's complement, the highest byte first
+                Field::Decimal(value) => {
+                    let bytes = value.data();
+                    let negative = bytes.first().is_some_and(|b| *b >= 128);
+                    let whole = bytes.iter().fold(-f64::from(u8::from(negative)), |x, b| {
+                        x * 256.0 + f64::from(*b)
+                    });
+                    whole / 10_f64.powi(value.scale())
+                }
+                // of no such type is a measurement: NaN, which is refused where one is wanted
                 _ => f64::NAN,
             });
         }

@@ -169,3 +169,70 @@ proptest! {
         let _ = read_text("a.csv", reader, &DICTIONARY);
     }
 }
+
+/// Time stamps have the unit of their type, decimals their scale, and a text is no number.
+#[cfg(feature = "parquet")]
+#[test]
+fn types_of_parquet_are_respected() {
+    use parquet::data_type::{ByteArray, ByteArrayType, Int32Type, Int64Type};
+    use parquet::file::writer::SerializedFileWriter;
+    use parquet::schema::parser::parse_message_type;
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("a.parquet");
+    let made = |time: &str, accel: &str| {
+        let schema = format!("message m {{ required int64 stamp ({time}); {accel} }}");
+        let schema = std::sync::Arc::new(parse_message_type(&schema).unwrap());
+        let file = std::fs::File::create(&path).unwrap();
+        let mut writer = SerializedFileWriter::new(file, schema, Default::default()).unwrap();
+        let mut rows = writer.next_row_group().unwrap();
+        let mut column = rows.next_column().unwrap().unwrap();
+        let stamps = [1_700_000_000_000_000, 1_700_000_000_010_000];
+        column
+            .typed::<Int64Type>()
+            .write_batch(&stamps, None, None)
+            .unwrap();
+        column.close().unwrap();
+        let mut column = rows.next_column().unwrap().unwrap();
+        match accel.contains("int32") {
+            true => column
+                .typed::<Int32Type>()
+                .write_batch(&[-1_250, 9_806], None, None),
+            false => {
+                let texts = ["a", "b"].map(ByteArray::from);
+                column
+                    .typed::<ByteArrayType>()
+                    .write_batch(&texts, None, None)
+            }
+        }
+        .unwrap();
+        column.close().unwrap();
+        rows.close().unwrap();
+        writer.close().unwrap();
+        read(&path, &DICTIONARY)
+    };
+    let decimal = "required int32 accel_x_m_s2 (DECIMAL(9,3));";
+    for (time, factor) in [
+        ("TIMESTAMP(MICROS,true)", 1e-6),
+        ("TIMESTAMP(NANOS,false)", 1e-9),
+        ("TIMESTAMP_MICROS", 1e-6),
+    ] {
+        let table = made(time, decimal).unwrap();
+        let t = table
+            .columns
+            .iter()
+            .find(|c| c.name.starts_with("t_"))
+            .unwrap();
+        assert_eq!(
+            (t.factor, t.values[1] - t.values[0]),
+            (Some(factor), 10_000.0),
+            "{time}"
+        );
+        assert_eq!(table.get("accel.x").unwrap().values, [-1.25, 9.806]);
+    }
+    let text = made(
+        "TIMESTAMP(MICROS,true)",
+        "required binary accel_x_m_s2 (UTF8);",
+    );
+    let refusal = text.unwrap_err().to_string();
+    assert!(refusal.contains("accel_x_m_s2"), "{refusal}");
+}

@@ -61,10 +61,17 @@ pub fn coarse(
     let later = LATER_S
         .iter()
         .filter_map(|s| first_fast(&courses, first_s + s));
+    // what few fixes at the end agree with says nothing of the many before
+    let imu_end_s = recorded.imu.last().map_or(first_s, |sample| sample.t_s);
+    let fixes = |from_s: f64, to_s: f64| {
+        let times = gnss.iter().map(|fix| fix.t_s);
+        times.filter(|t_s| (from_s..to_s).contains(t_s)).count()
+    };
+    let leaves_most = |t_s: f64| fixes(first_s, t_s) <= fixes(t_s, imu_end_s);
     let mut best: Option<Candidate> = None;
     let mut tried_s = f64::NEG_INFINITY;
     for at in std::iter::once(first).chain(later) {
-        if courses[at].fix.t_s <= tried_s {
+        if courses[at].fix.t_s <= tried_s || !leaves_most(courses[at].fix.t_s) {
             continue;
         }
         tried_s = courses[at].fix.t_s;

@@ -9,7 +9,7 @@
 use super::gnss::MAX_LEVER_ARM_M;
 use super::normal;
 use crate::rng::{Generator, StreamKey};
-use crate::units::{DEG, NonNegative, Positive};
+use crate::units::{Amount, DEG, Measurable};
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -483,17 +483,17 @@ impl Walk {
 #[serde(deny_unknown_fields, default)]
 pub struct NhcSettings {
     /// Measurements per second.
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub rate_hz: f64,
     /// Standard deviation of one measurement, white, as the filter believes (m/s).
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub sigma_m_s: f64,
     /// The point that moves neither sideways nor up, with respect to the IMU: front, right, down (m).
     #[schemars(inner(range(min = -MAX_LEVER_ARM_M, max = MAX_LEVER_ARM_M)))]
     pub lever_arm_m: [f64; 3],
     /// Pitch and yaw of the vehicle's axes in those of the IMU, as the filter expects them (1 σ, degrees): two states;
     /// 0: none.
-    #[schemars(with = "NonNegative")]
+    #[schemars(with = "Amount")]
     pub mounting_sigma_deg: f64,
     /// What is truly wrong with it.
     pub truth: NhcErrors,
@@ -504,19 +504,19 @@ pub struct NhcSettings {
 #[serde(deny_unknown_fields, default)]
 pub struct NhcErrors {
     /// White noise of one measurement (m/s); unless given, what the filter believes.
-    #[schemars(with = "Option<NonNegative>")]
+    #[schemars(with = "Option<Amount>")]
     pub noise_sigma_m_s: Option<f64>,
     /// Pitch and yaw of the vehicle's axes in those of the IMU (1 σ, degrees), constant in a run.
-    #[schemars(with = "NonNegative")]
+    #[schemars(with = "Amount")]
     pub mounting_sigma_deg: f64,
     /// Sideslip angle per lateral acceleration (rad s²/m), the same in every run.
-    #[schemars(with = "NonNegative")]
+    #[schemars(with = "Amount")]
     pub sideslip_s2_m: f64,
     /// Lateral and vertical velocity of the body on its suspension (1 σ, m/s), a Gauss-Markov process.
-    #[schemars(with = "NonNegative")]
+    #[schemars(with = "Amount")]
     pub walk_sigma_m_s: f64,
     /// Correlation time of that velocity (s).
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub correlation_time_s: f64,
 }
 
@@ -525,16 +525,16 @@ pub struct NhcErrors {
 #[serde(deny_unknown_fields, default)]
 pub struct OdometerSettings {
     /// Measurements per second.
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub rate_hz: f64,
     /// Standard deviation of one measurement, white, as the filter believes (m/s).
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub sigma_m_s: f64,
     /// The wheel, or the middle of its axle, with respect to the IMU: front, right, down (m).
     #[schemars(inner(range(min = -MAX_LEVER_ARM_M, max = MAX_LEVER_ARM_M)))]
     pub lever_arm_m: [f64; 3],
     /// Scale factor of the wheel, as the filter expects it (1 σ): a state; 0: none.
-    #[schemars(with = "NonNegative")]
+    #[schemars(with = "Amount")]
     pub scale_sigma: f64,
     /// What is truly wrong with it.
     pub truth: OdometerErrors,
@@ -545,13 +545,13 @@ pub struct OdometerSettings {
 #[serde(deny_unknown_fields, default)]
 pub struct OdometerErrors {
     /// White noise of one measurement (m/s); unless given, what the filter believes.
-    #[schemars(with = "Option<NonNegative>")]
+    #[schemars(with = "Option<Amount>")]
     pub noise_sigma_m_s: Option<f64>,
     /// Scale-factor error (1 σ), constant in a run: the tyre.
-    #[schemars(with = "NonNegative")]
+    #[schemars(with = "Amount")]
     pub scale_sigma: f64,
     /// Slip of the wheel: share of the speed per forward acceleration (s²/m), the same in every run.
-    #[schemars(with = "NonNegative")]
+    #[schemars(with = "Amount")]
     pub slip_s2_m: f64,
 }
 
@@ -560,10 +560,10 @@ pub struct OdometerErrors {
 #[serde(deny_unknown_fields, default)]
 pub struct ZuptSettings {
     /// Measurements per second.
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub rate_hz: f64,
     /// Standard deviation of one measurement, white, as the filter believes (m/s).
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub sigma_m_s: f64,
     /// What is truly wrong with it.
     pub truth: ZuptErrors,
@@ -574,13 +574,13 @@ pub struct ZuptSettings {
 #[serde(deny_unknown_fields, default)]
 pub struct ZuptErrors {
     /// White noise of one measurement (m/s); unless given, what the filter believes.
-    #[schemars(with = "Option<NonNegative>")]
+    #[schemars(with = "Option<Amount>")]
     pub noise_sigma_m_s: Option<f64>,
     /// Forward velocity that is taken for standstill (1 σ, m/s), a Gauss-Markov process.
-    #[schemars(with = "NonNegative")]
+    #[schemars(with = "Amount")]
     pub walk_sigma_m_s: f64,
     /// Correlation time of that velocity (s).
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub correlation_time_s: f64,
 }
 
@@ -589,10 +589,10 @@ pub struct ZuptErrors {
 #[serde(deny_unknown_fields, default)]
 pub struct HeadingSettings {
     /// Measurements per second.
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub rate_hz: f64,
     /// Standard deviation of one measurement, white, as the filter believes (degrees).
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub sigma_deg: f64,
     /// What measures it.
     pub source: HeadingSource,
@@ -616,16 +616,16 @@ pub enum HeadingSource {
 #[serde(deny_unknown_fields, default)]
 pub struct HeadingErrors {
     /// White noise of one measurement (degrees); unless given, what the filter believes.
-    #[schemars(with = "Option<NonNegative>")]
+    #[schemars(with = "Option<Amount>")]
     pub noise_sigma_deg: Option<f64>,
     /// Offset (1 σ, degrees), constant in a run.
-    #[schemars(with = "NonNegative")]
+    #[schemars(with = "Amount")]
     pub offset_sigma_deg: f64,
     /// Error that lasts (1 σ, degrees), a Gauss-Markov process: iron about a compass.
-    #[schemars(with = "NonNegative")]
+    #[schemars(with = "Amount")]
     pub walk_sigma_deg: f64,
     /// Correlation time of that error (s).
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub correlation_time_s: f64,
 }
 

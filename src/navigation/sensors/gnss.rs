@@ -2,7 +2,7 @@
 
 use super::normal;
 use crate::rng::{Generator, StreamKey};
-use crate::units::{NonNegative, Positive};
+use crate::units::{Amount, Measurable};
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -17,10 +17,10 @@ pub const MAX_LEVER_ARM_M: f64 = 100.0;
 #[serde(deny_unknown_fields, default)]
 pub struct GnssSettings {
     /// Fixes per second.
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub rate_hz: f64,
     /// Position standard deviations north, east, down (m).
-    #[schemars(with = "[Positive; 3]")]
+    #[schemars(with = "[Measurable; 3]")]
     pub pos_sigma_m: [f64; 3],
     /// Velocity standard deviations north, east, down (m/s); `None` ("none" in files): no velocity.
     #[serde(
@@ -34,10 +34,10 @@ pub struct GnssSettings {
     pub lever_arm_m: [f64; 3],
     /// Standard deviations of a correlated position error north, east, down (m): a Gauss-Markov process beside
     /// the white noise, in the true receiver only. The filter believes `pos_sigma_m`, white.
-    #[schemars(with = "[NonNegative; 3]")]
+    #[schemars(with = "[Amount; 3]")]
     pub correlated_pos_sigma_m: [f64; 3],
     /// Correlation time of that error (s).
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub correlation_time_s: f64,
 }
 
@@ -161,7 +161,7 @@ fn parse_sigmas_or_none<'de, D: Deserializer<'de>>(
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected three numbers or \"none\"")]
 enum SigmasOrNone {
-    Sigmas(#[schemars(with = "[Positive; 3]")] [f64; 3]),
+    Sigmas(#[schemars(with = "[Measurable; 3]")] [f64; 3]),
     None(NoneText),
 }
 
@@ -178,10 +178,10 @@ enum NoneText {
 #[serde(deny_unknown_fields)]
 pub struct BaroSettings {
     /// Heights per second.
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub rate_hz: f64,
     /// Standard deviation of a height (m).
-    #[schemars(with = "Positive")]
+    #[schemars(with = "Measurable")]
     pub sigma_m: f64,
 }
 

@@ -355,7 +355,33 @@ impl<'a> Path<'a> {
     fn follow(&mut self, segment: &Segment) -> Result<(), Problem> {
         let ramp_s = segment.ramp_s.unwrap_or(self.profile.ramp_s);
         let climb = segment.climb_m;
-        match &segment.kind {
+        // a piece is known by its duration, whatever says how long it is
+        let length_key = match &segment.kind {
+            Kind::Straight(Length::Distance(_))
+            | Kind::Climb {
+                by: Length::Distance(_),
+                ..
+            } => "distance_m",
+            Kind::Accelerate {
+                by: Acceleration::Peak(_),
+                ..
+            } => "accel_m_s2",
+            Kind::Turn { by, .. } | Kind::Waypoints { by, .. } => match by {
+                Turning::Duration(_) => "duration_s",
+                Turning::Rate(_) => "rate_deg_s",
+                Turning::Radius(_) => "radius_m",
+                Turning::LateralAccel(_) => "lateral_accel_m_s2",
+            },
+            _ => "duration_s",
+        };
+        let named = |problem: Problem| match problem.key {
+            "duration_s" => Problem {
+                key: length_key,
+                ..problem
+            },
+            _ => problem,
+        };
+        let followed = match &segment.kind {
             Kind::Straight(length) => self.straight(*length, climb, ramp_s),
             Kind::Climb { height_m, by } => self.straight(*by, climb + height_m, ramp_s),
             Kind::Accelerate { to_speed, by } => self.accelerate(*to_speed, *by, climb, ramp_s),
@@ -370,7 +396,8 @@ impl<'a> Path<'a> {
                 self.straight(Length::Duration(*duration), climb, ramp_s)
             }
             Kind::Waypoints { points, by } => self.waypoints(points, *by, climb, ramp_s),
-        }
+        };
+        followed.map_err(named)
     }
 
     fn straight(&mut self, length: Length, climb: f64, ramp_s: f64) -> Result<(), Problem> {

@@ -263,6 +263,10 @@ fn what_cannot_be_followed_is_refused() {
         "segment 1: \"duration_s\" makes the trajectory 1.000e300 s long: more than a day"
     );
     assert_eq!(
+        refused(2.0, straight(Length::Distance(1e300))),
+        "segment 1: \"distance_m\" makes the trajectory 5.000e299 s long: more than a day"
+    );
+    assert_eq!(
         refused(0.0, straight(Length::Distance(5.0))),
         "segment 1: \"distance_m\" needs a moving vehicle, but it stands still here"
     );

@@ -29,9 +29,6 @@ use super::{Composite, Kind, Process};
 use crate::minimise::golden_section;
 use crate::units::Refused;
 
-/// Allan deviation over B of pure flicker noise: √(2 ln 2/π) = 0.664.
-const FLICKER_FLOOR: f64 = 0.664_282_8;
-
 /// Averaging times per octave at which curves are compared.
 const PER_OCTAVE: f64 = 16.0;
 
@@ -512,12 +509,13 @@ fn least(low: f64, high: f64, steps: u32, f: impl Fn(f64) -> f64) -> (f64, f64) 
 
 // The parameters of one axis, each with the averaging times that it governs.
 
-/// A minimum of the Allan deviation.
+/// A minimum of the Allan deviation: the bias instability B of data sheets. The coefficient of flicker noise that
+/// [IEEE 952](crate::bibliography::Ieee952) calls B is that over √(2 ln 2/π) = 0.664.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Minimum {
     /// Averaging time (s).
     pub tau_s: f64,
-    /// Allan deviation there (units).
+    /// Allan deviation there, the bias instability (units).
     pub deviation: f64,
 }
 
@@ -542,11 +540,6 @@ impl Minimum {
             tau_s: f64::from(samples[lowest]) / rate_hz,
             deviation: variances[lowest].sqrt(),
         })
-    }
-
-    /// Bias instability B = Allan deviation/0.664 (units).
-    pub fn bias_instability(&self) -> f64 {
-        self.deviation / FLICKER_FLOOR
     }
 }
 
