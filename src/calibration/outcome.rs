@@ -553,10 +553,12 @@ impl Outcome {
         let curve = &self.curve;
         let implied = implied(&self.fit.composite, curve);
         let data = curve.wv.iter().zip(&curve.edof).zip(implied);
+        // Var ln nu is 2/eta by a curve's own noise, and what recordings differ by beside it.
+        let known_to = |edof: &f64| 1.0 / (1.0 / edof + 0.5 * curve.differing);
         let miss = |(level, ((nu, edof), implied)): (&u32, ((&f64, &f64), f64))| Miss {
             level: *level,
             ratio: nu / implied,
-            deviations: score(nu / implied, *edof),
+            deviations: score(nu / implied, known_to(edof)),
             is_fitted: !curve.ignored.contains(level),
             is_known: (2.0 / edof).sqrt() <= KNOWN,
         };
@@ -582,8 +584,12 @@ impl Outcome {
 
 #[cfg(test)]
 mod departure_tests {
-    use super::{Departure, Miss, chance};
+    use super::{Departure, Miss, ModelChoice, Settings, chance};
+    use crate::curve::{Estimator, Group, Scope};
     use crate::fit::score;
+    use crate::imu::Sensor;
+    use crate::pipeline::fit_curve;
+    use crate::wavelet::Curve;
     use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
     /// Twelve scales that are off by one deviation each are what chance brings: P(chi-square of 12 > 12) = 0.4457 (tables). Off by
@@ -619,6 +625,39 @@ mod departure_tests {
         );
         assert_eq!(impossible.misfit.unwrap().level, 12);
         assert_eq!(Departure::of(&off(1.0)[..8], None).known_to, None);
+    }
+
+    /// White noise, exact but for a fifth more at one scale: missed where recordings are alike, not where they differ by as much.
+    #[test]
+    fn what_recordings_differ_by_is_no_miss() {
+        let levels: Vec<u32> = (1..=12).collect();
+        let wv = levels
+            .iter()
+            .map(|l| 0.5_f64.powi(*l as i32) * [1.0, 1.2][usize::from(*l == 5)]);
+        let outcome = |differing: f64| {
+            let curve = Curve {
+                wv: wv.clone().collect(),
+                edof: vec![1e6; 12],
+                levels: levels.clone(),
+                differing,
+                ..Curve::default()
+            };
+            let scope = Scope {
+                sensor: Sensor::Accel,
+                axis: None,
+            };
+            let group = Group {
+                scope,
+                replicates: Vec::new(),
+            };
+            let settings = Settings {
+                model: ModelChoice::Given("WN".parse().unwrap()),
+                ..Settings::default()
+            };
+            fit_curve(&group, Estimator::Given, curve, &settings, &|_| {}).unwrap()
+        };
+        assert!(!outcome(0.0).departure().missed.is_empty());
+        assert!(outcome(0.04).departure().missed.is_empty());
     }
 
     /// Against the exact law: the cube is good to a tenth of a deviation out to five of them, from ten degrees on.

@@ -445,6 +445,9 @@ fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
             "axes differ: {largest} has up to {ratio} times the wavelet variance of {smallest}; --pool axes fits each"
         )
     }));
+    if outcome.recordings == 2 && outcome.inference.is_some() {
+        notes.push("two recordings hardly bound how recordings differ: intervals are wide".into());
+    }
     // A range that was asked for is no news.
     if let ([first, ..], None) = (&curve.ignored[..], settings.fit_range) {
         let scales = [first, curve.ignored.last().unwrap_or(first)]
