@@ -521,7 +521,8 @@ impl Departure {
             None => doubtful.is_some() && chance(&fitted) < IMPOSSIBLE,
         };
         let farthest = furthest(if known.is_empty() { &fitted } else { &known });
-        let worst = furthest(&beyond(all, MISSED)).or(doubtful).or(farthest);
+        let of_fit = furthest(&missed).or(doubtful);
+        let worst = of_fit.or(furthest(&beyond(all, MISSED))).or(farthest);
         let known_to = known.last().map(|m| m.level);
         Self {
             scales: fitted.len(),

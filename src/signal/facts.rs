@@ -130,6 +130,25 @@ pub fn zeros(axis: &[f64]) -> Option<f64> {
     (p < 0.5 && share > p + 0.005 && is_beyond(zeros, there, p)).then_some(share)
 }
 
+/// Share of a column at one of its extremes, and that value, where the next value inward is far rarer: the range of a sensor was
+/// exceeded. The tail of a noise has no more at its end than one step inside, that of a sine 2.4 times as much; a column of few
+/// steps about its median has no tail to tell by.
+#[must_use]
+pub fn clipped(axis: &[f64]) -> Option<(f64, f64)> {
+    let there = || axis.iter().copied().filter(|x| x.is_finite());
+    let (step, middle) = (grain(axis)?.step, median(there().collect()));
+    let ends = [f64::min as fn(f64, f64) -> f64, f64::max];
+    ends.into_iter().find_map(|farther| {
+        let end = there().reduce(farther)?;
+        let inside = there().filter(|x| *x != end).reduce(farther)?;
+        let count = |value: f64| there().filter(|x| *x == value).count();
+        let (at_end, next) = (count(end), count(inside));
+        let is_tail = (end - middle).abs() >= FINE * step;
+        (is_tail && is_beyond(at_end, at_end + next, 0.75))
+            .then(|| (at_end as f64 / there().count() as f64, end))
+    })
+}
+
 /// Rows that repeat the one before on all axes of a sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Repeats {

@@ -387,7 +387,11 @@ impl SensorExport {
             markov,
         } = self.exported;
         if density <= 0.0 {
-            doubts.push("N is 0, with which many filters fail: try --policy matched".to_owned());
+            let remedy = match policy {
+                Policy::Strict => ": try --policy matched",
+                _ => "",
+            };
+            doubts.push(format!("N is 0, with which many filters fail{remedy}"));
         }
         if walk <= 0.0 && markov.is_none_or(|m| m.sigma <= 0.0) {
             doubts.push("K is 0: a filter will hold its bias estimate for certain".to_owned());

@@ -539,9 +539,12 @@ impl<'a> Drive<'a> {
             (None, None) => coarse(&recorded, &settings, &belief),
         };
         let Alignment { start, doubts } = aligned.map_err(|e| {
-            Failure::input(e).hint(
-                "give the heading with --initial DEG:SD, or the whole start with --initial FILE",
-            )
+            Failure::input(e).hint(match self.request.given_heading() {
+                Some(_) => "give the whole start with --initial FILE",
+                None => {
+                    "give the heading with --initial DEG:SD, or the whole start with --initial FILE"
+                }
+            })
         })?;
         settings.outages.retain(|outage| {
             let is_early = outage.end_s <= start.t_s;

@@ -85,6 +85,15 @@ fn zeros(name: impl Display, values: &[f64]) -> Option<String> {
     Some(format!("{share} of {name} is exactly 0, {why}"))
 }
 
+/// What is said of a column whose range was exceeded.
+fn clipped(name: impl Display, values: &[f64]) -> Option<String> {
+    let (share, end) = facts::clipped(values)?;
+    let share = percent(share);
+    Some(format!(
+        "{name} is clipped: {share} of it is {end}, its extreme; N reads low"
+    ))
+}
+
 /// What is said of a column that was interpolated.
 fn interpolated(name: impl Display, values: &[f64]) -> Option<String> {
     let share = percent(facts::interpolated(values)?);
@@ -109,6 +118,7 @@ pub fn doubts(name: &str, signal: &[f64]) -> Vec<String> {
         repeated,
         frozen,
         zeros(name, signal),
+        clipped(name, signal),
         interpolated(name, signal),
     ];
     all.into_iter().flatten().collect()
@@ -181,6 +191,8 @@ pub(super) fn repair(
     let zeros = signals(table).filter_map(|(channel, values)| zeros(channel, values));
     report.warnings.extend(zeros.filter(|_| !is_lossy));
     repair.apply(table, options.gaps);
+    let clipped = signals(table).filter_map(|(channel, values)| clipped(channel, values));
+    report.warnings.extend(clipped);
     Ok(repair)
 }
 
@@ -450,7 +462,12 @@ pub(super) fn compare(files: &[FileReport]) -> Result<Vec<String>, Failure> {
     let has = |file: &FileReport, channel| file.means.iter().any(|(c, _)| *c == channel);
     let lacks = Channel::ALL.into_iter().filter_map(|channel| {
         let with = files.iter().find(|file| has(file, channel))?;
-        let without = files.iter().find(|file| !has(file, channel))?;
+        // Phones write a file for each sensor: these lack nothing.
+        let is_like = |file: &&FileReport| with.means.iter().any(|(own, _)| has(file, *own));
+        let without = files
+            .iter()
+            .filter(is_like)
+            .find(|file| !has(file, channel))?;
         let (with, without) = (&with.file, &without.file);
         Some(format!("{channel} is in {with}, but not in {without}"))
     });

@@ -164,7 +164,9 @@ impl Clock {
         let Some(end) = self.since.last().filter(|_| !self.steps.is_empty()) else {
             return Err(too_short(&raw.path, self.since.len(), 2));
         };
-        if self.step <= 0.0 {
+        // Coarse stamps: half of the rows or more have that of the row before.
+        let stands_still = self.step <= 0.0;
+        if stands_still && (options.gaps != Gaps::Ignore || *end <= 0.0) {
             let name = &self.name;
             let error = refused(format!(
                 "column \"{name}\" does not advance: its median step is 0"
@@ -203,7 +205,7 @@ impl Clock {
                 .or_option(help::GAPS)
                 .or_without(help::GAPS_ELSEWHERE));
         }
-        if let Some(means) = self.drift() {
+        if let Some(means) = self.drift().filter(|_| !stands_still) {
             let [first, last] = means.map(|step| six_digits(self.rate_hz(step)));
             let message = format!(
                 "the rate changes from {first} Hz in the first tenth to {last} Hz in the last"
@@ -214,7 +216,7 @@ impl Clock {
         }
         let lost: usize = holes.iter().flatten().map(|(_, lost)| lost).sum();
         // The whole span averages the jitter.
-        let found_hz = self.rate_hz(match holes.is_none() && count > 0 {
+        let found_hz = self.rate_hz(match holes.is_none() && count > 0 && !stands_still {
             true => self.step,
             false => end / (self.steps.len() + lost) as f64,
         });

@@ -454,7 +454,7 @@ impl Table {
         if count > 0 {
             let name = &time.name;
             let text = format!("column \"{name}\" starts again {count} times: counted on");
-            self.warnings.push(text);
+            self.assumptions.push(text);
         }
     }
 

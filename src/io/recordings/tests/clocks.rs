@@ -306,7 +306,7 @@ fn counters_that_start_again_are_counted_on() {
         let (recordings, report) = read(&[path], &ReadOptions::default()).unwrap();
         assert!((recordings[0].rate_hz - 100.0).abs() < 0.01);
         assert_eq!(
-            report.files[0].warnings[0],
+            report.files[0].assumptions[0],
             format!("column \"{name}\" starts again 1 times: counted on")
         );
     }

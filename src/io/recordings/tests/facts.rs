@@ -315,6 +315,19 @@ fn what_makes_a_model_worthless_is_refused() {
     );
 }
 
+/// Beyond two standard deviations a gyroscope stays at the end of its range, 2.3 % of its samples at either.
+#[test]
+fn a_range_that_is_exceeded_is_told() {
+    let mut rows = rows(11, 6000);
+    let end = |x: f64| x.clamp(0.01 - 0.004, 0.01 + 0.004);
+    rows.iter_mut().for_each(|row| row[3] = end(row[3]));
+    let (_, warnings) = kept(&at(100.0, &rows), None);
+    let [clipped] = &warnings[..] else {
+        panic!("{warnings:?}");
+    };
+    assert!(clipped.starts_with("gyro.x is clipped: 2"), "{clipped}");
+}
+
 #[test]
 fn a_knock_a_dead_band_and_a_slip_of_the_pen_are_told() {
     let mut knocked = rows(7, 6000);
