@@ -339,10 +339,11 @@ fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
         .map_or(String::new(), |g| format!(" (p = {:.3})", g.p_value));
     if let Some(worst) = departure.misfit {
         let (ratio, at) = (readable(worst.ratio), at(worst.level));
-        let (missed, scales) = (departure.missed.len(), departure.scales);
-        return format!(
-            "{name}: {spec} does not fit: data/model {ratio} at {at}; {missed} of {scales} scales off{p}"
-        );
+        let off = match departure.missed.len() {
+            0 => "all scales together off".to_owned(),
+            missed => format!("{missed} of {} scales off", departure.scales),
+        };
+        return format!("{name}: {spec} does not fit: data/model {ratio} at {at}; {off}{p}");
     }
     let off = departure.furthest.map_or(String::new(), |m| {
         let off = percent((m.ratio - 1.0).abs());
