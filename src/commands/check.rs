@@ -3,6 +3,7 @@
 use super::batch::Study;
 use super::inspect::inspect;
 use crate::app::{Command, Context, Failure, Inputs, PlainAnswer, Result, inputs};
+use crate::io::Place;
 use crate::io::file_kind::{self, FileKind};
 use crate::io::fusion_files::{ImuFile, read_gnss, read_imu, read_initial};
 use crate::io::recordings::Gaps;
@@ -114,7 +115,13 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
         }
         FileKind::Model => inputs::model(path, context).map(|_| "a noise model")?,
         FileKind::Log => {
-            inspect(path, Stamp::default()).map(|_| "a log (nav-sim inspect lists its channels)")?
+            let log = inspect(path, Stamp::default())?;
+            if log.channels.is_empty() {
+                let why = log.damage.unwrap_or_else(|| "no channel in it".to_owned());
+                return Err(Failure::contents(path.display(), Place::Within, why)
+                    .or_hint("copy it again from the recorder"));
+            }
+            "a log (nav-sim inspect lists its channels)"
         }
         FileKind::CatalogueEntry => {
             let name = datasheet::read(path)?.name.unwrap_or_default();
