@@ -585,11 +585,9 @@ impl Outcome {
 
 #[cfg(test)]
 mod departure_tests {
-    use super::{Departure, Miss, ModelChoice, Settings, chance};
-    use crate::curve::{Estimator, Group, Scope};
+    use super::{Departure, Miss, chance};
     use crate::fit::score;
-    use crate::imu::Sensor;
-    use crate::pipeline::fit_curve;
+    use crate::pipeline::fit_given;
     use crate::wavelet::Curve;
     use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
@@ -643,19 +641,7 @@ mod departure_tests {
                 differing,
                 ..Curve::default()
             };
-            let scope = Scope {
-                sensor: Sensor::Accel,
-                axis: None,
-            };
-            let group = Group {
-                scope,
-                replicates: Vec::new(),
-            };
-            let settings = Settings {
-                model: ModelChoice::Given("WN".parse().unwrap()),
-                ..Settings::default()
-            };
-            fit_curve(&group, Estimator::Given, curve, &settings, &|_| {}).unwrap()
+            fit_given(curve, "WN", 100.0)
         };
         assert!(!outcome(0.0).departure().missed.is_empty());
         assert!(outcome(0.04).departure().missed.is_empty());

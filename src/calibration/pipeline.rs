@@ -153,6 +153,24 @@ pub fn infer_telling(
     });
 }
 
+/// The fit of a curve of accelerometers from elsewhere.
+#[cfg(test)]
+pub(crate) fn fit_given(curve: Curve, model: &str, rate_hz: f64) -> Outcome {
+    let group = Group {
+        scope: crate::curve::Scope {
+            sensor: crate::imu::Sensor::Accel,
+            axis: None,
+        },
+        replicates: Vec::new(),
+    };
+    let settings = Settings {
+        model: ModelChoice::Given(model.parse().unwrap()),
+        rate_hz,
+        ..Settings::default()
+    };
+    fit_curve(&group, Estimator::Given, curve, &settings, &|_| {}).unwrap()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -186,19 +204,7 @@ mod tests {
             levels,
             ..Curve::default()
         };
-        let group = Group {
-            scope: Scope {
-                sensor: Sensor::Accel,
-                axis: None,
-            },
-            replicates: Vec::new(),
-        };
-        let model = ModelChoice::Given("WN+RW".parse().unwrap());
-        let settings = Settings {
-            model,
-            ..Settings::default()
-        };
-        let outcome = fit_curve(&group, Estimator::Given, curve, &settings, &|_| {}).unwrap();
+        let outcome = fit_given(curve, "WN+RW", Settings::default().rate_hz);
         assert_eq!(outcome.curve.ignored, [7]);
     }
 

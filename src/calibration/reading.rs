@@ -90,11 +90,9 @@ fn slopes(outcome: &Outcome, rate_hz: f64) -> Option<Outcome> {
 
 #[cfg(test)]
 mod tests {
-    use crate::curve::{Estimator, Group, Scope};
-    use crate::imu::Sensor;
     use crate::noise::{Composite, Process};
-    use crate::outcome::{ModelChoice, Outcome, Settings};
-    use crate::pipeline::fit_curve;
+    use crate::outcome::Outcome;
+    use crate::pipeline::fit_given;
     use crate::wavelet::Curve;
 
     /// White noise and random walk, exact but for a vibration at these levels.
@@ -114,19 +112,7 @@ mod tests {
             levels,
             ..Curve::default()
         };
-        let group = Group {
-            scope: Scope {
-                sensor: Sensor::Accel,
-                axis: None,
-            },
-            replicates: Vec::new(),
-        };
-        let settings = Settings {
-            model: ModelChoice::Given("WN+RW".parse().unwrap()),
-            rate_hz: 100.0,
-            ..Settings::default()
-        };
-        fit_curve(&group, Estimator::Given, curve, &settings, &|_| {}).unwrap()
+        fit_given(curve, "WN+RW", 100.0)
     }
 
     /// The scales beside a vibration are exact, and so is what is read there: both amplitudes, and no other noise.

@@ -55,7 +55,8 @@ static QUANTITIES: [Quantity; 3] = [
     Quantity::number("wv", "wv"),
     Quantity::number("edof", "edof"),
 ];
-const DICTIONARY: Dictionary<'_> = Dictionary::new(&QUANTITIES, "the first line names them");
+pub(crate) const DICTIONARY: Dictionary<'_> =
+    Dictionary::new(&QUANTITIES, "the first line names them");
 
 fn csv(path: &str, text: &str) -> Result<NamedCurve, Failure> {
     let table = parse_table(path, text, &DICTIONARY)?;

@@ -3,7 +3,7 @@
 use super::fusion_files::{FIXES, bare_row, is_nmea, is_rtklib};
 use super::table::{Quantity, quantities};
 use super::trajectory_file::DICTIONARY as TRAJECTORIES;
-use super::{Failure, logs, recordings, source};
+use super::{Failure, curve_file, logs, recordings, source};
 use std::path::Path;
 
 /// The kinds of files that commands read.
@@ -133,11 +133,7 @@ fn table_kind(text: &str) -> FileKind {
         kind
     } else if is_nmea(text) || is_rtklib(text) {
         FileKind::Gnss
-    } else if text
-        .lines()
-        .take(20)
-        .any(|line| line.contains("tau_samples"))
-    {
+    } else if has(&of(&curve_file::DICTIONARY), "tau_samples") {
         FileKind::Curve
     } else if is_signal {
         FileKind::Recording

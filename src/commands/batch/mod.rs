@@ -393,9 +393,10 @@ impl Study {
             serde_json::from_str(&text).refuse_within(path.display())?
         } else {
             let source = Source::read(path)?;
+            let study: Self = source.get()?;
             Self {
                 source: Some(source).filter(|_| set.is_empty()),
-                ..Source::read(path)?.get()?
+                ..study
             }
         };
         for assignment in set {

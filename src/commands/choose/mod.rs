@@ -185,7 +185,11 @@ impl Command for Choose {
         let ranking = Ranking::new(&candidates, &folds);
         let winner = &candidates[ranking.candidates[0].index];
         // an estimator of single recordings never wins: this is of all of them
-        let (groups, outcomes, settings) = laboratory.calibrate(winner, None)?;
+        let (groups, mut outcomes, settings) = laboratory.calibrate(winner, None)?;
+        // The model that was compared is the one that is written.
+        outcomes
+            .iter_mut()
+            .for_each(|outcome| outcome.reading = None);
         let model = winner.inflated(&model_of(&outcomes, settings.rate_hz));
         let mut calibration = Calibration::new(
             groups,

@@ -849,7 +849,7 @@ pub(crate) fn read_imu(
         ..ReadOptions::default()
     };
     let mut table = recordings::load(path, &options, &SAMPLES)?;
-    let facts = recordings::facts::of_drive(&mut table);
+    let facts = recordings::facts::repair_drive(&mut table);
     let names = [
         "t_s", "accel.x", "accel.y", "accel.z", "gyro.x", "gyro.y", "gyro.z",
     ];

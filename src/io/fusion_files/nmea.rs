@@ -45,7 +45,7 @@ pub(crate) fn is_nmea(text: &str) -> bool {
     // those of VectorNav are of an IMU
     let is_address = |word: &str| {
         let is_upper = word.bytes().all(|b| b.is_ascii_uppercase());
-        word.len() == 5 && is_upper && !word.starts_with("VN")
+        word.len() == 5 && is_upper && &word[..2] != "VN"
     };
     let mut lines = text.lines().take(20).map(str::trim_end);
     lines.any(|line| body(line).is_ok_and(|body| body.split(',').next().is_some_and(is_address)))

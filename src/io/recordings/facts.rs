@@ -1,10 +1,11 @@
-//! What recordings hold beside measurements: repaired and counted where it is certain, a warning where it is not, refused
+//! Rows and values of recordings that are no measurements: repaired and counted where it is certain, a warning where it is not, refused
 //! where it makes a noise model worthless. The tests are those of [`nav_sim_signal::facts`].
 
 use super::{Channel, DICTIONARY, FileReport, Gaps, ReadOptions, SIX, channel_of, timing};
 use crate::io::table::{Column, Table, find, normalised};
 use crate::io::{Failure, Place, help};
 use crate::report::{readable, six_digits};
+use nav_sim_calibration::percent;
 use nav_sim_signal::facts::{self, Marks, Repeats};
 use nav_sim_signal::imu::{Recording, Sensor};
 use nav_sim_signal::noise::{Kind, Model, Process};
@@ -17,14 +18,6 @@ const MOST_REPEATED: f64 = 0.1;
 /// Seconds in motion from which on a recording is not static.
 const MOST_MOVING: f64 = 0.5;
 
-fn percent(share: f64) -> String {
-    let percent = 100.0 * share;
-    match percent {
-        p if p < 10.0 => format!("{p:.1} %"),
-        p => format!("{p:.0} %"),
-    }
-}
-
 fn axes(table: &Table, is: impl Fn(Channel) -> bool) -> Vec<&[f64]> {
     let own = |c: &&Column| channel_of(c).is_some_and(&is);
     table
@@ -35,7 +28,7 @@ fn axes(table: &Table, is: impl Fn(Channel) -> bool) -> Vec<&[f64]> {
         .collect()
 }
 
-/// Rows of a table that are no measurements, and what is said of them.
+/// Rows of a table that are no measurements.
 #[derive(Default)]
 pub(super) struct Repair {
     /// Rows of a sample where a sensor is slower than the file, else 1.
@@ -44,8 +37,8 @@ pub(super) struct Repair {
     missing: Vec<(Option<Channel>, Range<usize>)>,
     /// First rows after rows that were left out.
     pub(super) breaks: Vec<usize>,
-    /// What is said of samples that were interpolated.
-    on_line: Option<String>,
+    /// A warning of interpolated samples.
+    interpolated: Option<String>,
     /// Stretches of one value, to be told with their times.
     frozen: Vec<(Channel, f64, Range<usize>)>,
 }
@@ -69,7 +62,7 @@ fn leave_out(table: &mut Table, rows: &[usize]) {
     }
 }
 
-/// Rows that are zero for lost samples, and what is said of them.
+/// Rows that are zero for lost samples, and a warning of them.
 fn lost(table: &Table) -> (Vec<usize>, Option<String>) {
     let accel = axes(table, |channel| channel.sensor == Sensor::Accel);
     let rows = facts::zero_rows(&axes(table, |_| true), &accel);
@@ -78,14 +71,14 @@ fn lost(table: &Table) -> (Vec<usize>, Option<String>) {
     (rows, (count > 0).then_some(text))
 }
 
-/// What is said of the zeros of a column.
+/// A warning of the zeros of a column.
 fn zeros(name: impl Display, values: &[f64]) -> Option<String> {
     let share = percent(facts::zeros(values)?);
     let why = "which its step does not explain: a dead band, or lost samples";
     Some(format!("{share} of {name} is exactly 0, {why}"))
 }
 
-/// What is said of a column whose range was exceeded.
+/// A warning of a column whose range was exceeded.
 fn clipped(name: impl Display, values: &[f64]) -> Option<String> {
     let (share, end) = facts::clipped(values)?;
     let share = percent(share);
@@ -94,7 +87,7 @@ fn clipped(name: impl Display, values: &[f64]) -> Option<String> {
     ))
 }
 
-/// What is said of a column that was interpolated.
+/// A warning of a column that was interpolated.
 fn interpolated(name: impl Display, values: &[f64]) -> Option<String> {
     let share = percent(facts::interpolated(values)?);
     let why = "interpolated, not measured";
@@ -138,7 +131,7 @@ fn repeats_of(table: &Table) -> Vec<(Sensor, Option<Repeats>)> {
     Sensor::ALL.into_iter().filter_map(of).collect()
 }
 
-/// What is said of repeated rows; `rate_hz` is that of the rows, if it is known.
+/// A warning of repeated rows; `rate_hz` is that of the rows, if it is known.
 fn repeated(name: impl Display, repeats: &Repeats, rate_hz: f64) -> String {
     let share = percent(repeats.share);
     let repeated = format!("{name}: {share} of its rows repeat the row before");
@@ -154,7 +147,7 @@ fn repeated(name: impl Display, repeats: &Repeats, rate_hz: f64) -> String {
 /// Repairs a table of a static recording before its time is looked at.
 ///
 /// # Errors
-/// What makes a noise model worthless.
+/// When the rows make a noise model worthless.
 pub(super) fn repair(
     table: &mut Table,
     options: &ReadOptions,
@@ -187,7 +180,8 @@ pub(super) fn repair(
         let text = format!("{channel} holds one value, {value}, for {count} rows: missing samples");
         return Err(missing(table, rows.start, &text));
     }
-    repair.on_line = signals(table).find_map(|(channel, values)| interpolated(channel, values));
+    repair.interpolated =
+        signals(table).find_map(|(channel, values)| interpolated(channel, values));
     let zeros = signals(table).filter_map(|(channel, values)| zeros(channel, values));
     report.warnings.extend(zeros.filter(|_| !is_lossy));
     repair.apply(table, options.gaps);
@@ -321,17 +315,17 @@ impl Repair {
     ///
     /// # Errors
     /// Where there are some.
-    pub(super) fn measured(self, path: &str) -> Result<(), Failure> {
+    pub(super) fn refuse_interpolated(self, path: &str) -> Result<(), Failure> {
         let refused = |text: String| {
             Failure::contents(path, Place::Within, text)
                 .or_hint("write the samples as the sensor gave them, at its own rate and stamps")
                 .or_option(help::CHANNELS)
         };
-        self.on_line.map_or(Ok(()), |text| Err(refused(text)))
+        self.interpolated.map_or(Ok(()), |text| Err(refused(text)))
     }
 
-    /// Tells which stretches hold one value, now that the rate is known.
-    pub(super) fn tell(&self, rate_hz: f64, report: &mut FileReport) {
+    /// Warns of stretches of one value, now that the rate is known.
+    pub(super) fn warn_of_frozen(&self, rate_hz: f64, report: &mut FileReport) {
         for channel in Channel::ALL {
             let own = || self.frozen.iter().filter(|(c, ..)| *c == channel);
             let Some((_, value, rows)) = own().next() else {
@@ -349,7 +343,7 @@ impl Repair {
     }
 }
 
-/// What a static recording says of itself in SI units.
+/// Warnings of a static recording in SI units.
 ///
 /// # Errors
 /// When it moves in most of its seconds.
@@ -416,18 +410,18 @@ pub(crate) fn out_of_range(model: &Model) -> Vec<String> {
     Sensor::ALL.into_iter().filter_map(of).collect()
 }
 
-/// What a recording under way says of itself: copies and lost samples are left out.
-pub(crate) fn of_drive(table: &mut Table) -> Vec<String> {
-    let mut said: Vec<String> = drop_copies(table).into_iter().collect();
+/// Leaves copies and lost samples out of a recording under way; warnings of it.
+pub(crate) fn repair_drive(table: &mut Table) -> Vec<String> {
+    let mut warnings: Vec<String> = drop_copies(table).into_iter().collect();
     let (zero, text) = lost(table);
     leave_out(table, &zero);
-    said.extend(text);
+    warnings.extend(text);
     let rate_hz = rate_of_rows(table, &ReadOptions::default()).unwrap_or(f64::NAN);
     for (sensor, repeats) in repeats_of(table) {
-        said.extend(repeats.map(|repeats| repeated(sensor, &repeats, rate_hz)));
+        warnings.extend(repeats.map(|repeats| repeated(sensor, &repeats, rate_hz)));
     }
-    said.extend(signals(table).find_map(|(channel, values)| interpolated(channel, values)));
-    said
+    warnings.extend(signals(table).find_map(|(channel, values)| interpolated(channel, values)));
+    warnings
 }
 
 /// Marks of the samples of each sensor.

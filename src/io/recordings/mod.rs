@@ -585,7 +585,7 @@ pub(super) fn recordings(
         timing.breaks.sort_unstable();
         timing.breaks.dedup();
     }
-    repair.tell(timing.rate_hz, &mut report);
+    repair.warn_of_frozen(timing.rate_hz, &mut report);
     report.marks = facts::marks(&raw);
     raw.columns
         .sort_by_key(|c| channel_of(c).map(Channel::index));
@@ -625,7 +625,7 @@ pub(super) fn recordings(
             report.means = means;
         }
     }
-    repair.measured(&report.file)?;
+    repair.refuse_interpolated(&report.file)?;
     report.rate_hz = timing.rate_hz;
     Ok((recordings, report))
 }

@@ -329,7 +329,7 @@ fn a_range_that_is_exceeded_is_told() {
 }
 
 #[test]
-fn a_knock_a_dead_band_and_a_slip_of_the_pen_are_told() {
+fn a_knock_a_dead_band_and_a_misspelt_column_are_told() {
     let mut knocked = rows(7, 6000);
     knocked[3050..3060].iter_mut().for_each(|row| row[2] += 3.0);
     assert_eq!(

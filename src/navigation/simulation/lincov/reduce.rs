@@ -2,9 +2,9 @@
 //!
 //! A filter with one Gauss-Markov bias an axis cannot follow the processes of a larger model; the pair
 //! closest in wavelet variance leaves it overconfident. Here white noise, drive and correlation time of each
-//! sensor's level axes and of its axis down are chosen so that the filter's own covariance is closest to that of
-//! the errors it truly makes, in the sense of the Kullback-Leibler divergence, along a trajectory with its fixes and
-//! outages.
+//! sensor's level axes and of its axis down are chosen so that the true errors at the ends of outages have the
+//! largest expected log density under the filter's own covariance, and that this covariance is closest to that of the true
+//! errors along the drive, in the sense of the Kullback-Leibler divergence.
 
 use super::pass::{Assessment, Consistency, ErrorLaw, FilterPass, Judged};
 use super::track::{NAV, Track};
@@ -122,7 +122,9 @@ impl Search<'_> {
         let law = FilterPass::new(&self.track, &belief).errors_as_expected(&belief, self.model);
         let assessment = law.assessment();
         let steep = steep(&assessment);
-        let cost = score(&assessment) + steep.iter().map(Steep::cost).sum::<f64>();
+        // Small errors that are stated as they are have the largest density.
+        let cost = average(&assessment, |end| -2.0 * end.log_density)
+            + steep.iter().map(Steep::cost).sum::<f64>();
         let parts = shape(&law).chain(steep.iter().map(Steep::part)).collect();
         Value { cost, parts }.with_ridge(RIDGE, ln)
     }
@@ -192,23 +194,6 @@ const WAY: f64 = 0.3;
 /// The same for the mean NEES: the logarithm at which it begins to count, and its weight.
 const NEES_OFF: f64 = 0.03;
 const NEES_WEIGHT: f64 = 0.1;
-
-/// Twice what the belief loses of the expected log density of the errors: at the outage ends the density itself, which rewards
-/// small errors that are stated as they are, and over the drive the divergence of what is stated from what is made.
-fn score(assessment: &Assessment) -> f64 {
-    let all = divergence(assessment, |_| 0.0);
-    let ends = &assessment.outage_ends;
-    match ends.is_empty() {
-        true => all,
-        false => {
-            all - ENDS
-                * mean(
-                    ends.iter()
-                        .map(|end| 2.0 * end.log_density + end.divergence),
-                )
-        }
-    }
-}
 
 /// A logarithm that costs its fourth power: `scale` off costs `weight`, half of that a sixteenth, twice as much sixteen times;
 /// both directions count alike.
@@ -297,8 +282,8 @@ fn shape(law: &ErrorLaw) -> impl Iterator<Item = Part> {
     })
 }
 
-/// The divergence on the average and at the outage ends, where `beside` is added to it.
-pub(super) fn divergence(assessment: &Assessment, beside: impl Fn(&Consistency) -> f64) -> f64 {
+/// The mean divergence along the drive, and with its share the mean cost at the outage ends.
+pub(super) fn average(assessment: &Assessment, of_end: impl Fn(&Consistency) -> f64) -> f64 {
     // The first instant is the initial state, which no belief about the IMU changes. A trajectory of a few
     // seconds has no other: the mean of none is NaN, and a search ends where it starts.
     let reports = assessment.reports.get(1..).unwrap_or_default();
@@ -306,9 +291,7 @@ pub(super) fn divergence(assessment: &Assessment, beside: impl Fn(&Consistency) 
     if assessment.outage_ends.is_empty() {
         return all;
     }
-    let ends = &assessment.outage_ends;
-    let ends = mean(ends.iter().map(|c| c.divergence + beside(c)));
-    ENDS * ends + (1.0 - ENDS) * all
+    ENDS * mean(assessment.outage_ends.iter().map(of_end)) + (1.0 - ENDS) * all
 }
 
 /// Time before the first outage, between the two and after them (s).

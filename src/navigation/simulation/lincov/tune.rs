@@ -6,7 +6,7 @@
 //! on all of them makes the filter exactly consistent.
 
 use super::pass::{Assessment, Consistency, FilterPass};
-use super::reduce::{ENDS, Part, Value, divergence, minimum};
+use super::reduce::{ENDS, Part, Value, average, minimum};
 use super::track::Track;
 use super::truth::TrueErrors;
 use crate::ekf::{Belief, BeliefError};
@@ -196,8 +196,9 @@ impl Task<'_> {
         for assessment in &assessments {
             let of_run = assessment.ratio_over_run();
             cost += share
-                * (divergence(assessment, |end| overconfidence(end.ratio()))
-                    + overconfidence(of_run));
+                * (average(assessment, |end| {
+                    end.divergence + overconfidence(end.ratio())
+                }) + overconfidence(of_run));
             // The divergence of one state, (r² − 1)/2 − ln r, has the second derivative 2r² with respect to ln r.
             let part = |weight: f64, of_divergence: f64, r: f64| Part {
                 value: r.ln(),
