@@ -2,7 +2,7 @@
 
 use nav_sim_document::{Tone, readable, short_names, window};
 use nav_sim_navigation::metrics::{
-    ALL_STATES, Met, ReductionQuality, Summary, Verdict, VerdictKind,
+    ALL_STATES, Basis, Met, ReductionQuality, Summary, Verdict, VerdictKind,
 };
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 use serde::Deserialize;
@@ -76,15 +76,9 @@ fn words(summary: &Summary) -> String {
         }
         VerdictKind::Undecided => {
             let percent = 100.0 * (verdict.detectable_state_ratio - 1.0);
-            let needed = verdict.runs_to_decide.unwrap_or_default();
-            let miss = if verdict.independent_runs == 1.0 {
-                "misses"
-            } else {
-                "miss"
-            };
-            let runs = independent(verdict.independent_runs);
+            let (samples, decides) = (samples(verdict), deciding(verdict));
             format!(
-                "undecided: {runs} {miss} errors below {percent:.0} % in one state; {needed} would decide"
+                "undecided: {samples} cannot show errors below {percent:.0} % in one state; {decides}"
             )
         }
         VerdictKind::Doubtful => {
@@ -98,7 +92,7 @@ fn words(summary: &Summary) -> String {
             let rest = if verdict.is_expected() {
                 "by covariance analysis".to_owned()
             } else {
-                independent(verdict.independent_runs)
+                samples(verdict)
             };
             format!("{kind}: {nees}, coverage {:.3}; {rest}", verdict.coverage)
         }
@@ -116,11 +110,29 @@ fn beyond(verdict: &Verdict, outages: &[(f64, f64)]) -> String {
     format!("beyond linear theory{place}: confirm with --method both")
 }
 
-fn independent(runs: f64) -> String {
-    match runs {
-        1.0 => "1 run".to_owned(),
-        _ if runs.fract() == 0.0 => format!("{runs} runs"),
-        _ => format!("runs worth {runs:.1} independent ones"),
+/// What a verdict rests on.
+fn samples(verdict: &Verdict) -> String {
+    let worth = readable(verdict.independent_samples);
+    match verdict.basis {
+        Basis::Drive => format!("a drive worth {worth} independent samples"),
+        Basis::Windows => format!("runs on {worth} independent windows of the recording"),
+        Basis::Expectation => "covariance analysis".to_owned(),
+        Basis::Runs if verdict.independent_samples == 1.0 => "1 run".to_owned(),
+        Basis::Runs => format!("{} runs", verdict.independent_samples),
+    }
+}
+
+/// What would decide.
+fn deciding(verdict: &Verdict) -> String {
+    let times = verdict.times_to_decide.unwrap_or(1.0);
+    match verdict.basis {
+        Basis::Runs | Basis::Expectation => {
+            // a whole number is met to rounding
+            let runs = (times * verdict.independent_samples - 1e-6).ceil();
+            format!("{runs} would decide")
+        }
+        Basis::Windows => format!("a recording {times:.1} times as long would decide"),
+        Basis::Drive => format!("a drive {times:.1} times as long would decide"),
     }
 }
 
@@ -173,9 +185,13 @@ pub(crate) fn verdict_counts(verdicts: &[(&str, &Value)]) -> (VerdictKind, Vec<S
         let (count, all) = (of_kind.len(), verdicts.len());
         let [nees, ratio] = ["nees", "ratio"].map(|key| readable(number(worst, key)));
         let state = state_in_words(worst["worst_state"].as_str().unwrap_or_default());
-        let decide = worst["runs_to_decide"]
-            .as_u64()
-            .map_or_else(String::new, |runs| format!(", {runs} runs would decide"));
+        let decide = worst["times_to_decide"].as_f64().map(|times| Verdict {
+            basis: Basis::deserialize(&worst["basis"]).unwrap_or_default(),
+            independent_samples: number(worst, "independent_samples"),
+            times_to_decide: Some(times),
+            ..Verdict::default()
+        });
+        let decide = decide.map_or_else(String::new, |v| format!(", {}", deciding(&v)));
         Some(format!(
             "{count} of {all} filters {kind}, most: {name} (NEES {nees}, {ratio} × in {state}{decide})"
         ))

@@ -7,7 +7,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
 use std::collections::HashMap;
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::iter::Sum;
 
 /// A value estimated from runs and its Monte-Carlo standard error (NaN when one run cannot tell).
@@ -91,6 +91,36 @@ impl SampleSize {
         Self {
             values,
             independent: windows.unwrap_or(f64::INFINITY).min(values as f64),
+        }
+    }
+
+    /// The size of the sample that the mean square of series of normalised errors is made of (NaN: not known), the states
+    /// of one drive. The energy of a series at a scale of the Haar wavelet is the sum of N squares, alike and almost
+    /// independent; by Satterthwaite the sum of all scales has (Σ E)² degrees of freedom over Σ E²/N. White errors are all
+    /// independent; of an error that never changes there is one sample.
+    pub fn of_series<S: Iterator<Item = f64>>(series: impl Iterator<Item = S>) -> Self {
+        let (mut energy, mut square, mut states, mut values) = (0.0, 0.0, 0.0, 0);
+        for own in series {
+            let mut smooth: Vec<f64> = own.filter(|z| z.is_finite()).collect();
+            values = values.max(smooth.len() as u64);
+            states += 1.0;
+            let mut last = 0.0; // of the means that have no neighbour: as slow as the drive
+            while smooth.len() > 1 {
+                let (pairs, rest) = smooth.as_chunks::<2>();
+                last += rest.iter().map(|z| z * z).sum::<f64>();
+                let detail: f64 = pairs.iter().map(|[a, b]| 0.5 * (a - b).powi(2)).sum();
+                energy += detail;
+                square += detail * detail / pairs.len() as f64;
+                smooth = pairs.iter().map(|[a, b]| (a + b) * FRAC_1_SQRT_2).collect();
+            }
+            last += smooth.first().map_or(0.0, |z| z * z);
+            energy += last;
+            square += last * last;
+        }
+        let independent = energy * energy / (square * states);
+        Self {
+            values,
+            independent: independent.clamp(1.0, (values as f64).max(1.0)),
         }
     }
 }

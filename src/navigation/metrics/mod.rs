@@ -29,4 +29,6 @@ pub use summary::{
     AccuracySummary, Consistency, Coverage, Met, Nis, OutageSummary, Recovery, ReductionQuality,
     Requirement, Spread, Summary, TOLERANCE,
 };
-pub use verdict::{ALL_STATES, OutageVerdict, StateName, Verdict, VerdictKind};
+pub use verdict::{
+    ALL_STATES, Basis, NormalisedErrors, OutageVerdict, StateName, Verdict, VerdictKind,
+};

@@ -231,7 +231,7 @@ impl Summary {
         Self {
             schema_version: 1,
             verdict,
-            independent_runs: verdict.independent_runs,
+            independent_runs: verdict.independent_samples,
             accuracy: AccuracySummary::over(epochs.iter()),
             nees: nees(epochs, windows),
             coverage: coverage(epochs, coverage_level, windows),

@@ -2,23 +2,28 @@
 //!
 //! Statistics: NEES and (error/SEE)² of every reported state, as means over the whole run and at the end of
 //! each outage. Of a right filter each is a mean of chi-square variables, one of 9 or of 1 degree of freedom
-//! for each independent run. The epochs of one run hang together in a way nobody knows beforehand, so a mean
-//! over epochs is given the freedom of a single epoch: an interval that holds whatever their correlation, exact
-//! at the ends of outages. All statistics together alarm on a right filter with probability 1 % at most
+//! for each independent sample. Of simulated runs that is a run: the epochs of one run hang together, so a mean
+//! over epochs is given the freedom of a single epoch, an interval that holds whatever their correlation and is exact
+//! at the ends of outages. Of one recorded drive the errors themselves show how long they last
+//! ([`SampleSize::of_series`]). All statistics together alarm on a right filter with probability 1 % at most
 //! (Bonferroni), and what is significant but smaller than 10 % is let pass.
 //!
-//! A filter that does not alarm is consistent only where the runs would have found errors that matter: 25 % above the
-//! filter's standard deviations in all states together, 50 % in one of them. Fewer runs leave it undecided.
+//! A filter that does not alarm is consistent only where the samples would have found errors that matter: 25 % above the
+//! filter's standard deviations in all states together, 50 % in one of them. Fewer samples leave it undecided.
 
 use super::estimate::{Estimate, SampleSize, chi_square_interval};
-use crate::simulation::{NEES_DOF, REPORTED, REPORTED_NAMES, RunRecord, TOLERANCE};
+use crate::simulation::{NEES_DOF, OutageRecord, REPORTED, REPORTED_NAMES, RunRecord, TOLERANCE};
 use serde::Serialize;
 
 /// Probability at which a right filter is called wrong, all statistics together.
 const LEVEL: f64 = 0.01;
-/// Runs decide where errors so much larger than the filter's standard deviations would alarm: of all states together, of
+/// Samples decide where errors so much larger than the filter's standard deviations would alarm: of all states together, of
 /// one state.
 const DECISIVE: [f64; 2] = [1.25, 1.5];
+/// Fewer samples of a drive than these do not tell errors that are smaller than stated.
+const FEW: f64 = 10.0;
+/// Level of the coverage of a recorded drive.
+const COVERAGE: f64 = 0.95;
 /// A mean NEES above this is not a matter of tuning: errors are of another order than the filter believes.
 const FAR: f64 = 100.0;
 
@@ -28,7 +33,7 @@ pub enum VerdictKind {
     /// Errors are as large as the filter believes; other ones would have been found.
     #[default]
     Consistent,
-    /// No fault was found, by runs too few to find one.
+    /// No fault was found, by samples too few to find one.
     Undecided,
     /// Errors are smaller than the filter believes.
     Underconfident,
@@ -83,18 +88,53 @@ pub struct Verdict {
     pub by_covariance_analysis: Option<VerdictKind>,
     /// The first outage (from 0) in which errors are beyond linear theory, where covariance analysis does not hold.
     pub beyond_linear: Option<usize>,
-    /// Runs that count as independent; infinitely many (null) of a covariance analysis.
-    pub independent_runs: f64,
-    /// The error over standard deviation, common to all states, from which on these runs would tell it.
+    /// What the samples are.
+    pub basis: Basis,
+    /// Samples that count as independent; infinitely many (null) of a covariance analysis. Of a drive those of all states
+    /// together.
+    pub independent_samples: f64,
+    /// The error over standard deviation, common to all states, from which on these samples would tell it.
     pub detectable_ratio: f64,
-    /// The same of one state alone.
+    /// The same of the state that is known least.
     pub detectable_state_ratio: f64,
-    /// Independent runs that would decide; none (null) where the verdict is decided.
-    pub runs_to_decide: Option<u64>,
+    /// How many times as many samples would decide; none (null) where the verdict is decided.
+    pub times_to_decide: Option<f64>,
     /// Probability at which a right filter is called wrong, all statistics together.
     pub level: f64,
     /// Errors that differ by less than this share from the filter's standard deviations are let pass.
     pub tolerance: f64,
+}
+
+/// What a verdict rests on.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Basis {
+    /// Simulated runs, each with noise of its own.
+    #[default]
+    Runs,
+    /// Simulated runs on windows of a recording, of which only so many do not overlap.
+    Windows,
+    /// One recorded drive.
+    Drive,
+    /// Covariance analysis.
+    Expectation,
+}
+
+nav_sim_signal::named!(Basis {
+    Runs = "runs",
+    Windows = "windows",
+    Drive = "drive",
+    Expectation = "expectation",
+}, in files);
+
+/// The errors of a recorded drive at an instant, each over its standard deviation; NaN where one is not known.
+#[derive(Debug, Clone, Copy)]
+pub struct NormalisedErrors {
+    /// Time (s).
+    pub t_s: f64,
+    /// In each reported state.
+    pub over_sigma: [f64; REPORTED],
+    /// Normalised by the covariance of the known states; none where correlations are not known.
+    pub nees: Option<f64>,
 }
 
 /// The verdict on the filter at the end of one outage.
@@ -118,13 +158,20 @@ pub(super) fn judged(
     windows: Option<f64>,
 ) -> (Verdict, Vec<OutageVerdict>) {
     let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
-    let independent_runs = SampleSize::of(kept.len() as u64, windows).independent;
-    let statistics = statistics(&kept, outages, windows);
-    let judge = Judge::new(independent_runs, statistics.len());
+    let independent = SampleSize::of(kept.len() as u64, windows).independent;
+    let judge = Judge::of_runs(&kept, outages, windows, independent);
     let lost = (kept.len() < runs.len()).then_some(VerdictKind::Diverged);
-    let kind = lost.unwrap_or_else(|| judge.kind(&statistics));
-    let verdict = judge.verdict(kind, &statistics, (&kept, windows), independent_runs);
-    (verdict, judge.outages(&statistics, outages, lost))
+    let kind = lost.unwrap_or_else(|| judge.kind(None));
+    let basis = match windows {
+        Some(windows) if windows < kept.len() as f64 => Basis::Windows,
+        _ => Basis::Runs,
+    };
+    let verdict = Verdict {
+        basis,
+        independent_samples: independent,
+        ..judge.verdict(kind, (&kept, windows))
+    };
+    (verdict, judge.outages(outages, lost))
 }
 
 /// The same from the run whose squares are the expected ones: nothing is left to chance, and what is off by more than
@@ -133,17 +180,19 @@ pub(super) fn expected(
     record: &RunRecord,
     beyond_linear: Option<usize>,
 ) -> (Verdict, Vec<OutageVerdict>) {
-    let (judge, outages) = (Judge::EXACT, record.outages.len());
-    let statistics = statistics(&[record], outages, None);
-    let kind = match judge.kind(&statistics) {
+    let outages = record.outages.len();
+    let judge = Judge::of_runs(&[record], outages, None, f64::INFINITY);
+    let kind = match judge.kind(None) {
         VerdictKind::Consistent if beyond_linear.is_some() => VerdictKind::Doubtful,
         kind => kind,
     };
     let verdict = Verdict {
         beyond_linear,
-        ..judge.verdict(kind, &statistics, (&[record], None), f64::INFINITY)
+        basis: Basis::Expectation,
+        independent_samples: f64::INFINITY,
+        ..judge.verdict(kind, (&[record], None))
     };
-    (verdict, judge.outages(&statistics, outages, None))
+    (verdict, judge.outages(outages, None))
 }
 
 impl Verdict {
@@ -153,9 +202,103 @@ impl Verdict {
         judged(runs, outages, independent_windows).0
     }
 
+    /// Of one recorded drive with outages (start, end) (s): errors in order of time. None without errors over their
+    /// standard deviations.
+    pub fn of_drive(errors: &[NormalisedErrors], outages: &[(f64, f64)]) -> Option<Self> {
+        let column = |state: usize| errors.iter().map(move |e| e.over_sigma[state]);
+        let known: Vec<usize> = (0..REPORTED)
+            .filter(|state| column(*state).any(f64::is_finite))
+            .collect();
+        let size = |states: &[usize]| {
+            let columns = states.iter().map(|state| column(*state));
+            SampleSize::of_series(columns).independent
+        };
+        // Of standard deviations alone the sum of squares takes the place of the NEES. States whose errors hang together
+        // are then worth fewer: of a sum of squares of covariance R, (tr R)² over as many states as tr R² (Satterthwaite).
+        let has_covariance = errors.iter().any(|e| e.nees.is_some());
+        let whole: Vec<&NormalisedErrors> = errors
+            .iter()
+            .filter(|e| known.iter().all(|state| e.over_sigma[*state].is_finite()))
+            .collect();
+        let moment = |i: usize, j: usize| {
+            let products = whole.iter().map(|e| e.over_sigma[i] * e.over_sigma[j]);
+            products.sum::<f64>()
+        };
+        let trace: f64 = known.iter().map(|i| moment(*i, *i)).sum();
+        let pairs = known.iter().flat_map(|i| known.iter().map(move |j| (i, j)));
+        let squares: f64 = pairs.map(|(i, j)| moment(*i, *j).powi(2)).sum();
+        let together = match has_covariance {
+            true => 1.0,
+            false => (trace * trace / (known.len() as f64 * squares)).min(1.0),
+        };
+        let nees = |e: &NormalisedErrors| {
+            let squares = || known.iter().map(|i| e.over_sigma[*i].powi(2)).sum();
+            e.nees.unwrap_or_else(squares)
+        };
+        let mean = |values: &mut dyn Iterator<Item = f64>| {
+            let (sum, count) = values
+                .filter(|x| x.is_finite())
+                .fold((0.0, 0), |(sum, n), x| (sum + x, n + 1));
+            sum / f64::from(count)
+        };
+        let limit = chi_square_interval(known.len().max(1), 1.0, 1.0 - COVERAGE).lower;
+        let end = |&(start_s, end_s): &(f64, f64)| {
+            let within = errors
+                .iter()
+                .filter(|e| e.t_s > start_s && e.t_s <= end_s + 1e-6);
+            let last = within.last();
+            OutageRecord {
+                error_end: last.map_or([f64::NAN; REPORTED], |e| e.over_sigma),
+                see_end: [1.0; REPORTED],
+                nees_end: last.map_or(f64::NAN, nees),
+                ..OutageRecord::default()
+            }
+        };
+        let record = RunRecord {
+            nees_mean: mean(&mut whole.iter().map(|e| nees(e))),
+            covered: mean(&mut whole.iter().map(|e| f64::from(u8::from(nees(e) <= limit)))),
+            normalised_sq: std::array::from_fn(|i| mean(&mut column(i).map(|z| z * z))),
+            outages: outages.iter().map(end).collect(),
+            ..RunRecord::default()
+        };
+        if known.is_empty() {
+            return None;
+        }
+        let independent = size(&known) * together;
+        let samples = |outage: Option<usize>, state: Option<usize>| match (outage, state) {
+            (Some(_), _) => 1.0,
+            (_, Some(state)) => size(&[state]),
+            _ => independent,
+        };
+        let mut judge = Judge::new(&[&record], outages.len(), None, known.len(), samples);
+        // Slow errors that are small by chance leave fast ones, which look like many samples.
+        let few = judge.statistics.iter_mut().filter(|s| s.freedom.1.min(independent) < FEW);
+        few.for_each(|s| s.limits.0 = 0.0);
+        let verdict = judge.verdict(judge.kind(None), (&[&record], None));
+        // the scatter of a chi-square mean of so many independent samples
+        let dof = known.len() as f64;
+        let error = |freedom: f64| (2.0 / freedom).sqrt();
+        let ratio_samples = match (verdict.worst_outage, verdict.worst_state) {
+            (Some(_), _) => 1.0,
+            (_, ALL_STATES) => dof * independent,
+            (_, name) => {
+                let state = REPORTED_NAMES.iter().position(|own| *own == name);
+                size(&[state.unwrap_or_default()])
+            }
+        };
+        Some(Self {
+            basis: Basis::Drive,
+            independent_samples: independent,
+            nees_std_error: verdict.nees * error(dof * independent),
+            coverage_std_error: (COVERAGE * (1.0 - COVERAGE) / independent).sqrt(),
+            ratio_std_error: 0.5 * verdict.ratio * error(ratio_samples),
+            ..verdict
+        })
+    }
+
     /// Whether it rests on covariance analysis, not on runs.
-    pub const fn is_expected(&self) -> bool {
-        self.independent_runs.is_infinite()
+    pub fn is_expected(&self) -> bool {
+        self.basis == Basis::Expectation
     }
 
     /// Whether the errors are of another order than the filter believes.
@@ -173,76 +316,120 @@ struct Statistic {
     outage: Option<usize>,
     /// √(mean/degrees of freedom).
     ratio: Estimate,
+    /// Degrees of freedom of a sample, and independent samples.
+    freedom: (usize, f64),
+    /// Where the ratio of a right filter lies.
+    limits: (f64, f64),
 }
 
 impl Statistic {
     fn name(&self) -> StateName {
         self.state.map_or(ALL_STATES, |state| REPORTED_NAMES[state])
     }
+
+    /// The error over standard deviation from which on it alarms.
+    fn detectable(&self) -> f64 {
+        self.limits.1.max(1.0 + TOLERANCE)
+    }
 }
 
-/// All states together and each of them, over the whole run and at the end of each outage.
-fn statistics(runs: &[&RunRecord], outages: usize, windows: Option<f64>) -> Vec<Statistic> {
-    let square = |run: &RunRecord, outage: Option<usize>, state: Option<usize>| match outage {
-        None => state.map_or(run.nees_mean / NEES_DOF as f64, |i| run.normalised_sq[i]),
-        // A record that is missing makes the statistic NaN, and NaN alarms in neither direction.
-        Some(k) => run.outages.get(k).map_or(f64::NAN, |end| {
-            // Normalised run by run with the run's own deviation: to first order it is the same in all of them.
-            let of_state = |i: usize| (end.error_end[i] / end.see_end[i]).powi(2);
-            state.map_or(end.nees_end / NEES_DOF as f64, of_state)
-        }),
-    };
-    let statistic = |outage, state| Statistic {
-        state,
-        outage,
-        ratio: Estimate::mean_of(runs.iter().map(|r| square(r, outage, state)), windows).root(),
-    };
-    let some_and_each = |n: usize| std::iter::once(None).chain((0..n).map(Some));
-    some_and_each(outages)
-        .flat_map(|outage| some_and_each(REPORTED).map(move |state| (outage, state)))
-        .map(|(outage, state)| statistic(outage, state))
-        .collect()
+/// Between which a right filter's root mean square of so many degrees of freedom lies but with probability `tail` on
+/// either side.
+fn ratio_limits((dof, samples): (usize, f64), tail: f64) -> (f64, f64) {
+    if samples.is_infinite() {
+        return (1.0, 1.0); // nothing is left to chance: the tolerance alone decides
+    }
+    // Of a right filter the square is χ² over its degrees of freedom; the ratio is its root.
+    let band = chi_square_interval(dof, samples, tail);
+    let ratio = |mean: f64| (mean / dof as f64).sqrt();
+    (ratio(band.lower), ratio(band.upper))
 }
 
-/// The limits between which the ratios of a right filter lie.
+/// The statistics of some samples and what a right filter's are.
 struct Judge {
-    /// Lower and upper limit of all states together, and of one state.
-    limits: [(f64, f64); 2],
+    /// All states together and each of them, over the whole run and at the end of each outage.
+    statistics: Vec<Statistic>,
+    /// Probability that one of them is beyond a limit.
+    tail: f64,
 }
 
 impl Judge {
-    /// Nothing is left to chance: the limits of significance close on 1, and the tolerance alone decides.
-    const EXACT: Self = Self {
-        limits: [(1.0, 1.0); 2],
-    };
+    /// Of runs that all count alike.
+    fn of_runs(
+        runs: &[&RunRecord],
+        outages: usize,
+        windows: Option<f64>,
+        independent: f64,
+    ) -> Self {
+        Self::new(runs, outages, windows, NEES_DOF, |_, _| independent)
+    }
 
-    /// Of so many independent runs and so many statistics on both sides.
-    fn new(independent_runs: f64, statistics: usize) -> Self {
-        let tail = LEVEL / (2.0 * statistics as f64);
-        let limits = [NEES_DOF, 1].map(|dof| {
-            // Of a right filter the square is χ² over its degrees of freedom; the ratio is its root.
-            let band = chi_square_interval(dof, independent_runs, tail);
-            let ratio = |mean: f64| (mean / dof as f64).sqrt();
-            (ratio(band.lower), ratio(band.upper))
-        });
-        Self { limits }
+    /// Of so many reported states; `samples`: how many are independent, of an outage (none: of the whole) and a state
+    /// (none: of all together).
+    fn new(
+        runs: &[&RunRecord],
+        outages: usize,
+        windows: Option<f64>,
+        states: usize,
+        samples: impl Fn(Option<usize>, Option<usize>) -> f64,
+    ) -> Self {
+        let square = |run: &RunRecord, outage: Option<usize>, state: Option<usize>| match outage {
+            None => state.map_or(run.nees_mean / states as f64, |i| run.normalised_sq[i]),
+            // A record that is missing makes the statistic NaN, and NaN alarms in neither direction.
+            Some(k) => run.outages.get(k).map_or(f64::NAN, |end| {
+                // Normalised run by run with the run's own deviation: to first order it is the same in all of them.
+                let of_state = |i: usize| (end.error_end[i] / end.see_end[i]).powi(2);
+                state.map_or(end.nees_end / states as f64, of_state)
+            }),
+        };
+        let some_and_each = |n: usize| std::iter::once(None).chain((0..n).map(Some));
+        let places: Vec<_> = some_and_each(outages)
+            .flat_map(|outage| some_and_each(REPORTED).map(move |state| (outage, state)))
+            .collect();
+        let tail = LEVEL / (2.0 * places.len() as f64);
+        let statistic = |(outage, state): (Option<usize>, Option<usize>)| {
+            let squares = runs.iter().map(|r| square(r, outage, state));
+            let dof = if state.is_none() { states } else { 1 };
+            let freedom = (dof, samples(outage, state));
+            Statistic {
+                state,
+                outage,
+                ratio: Estimate::mean_of(squares, windows).root(),
+                freedom,
+                limits: ratio_limits(freedom, tail),
+            }
+        };
+        Self {
+            statistics: places.into_iter().map(statistic).collect(),
+            tail,
+        }
+    }
+
+    /// The statistics of an outage; none: all.
+    fn of(&self, outage: Option<usize>) -> impl Iterator<Item = &Statistic> + Clone {
+        let is_of = move |s: &&Statistic| outage.is_none_or(|k| s.outage == Some(k));
+        self.statistics.iter().filter(is_of)
+    }
+
+    /// Those over the whole run, or, of an outage, its own.
+    fn deciding(&self, outage: Option<usize>) -> impl Iterator<Item = &Statistic> + Clone {
+        let is_known = move |s: &&Statistic| s.outage == outage && !s.ratio.value.is_nan();
+        self.statistics.iter().filter(is_known)
     }
 
     /// The verdict on runs of these statistics.
-    fn verdict(
-        &self,
-        kind: VerdictKind,
-        statistics: &[Statistic],
-        (runs, windows): (&[&RunRecord], Option<f64>),
-        independent_runs: f64,
-    ) -> Verdict {
-        let worst = self.worst(statistics, kind);
+    fn verdict(&self, kind: VerdictKind, (runs, windows): (&[&RunRecord], Option<f64>)) -> Verdict {
+        let worst = self.worst(None, kind);
         let mean =
             |of: fn(&RunRecord) -> f64| Estimate::mean_of(runs.iter().map(|r| of(r)), windows);
         let (nees, coverage) = (mean(|r| r.nees_mean), mean(|r| r.covered));
-        // Errors over standard deviations from which on it alarms: of all states together, of one state.
-        let [detectable_ratio, detectable_state_ratio] =
-            self.limits.map(|(_, upper)| upper.max(1.0 + TOLERANCE));
+        let detectable = |is_state: bool| {
+            let own = self
+                .deciding(None)
+                .filter(|s| s.state.is_some() == is_state);
+            own.map(Statistic::detectable)
+                .fold(1.0 + TOLERANCE, f64::max)
+        };
         Verdict {
             kind,
             nees: nees.value,
@@ -253,49 +440,45 @@ impl Judge {
             worst_outage: worst.outage,
             ratio: worst.ratio.value,
             ratio_std_error: worst.ratio.std_error,
-            by_covariance_analysis: None,
-            beyond_linear: None,
-            independent_runs,
-            detectable_ratio,
-            detectable_state_ratio,
-            runs_to_decide: (kind == VerdictKind::Undecided)
-                .then(|| Self::runs_to_decide(statistics.len())),
+            detectable_ratio: detectable(false),
+            detectable_state_ratio: detectable(true),
+            times_to_decide: (kind == VerdictKind::Undecided).then(|| self.times_to_decide()),
             level: LEVEL,
             tolerance: TOLERANCE,
+            ..Verdict::default()
         }
     }
 
-    /// Whether it finds errors that matter.
-    fn is_decisive(&self) -> bool {
-        let limits = self.limits.iter().zip(DECISIVE);
-        limits
-            .into_iter()
-            .all(|((_, upper), limit)| *upper <= limit)
+    /// Whether so many times the samples find errors that matter.
+    fn is_decisive(&self, outage: Option<usize>, times: f64) -> bool {
+        self.deciding(outage).all(|s| {
+            let freedom = (s.freedom.0, s.freedom.1 * times);
+            ratio_limits(freedom, self.tail).1 <= DECISIVE[usize::from(s.state.is_some())]
+        })
     }
 
-    /// The fewest independent runs that decide, by bisection: the limits close on 1 as runs are added.
-    fn runs_to_decide(statistics: usize) -> u64 {
-        let decides = |runs: u64| Self::new(runs as f64, statistics).is_decisive();
-        let (mut few, mut enough) = (0, 1);
-        while !decides(enough) {
-            (few, enough) = (enough, 2 * enough);
+    /// The fewest times the samples that decide, by bisection: the limits close on 1 as samples are added.
+    fn times_to_decide(&self) -> f64 {
+        let (mut few, mut enough) = (1.0, 2.0);
+        while !self.is_decisive(None, enough) {
+            (few, enough) = (enough, 2.0 * enough);
         }
-        while enough - few > 1 {
-            let middle = few.midpoint(enough);
-            if decides(middle) {
-                enough = middle
+        while enough - few > 1e-9 * enough {
+            let middle = f64::midpoint(few, enough);
+            if self.is_decisive(None, middle) {
+                enough = middle;
             } else {
-                few = middle
+                few = middle;
             }
         }
         enough
     }
 
     /// Whether a statistic is significantly and materially off.
-    fn fault(&self, statistic: &Statistic) -> Option<VerdictKind> {
-        let (lower, upper) = self.limits[usize::from(statistic.state.is_some())];
+    fn fault(statistic: &Statistic) -> Option<VerdictKind> {
+        let (lower, upper) = statistic.limits;
         let ratio = statistic.ratio.value;
-        // Both: significant, since chance must not alarm; material, since with enough runs any linear filter
+        // Both: significant, since chance must not alarm; material, since with enough samples any linear filter
         // is wrong. Below, 1/1.1 is the same distance in the logarithm.
         if ratio > upper && ratio > 1.0 + TOLERANCE {
             Some(VerdictKind::Overconfident)
@@ -306,27 +489,20 @@ impl Judge {
         }
     }
 
-    /// Too much confidence anywhere is the graver fault.
-    fn kind(&self, all: &[Statistic]) -> VerdictKind {
-        let found = all.iter().filter_map(|s| self.fault(s)).max();
-        found.unwrap_or(match self.is_decisive() {
+    /// Too much confidence anywhere is the graver fault. Of an outage; none: of all.
+    fn kind(&self, outage: Option<usize>) -> VerdictKind {
+        let found = self.of(outage).filter_map(Self::fault).max();
+        found.unwrap_or(match self.is_decisive(outage, 1.0) {
             true => VerdictKind::Consistent,
             false => VerdictKind::Undecided,
         })
     }
 
     /// The verdicts on outages, from the statistics at their ends.
-    fn outages(
-        &self,
-        all: &[Statistic],
-        outages: usize,
-        lost: Option<VerdictKind>,
-    ) -> Vec<OutageVerdict> {
+    fn outages(&self, outages: usize, lost: Option<VerdictKind>) -> Vec<OutageVerdict> {
         let verdict_of_outage = |outage: usize| {
-            let own = all.iter().filter(|s| s.outage == Some(outage));
-            let own: Vec<Statistic> = own.copied().collect();
-            let kind = lost.unwrap_or_else(|| self.kind(&own));
-            let worst = self.worst(&own, kind);
+            let kind = lost.unwrap_or_else(|| self.kind(Some(outage)));
+            let worst = self.worst(Some(outage), kind);
             OutageVerdict {
                 kind,
                 worst_state: worst.name(),
@@ -339,21 +515,36 @@ impl Judge {
 
     /// The state that is farthest off in the direction of the verdict; of those that alarm, if any does. Where all
     /// states together alarm and none by itself does, it is they.
-    fn worst(&self, all: &[Statistic], kind: VerdictKind) -> Statistic {
-        let distance = |s: &Statistic| match kind {
-            VerdictKind::Underconfident => -s.ratio.value.ln(),
-            VerdictKind::Overconfident => s.ratio.value.ln(),
-            _ => s.ratio.value.ln().abs(),
+    fn worst(&self, outage: Option<usize>, kind: VerdictKind) -> Statistic {
+        let distance = |s: &Statistic| {
+            let distance = match kind {
+                VerdictKind::Underconfident => -s.ratio.value.ln(),
+                VerdictKind::Overconfident => s.ratio.value.ln(),
+                _ => s.ratio.value.ln().abs(),
+            };
+            // what is not known is nowhere farthest
+            if distance.is_nan() {
+                f64::NEG_INFINITY
+            } else {
+                distance
+            }
         };
-        let alarms = |s: &Statistic| self.fault(s) == Some(kind);
-        let alarmed = |alone: bool| all.iter().any(|s| s.state.is_some() == alone && alarms(s));
+        let all = self.of(outage);
+        let alarms = |s: &Statistic| Self::fault(s) == Some(kind);
+        let alarmed = |alone: bool| {
+            let mut own = all.clone().filter(|s| s.state.is_some() == alone);
+            own.any(|s| alarms(s))
+        };
         let together = alarmed(false) && !alarmed(true);
-        let states = all.iter().filter(|s| s.state.is_none() == together);
+        let states = all.filter(|s| s.state.is_none() == together);
         let farther = |a: &&Statistic, b: &&Statistic| {
             let by_distance = distance(a).total_cmp(&distance(b));
             alarms(a).cmp(&alarms(b)).then(by_distance)
         };
-        states.max_by(farther).copied().unwrap_or(all[0])
+        states
+            .max_by(farther)
+            .copied()
+            .unwrap_or(self.statistics[0])
     }
 }
 

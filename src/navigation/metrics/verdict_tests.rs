@@ -153,7 +153,7 @@ fn runs_that_share_their_noise_tell_less() {
     );
     let shared = Verdict::of(&records, 1, Some(3.0));
     assert_eq!(
-        (shared.kind, shared.independent_runs),
+        (shared.kind, shared.independent_samples),
         (VerdictKind::Undecided, 3.0)
     );
     assert!(
@@ -189,7 +189,7 @@ fn too_few_runs_leave_a_right_filter_undecided() {
     let few = verdict(8, 1.0);
     assert_eq!(few.kind, VerdictKind::Undecided);
     assert!(few.detectable_state_ratio > 1.5, "{few:?}");
-    let enough = few.runs_to_decide.unwrap();
+    let enough = (8.0 * few.times_to_decide.unwrap() - 1e-6).ceil() as u64;
     let [one_less, decided] = [enough - 1, enough].map(|count| verdict(count, 1.0));
     assert_eq!(
         (one_less.kind, decided.kind),
@@ -199,7 +199,142 @@ fn too_few_runs_leave_a_right_filter_undecided() {
         decided.detectable_state_ratio <= 1.5 && decided.detectable_ratio <= 1.25,
         "{decided:?}"
     );
-    assert!(one_less.detectable_state_ratio > 1.5 && decided.runs_to_decide.is_none());
+    assert!(one_less.detectable_state_ratio > 1.5 && decided.times_to_decide.is_none());
     assert!(judged(&runs(8, 1, 3, [1.0; 9]), 1, None).1[0].kind == VerdictKind::Undecided);
     assert_eq!(verdict(8, 2.5).kind, VerdictKind::Overconfident);
+}
+
+/// Errors of first-order Gauss-Markov processes of nine states, `scale` times their standard deviations, over so many
+/// correlation times of 20 rows.
+fn drive(seed: u64, times: usize, scale: f64) -> Vec<NormalisedErrors> {
+    let key = StreamKey {
+        seed,
+        scenario: "",
+        run: 0,
+        source: "drive",
+        process: "t",
+    };
+    let mut rng = key.generator();
+    let phi = (-1.0 / 20.0_f64).exp();
+    let mut z = [0.0; REPORTED].map(|_: f64| StandardNormal.sample(&mut rng));
+    let mut row = |k: usize| {
+        z = z.map(|z: f64| {
+            let w: f64 = StandardNormal.sample(&mut rng);
+            phi * z + (1.0 - phi * phi).sqrt() * w
+        });
+        let over_sigma = z.map(|z| scale * z);
+        NormalisedErrors {
+            t_s: k as f64,
+            over_sigma,
+            nees: Some(over_sigma.iter().map(|z| z * z).sum()),
+        }
+    };
+    (0..20 * times).map(&mut row).collect()
+}
+
+/// A mean square of n independent errors varies by 2/n. Of a first-order process over 400 correlation times τ that is
+/// n = T/τ·(1 − φ²)/(1 + φ²)·20 to 0.1 %: 400. Over 200 drives the variance is known to 10 %, three of which are allowed.
+#[test]
+fn the_samples_of_a_drive_are_those_of_its_scatter() {
+    let (mut squares, mut worth) = (Vec::new(), Vec::new());
+    for seed in 0..200 {
+        let z: Vec<f64> = drive(seed, 400, 1.0)
+            .iter()
+            .map(|e| e.over_sigma[3])
+            .collect();
+        squares.push(z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64);
+        worth.push(SampleSize::of_series([z.into_iter()].into_iter()).independent);
+    }
+    let n = squares.len() as f64;
+    let mean = squares.iter().sum::<f64>() / n;
+    let variance = squares.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
+    let worth = worth.iter().sum::<f64>() / n;
+    assert!(
+        (worth * variance / 2.0 - 1.0).abs() < 0.3,
+        "{worth} {}",
+        2.0 / variance
+    );
+}
+
+/// White errors are all independent, one that never changes is one sample, and two states count as the mean of both.
+#[test]
+fn what_never_changes_is_one_sample() {
+    let constant = || std::iter::repeat_n(0.7, 1000);
+    let size =
+        |all: Vec<Vec<f64>>| SampleSize::of_series(all.into_iter().map(Vec::into_iter)).independent;
+    assert!((size(vec![constant().collect()]) - 1.0).abs() < 1e-9);
+    let white: Vec<f64> = (0..1024)
+        .map(|k| if k % 2 == 0 { 1.0 } else { -1.0 })
+        .collect();
+    // all of its energy is at the finest scale, which has half as many coefficients
+    assert!((size(vec![white.clone()]) - 512.0).abs() < 1e-9);
+    assert!((size(vec![white.clone(), white]) - 512.0).abs() < 1e-9);
+}
+
+/// Drives of 400 correlation times tell errors 1.0, 1.25 and 0.8 times the stated ones: at most two of 40 wrong, and the same
+/// word as 100 runs with these errors.
+#[test]
+fn a_long_drive_decides() {
+    for (scale, kind) in [
+        (1.0, VerdictKind::Consistent),
+        (1.25, VerdictKind::Overconfident),
+        (0.8, VerdictKind::Underconfident),
+    ] {
+        let right = |seed: &u64| {
+            Verdict::of_drive(&drive(*seed, 400, scale), &[])
+                .unwrap()
+                .kind
+                == kind
+        };
+        let count = (0..40).filter(right).count();
+        assert!(count >= 38, "{count} of 40 at {scale}");
+        assert_eq!(
+            Verdict::of(&runs(100, 20, 3, [scale; 9]), 1, None).kind,
+            kind
+        );
+    }
+}
+
+/// A right filter on drives of one to thirty correlation times: an alarm in 1 % of them. Of 600 at most 6, by four
+/// deviations of a binomial share 16.
+#[test]
+fn a_short_drive_is_rarely_called_wrong() {
+    for times in [1, 3, 10, 30] {
+        let wrong = |seed: &u64| {
+            let verdict = Verdict::of_drive(&drive(*seed, times, 1.0), &[]).unwrap();
+            verdict.kind > VerdictKind::Undecided
+        };
+        let count = (0..600).filter(wrong).count();
+        assert!(count <= 16, "{count} of 600 at {times}");
+    }
+    let short = Verdict::of_drive(&drive(1, 10, 1.0), &[]).unwrap();
+    assert_eq!(
+        (short.kind, short.basis),
+        (VerdictKind::Undecided, Basis::Drive)
+    );
+    let longer = short.times_to_decide.unwrap();
+    assert!(longer > 1.0, "{longer}");
+    let enough = drive(1, (10.0 * longer * 1.5) as usize, 1.0);
+    assert_eq!(
+        Verdict::of_drive(&enough, &[]).unwrap().kind,
+        VerdictKind::Consistent
+    );
+}
+
+/// Without a covariance, and with states whose errors are the same, the sum of squares has fewer degrees of freedom; a state
+/// that is not known is not counted.
+#[test]
+fn states_whose_errors_are_the_same_are_one() {
+    let alike: Vec<NormalisedErrors> = drive(5, 100, 1.0)
+        .into_iter()
+        .map(|e| NormalisedErrors {
+            over_sigma: std::array::from_fn(|i| if i < 3 { e.over_sigma[0] } else { f64::NAN }),
+            nees: None,
+            ..e
+        })
+        .collect();
+    let verdict = Verdict::of_drive(&alike, &[]).unwrap();
+    let one = SampleSize::of_series([alike.iter().map(|e| e.over_sigma[0])].into_iter());
+    assert!((verdict.independent_samples * 3.0 / one.independent - 1.0).abs() < 1e-9);
+    assert!(Verdict::of_drive(&[], &[]).is_none());
 }
