@@ -123,7 +123,7 @@ fn fixes(path: &Path) {
 fn trajectory(path: &Path) {
     let origin = Some([0.8, 0.1, 400.0]);
     _ = trajectory_file::load(path, origin);
-    _ = trajectory_file::load_reference(path);
+    _ = trajectory_file::load_reference(path, None);
 }
 
 /// As read, and with a checksum that is right, so that more than the checksum is tried.

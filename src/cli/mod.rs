@@ -113,6 +113,7 @@ models        datasheet, export   from a data sheet; to Kalibr, PX4, GTSAM and o
 navigation    trajectory          make, check and convert reference trajectories
               run, compare        INS/GNSS by Monte Carlo or covariance analysis; ratios between runs
               fuse                recorded IMU and GNSS data
+              judge               the solution of any filter against a reference
 studies       batch               grids of runs on any machines
 to start      demo, init          the case study of the paper; a directory with files of every kind
               check, schema       check files; their JSON schemas

@@ -10,6 +10,7 @@ pub mod design;
 pub mod export;
 pub mod fuse;
 pub mod inspect;
+pub mod judge;
 pub mod require;
 pub mod run;
 pub mod synthesize;
@@ -36,6 +37,7 @@ macro_rules! with_commands {
             Run: crate::commands::run::Run,
             Compare: crate::commands::compare::Compare,
             Fuse: crate::commands::fuse::Fuse,
+            Judge: crate::commands::judge::Judge,
             Inspect: crate::commands::inspect::Inspect,
             Check: crate::commands::check::CheckFiles,
         }

@@ -45,11 +45,25 @@ pub(crate) fn windows(summary: &Summary) -> Vec<(f64, f64)> {
         .collect()
 }
 
+/// The verdict on a drive by a reference that knows so many states.
+pub(crate) fn drive_line(verdict: &Verdict, states: usize, outages: &[(f64, f64)]) -> String {
+    sentence(verdict, (1, 0), states, outages)
+}
+
 fn words(summary: &Summary) -> String {
-    let (verdict, runs, diverged) = (&summary.verdict, summary.runs, summary.diverged);
-    let windows = windows(summary);
+    let runs = (summary.runs, summary.diverged);
+    sentence(&summary.verdict, runs, REPORTED, &windows(summary))
+}
+
+/// A verdict on so many runs, of which some diverged.
+fn sentence(
+    verdict: &Verdict,
+    (runs, diverged): (u64, u64),
+    states: usize,
+    windows: &[(f64, f64)],
+) -> String {
     let nees = format!(
-        "NEES {} (9 if right)",
+        "NEES {} ({states} if right)",
         with_error(verdict.nees, verdict.nees_std_error)
     );
     let by = if verdict.is_expected() {
@@ -63,14 +77,14 @@ fn words(summary: &Summary) -> String {
         VerdictKind::Diverged => {
             format!(
                 "diverged: {diverged} of {runs} runs; of the others, {}",
-                departure(verdict, &windows)
+                departure(verdict, windows)
             )
         }
         VerdictKind::Overconfident | VerdictKind::Underconfident => {
             let far = if verdict.is_far_off() { " by far" } else { "" };
             format!(
                 "{kind}{far}{by}: {}; NEES {}",
-                departure(verdict, &windows),
+                departure(verdict, windows),
                 readable(verdict.nees)
             )
         }
@@ -85,7 +99,7 @@ fn words(summary: &Summary) -> String {
             format!(
                 "doubtful: NEES {}{by}, {}",
                 readable(verdict.nees),
-                beyond(verdict, &windows)
+                beyond(verdict, windows)
             )
         }
         VerdictKind::Consistent | VerdictKind::NotMet => {
@@ -395,7 +409,7 @@ mod verdict_tests {
         );
         let few = line(8, 1.0);
         assert!(
-            few.starts_with("undecided: 8 runs miss") && few.ends_with(" would decide"),
+            few.starts_with("undecided: 8 runs cannot show") && few.ends_with(" would decide"),
             "{few}"
         );
     }

@@ -456,7 +456,7 @@ impl<'a> Drive<'a> {
         inputs::expect_turn_on(&mut expected, model.turn_on, &request.model, context);
         expected.validate().refuse()?;
         let reference = request.reference.as_deref().map(|path| {
-            let (reference, warnings) = load_reference(path)?;
+            let (reference, warnings) = load_reference(path, None)?;
             context.warn_each(&warnings);
             Ok::<_, Failure>(reference)
         });
@@ -1150,13 +1150,13 @@ fn directory(answer: &FuseAnswer) -> Vec<OutputFile<'static>> {
         .collect()
 }
 
-const TIME: Columns = ("", &["t_s"], Some(6));
+pub(super) const TIME: Columns = ("", &["t_s"], Some(6));
 
 /// Columns of a table: prefix and names, and with how many digits; none: four after the first, and a power of ten.
-type Columns = (&'static str, &'static [&'static str], Option<usize>);
+pub(super) type Columns = (&'static str, &'static [&'static str], Option<usize>);
 
 /// Rows as CSV with as many digits as their size deserves, 1e-10 degrees are 0.01 mm; NaN is an empty cell.
-fn table(columns: &[Columns], rows: impl Iterator<Item = Vec<f64>>) -> String {
+pub(super) fn table(columns: &[Columns], rows: impl Iterator<Item = Vec<f64>>) -> String {
     let columns: Vec<(String, Option<usize>)> = columns
         .iter()
         .flat_map(|(prefix, names, digits)| {

@@ -61,7 +61,7 @@ pub(super) fn bare_row(text: &str) -> Option<Vec<f64>> {
 }
 
 /// Refuses times (s) that stand still or go back; `line` is that of the k-th.
-fn increasing(
+pub(super) fn increasing(
     path: &str,
     line: impl Fn(usize) -> u64,
     t_s: impl Iterator<Item = f64> + Clone,
@@ -98,16 +98,8 @@ static FIX_QUANTITIES: [Quantity; 33] = [
     Quantity::speed("v_e_m_s", "v_e ve local_ve veast v_east"),
     V_D,
     V_D.reversed("v_u vu v_up vup local_vu"),
-    Quantity::speed(
-        "sd_vn_m_s",
-        "sd_vn sd_v_n vel_std_n sdvn northvel_std sd_vnorth",
-    )
-    .positive(),
-    Quantity::speed(
-        "sd_ve_m_s",
-        "sd_ve sd_v_e vel_std_e sdve eastvel_std sd_veast",
-    )
-    .positive(),
+    Quantity::speed("sd_vn_m_s", SD_VN).positive(),
+    Quantity::speed("sd_ve_m_s", SD_VE).positive(),
     Quantity::speed("sd_vd_m_s", SD_VD).positive(),
     Quantity::number("week", "week gps_week wnc_w gpstime_week"),
     Quantity::length("x_ecef_m", "x_ecef ecef_x"),
@@ -129,10 +121,12 @@ static FIX_QUANTITIES: [Quantity; 33] = [
     Quantity::speed("sd_vyz_m_s", "sdvyz"),
     Quantity::speed("sd_vzx_m_s", "sdvzx"),
 ];
-const SD_N: &str = "sd_n std_n sigma_n pos_std_n sd_north sd_lat sdn north_std sdnorth";
-const SD_E: &str = "sd_e std_e sigma_e pos_std_e sd_east sd_lon sde east_std sdeast";
-const SD_D: &str = "sd_d std_d sigma_d pos_std_d sd_u std_u sd_h sdu up_std sdheight";
-const SD_VD: &str = "sd_vd sd_v_d vel_std_d sdvu sd_vu sd_v_u upvel_std sd_vup sd_vh";
+pub(super) const SD_N: &str = "sd_n std_n sigma_n pos_std_n sd_north sd_lat sdn north_std sdnorth";
+pub(super) const SD_E: &str = "sd_e std_e sigma_e pos_std_e sd_east sd_lon sde east_std sdeast";
+pub(super) const SD_D: &str = "sd_d std_d sigma_d pos_std_d sd_u std_u sd_h sdu up_std sdheight";
+pub(super) const SD_VN: &str = "sd_vn sd_v_n vel_std_n sdvn northvel_std sd_vnorth";
+pub(super) const SD_VE: &str = "sd_ve sd_v_e vel_std_e sdve eastvel_std sd_veast";
+pub(super) const SD_VD: &str = "sd_vd sd_v_d vel_std_d sdvu sd_vu sd_v_u upvel_std sd_vup sd_vh";
 const V_D: Quantity = Quantity::speed("v_d_m_s", "v_d vd");
 /// Columns of position, its deviations, velocity and those.
 const GEODETIC: [[&str; 3]; 4] = [

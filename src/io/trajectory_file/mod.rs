@@ -1,14 +1,20 @@
 //! Trajectory files: CSV, motion profiles (TOML), imports.
 
-use super::fusion_files::{WEEK_S, check_jump, doubt_degrees};
+use super::fusion_files::{
+    SD_D, SD_E, SD_N, SD_VD, SD_VE, SD_VN, WEEK_S, check_jump, doubt_degrees, increasing, is_nmea,
+    is_rtklib, read_gnss,
+};
 use super::recordings::timing::median_step;
 use super::table::{self, Column, Dictionary, LATITUDE, LONGITUDE, Quantity, Table, normalised};
 use super::{Failure, Failure as Error, Place, source};
 use crate::parse;
 use chrono::{DateTime, Utc};
 use glam::{DQuat, DVec3};
+use nalgebra::{DMatrix, SMatrix};
 use nav_sim_navigation::earth::{e_to_n, ecef_to_geodetic, geodetic_to_ecef};
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, q_e_n, wrap_angle};
+use nav_sim_navigation::fusion::judge::StatedRow;
+use nav_sim_navigation::gnss::GnssFix;
 use nav_sim_navigation::trajectory;
 use nav_sim_navigation::trajectory::plausibility::VelocityMisfit;
 use nav_sim_navigation::trajectory::reference::{Reference, breaks, usable};
@@ -22,6 +28,8 @@ use std::ops::Range;
 use std::path::Path;
 
 mod profile;
+
+type Covariance = SMatrix<f64, 9, 9>;
 
 const KNOWN: &str =
     ".toml (motion profile), .csv, .tsv, .txt, .nav (KF-GINS), .tum or .gpx (also .gz)";
@@ -48,8 +56,11 @@ pub fn load(path: &Path, origin: Option<[f64; 3]>) -> Result<(Trajectory, Vec<St
 ///
 /// # Errors
 /// What cannot be read at all, with its line; rows of which no stretch is usable.
-pub(crate) fn load_reference(path: &Path) -> Result<(Reference, Vec<String>), Failure> {
-    match read(path, None, true)? {
+pub(crate) fn load_reference(
+    path: &Path,
+    origin: Option<[f64; 3]>,
+) -> Result<(Reference, Vec<String>), Failure> {
+    match read(path, origin, true)? {
         None => Ok((profile::load(path)?.into(), Vec::new())),
         Some(rows) => rows.reference(),
     }
@@ -74,6 +85,201 @@ fn read(path: &Path, origin: Option<[f64; 3]>, is_partial: bool) -> Result<Optio
     }
 }
 
+/// Reads the solution of a filter: a table of a trajectory, with standard deviations or a file of them or of covariances
+/// beside it, or a solution of RTKLIB or NMEA sentences, whose clock is taken to be that of `clock_s` (start, end).
+///
+/// # Errors
+/// Whatever is wrong with the files, with its line.
+pub(crate) fn load_solution(
+    path: &Path,
+    covariance: Option<&Path>,
+    origin: Option<[f64; 3]>,
+    clock_s: (f64, f64),
+) -> Result<(Vec<StatedRow>, Vec<String>), Failure> {
+    let text = source::table_text(path)?;
+    if is_rtklib(&text) || is_nmea(&text) {
+        let (fixes, notes) = read_gnss(path, None, Some(clock_s), None)?;
+        let rows = fixes.iter().map(of_fix).collect();
+        return Ok((rows, notes.into_iter().map(|note| note.text).collect()));
+    }
+    let Some(rows) = read(path, origin, false)? else {
+        let message = "a motion profile is no solution";
+        return Err(Error::contents(
+            path.display().to_string(),
+            Place::Within,
+            message,
+        ));
+    };
+    increasing(
+        &rows.path,
+        |k| rows.lines[k],
+        rows.samples.iter().map(|s| s.t_s),
+    )?;
+    let has = [!rows.velocities.is_empty(), !rows.follows_path];
+    let row = |(k, sample): (usize, &TrajectorySample)| StatedRow {
+        t_s: sample.t_s,
+        state: NavState {
+            lat: sample.lat,
+            lon: sample.lon,
+            h: sample.h,
+            v_n: rows.velocities.get(k).copied().unwrap_or_default(),
+            q_b_n: sample.q_b_n,
+        },
+        has,
+        covariance: of_sigmas(&rows.sigmas[k]),
+        has_correlations: false,
+    };
+    let mut stated: Vec<StatedRow> = rows.samples.iter().enumerate().map(row).collect();
+    if let Some(path) = covariance {
+        add_covariances(path, &mut stated)?;
+    }
+    let mut doubts = rows.doubts;
+    // a solution has columns of other states
+    doubts.retain(|text| {
+        !(text.contains("no attitude columns") || text.contains("columns not used"))
+    });
+    Ok((stated, doubts))
+}
+
+/// The covariance of independent errors with these standard deviations (m, m/s, rad), angles in degrees.
+fn of_sigmas(sigmas: &[f64; 9]) -> Covariance {
+    let unit = |i: usize| if i < 6 { 1.0 } else { DEG };
+    Covariance::from_fn(|i, j| match i == j {
+        true => (sigmas[i] / unit(i)).powi(2),
+        false => 0.0,
+    })
+}
+
+fn of_fix(fix: &GnssFix) -> StatedRow {
+    let mut sigmas = [f64::NAN; 9];
+    sigmas[..3].copy_from_slice(&fix.pos_sigma_n.to_array());
+    let mut v_n = DVec3::ZERO;
+    let velocity = fix.velocity.and_then(|v| Some((v, v.down?)));
+    if let Some((v, (down, down_sigma))) = velocity {
+        v_n = v.horizontal.extend(down);
+        sigmas[3..6].copy_from_slice(&v.horizontal_sigma.extend(down_sigma).to_array());
+    }
+    StatedRow {
+        t_s: fix.t_s,
+        state: NavState {
+            lat: fix.lat,
+            lon: fix.lon,
+            h: fix.h,
+            v_n,
+            q_b_n: DQuat::IDENTITY,
+        },
+        has: [velocity.is_some(), false],
+        covariance: of_sigmas(&sigmas),
+        has_correlations: false,
+    }
+}
+
+/// Puts the standard deviations or covariances of a file at the rows of its times: a table of standard deviations with a
+/// header, the one that KF-GINS writes, or rows of a time and a matrix, row by row: position north, east, down (3 × 3, m²);
+/// the pose of ROS, x, y, z and rotations about them (6 × 6, m², rad²); position, velocity, rotations about north, east, down
+/// (9 × 9).
+fn add_covariances(path: &Path, rows: &mut [StatedRow]) -> Result<(), Failure> {
+    const COUNTS: [usize; 3] = [1 + 9, 1 + 36, 1 + 81];
+    let name = path.display().to_string();
+    let text = source::table_text(path)?;
+    let numbers = |line: &str| -> Option<Vec<f64>> {
+        let cells = line.split(|c: char| c.is_whitespace() || c == ',');
+        let cells = cells.filter(|cell| !cell.is_empty());
+        cells.map(|cell| cell.parse().ok()).collect()
+    };
+    let lines = || (1_u64..).zip(text.lines());
+    let content = || {
+        lines().filter(|(_, l)| !(l.trim().is_empty() || l.trim_start().starts_with(['#', '%'])))
+    };
+    let first = content().next().and_then(|(_, line)| numbers(line));
+    let is_matrix = first.is_some_and(|row| COUNTS.contains(&row.len()));
+    let mut found: Vec<(f64, u64, Covariance)> = Vec::new();
+    if is_matrix {
+        for (line, text) in content() {
+            let row = numbers(text).filter(|row| COUNTS.contains(&row.len()));
+            let row = row.ok_or_else(|| {
+                let message = "a time and 9, 36 or 81 numbers are expected";
+                Error::contents(&name, line, message)
+            })?;
+            found.push((row[0], line, of_matrix(&row[1..])));
+        }
+    } else {
+        let dictionary = Dictionary {
+            bare: &[KF_GINS_SIGMAS],
+            ..DICTIONARY
+        };
+        let table = table::parse(&name, &text, &dictionary)?;
+        let [time] = table.columns(["t_s"])?;
+        table.require(SIGMAS.into_iter().take(3))?;
+        let all = (0..).zip(sigmas(&table));
+        found.extend(all.map(|(row, own)| (time.si(row), table.line(row), of_sigmas(&own))));
+    }
+    increasing(&name, |k| found[k].1, found.iter().map(|(t_s, ..)| *t_s))?;
+    for (_, line, covariance) in &found {
+        let known: Vec<usize> = (0..9).filter(|i| !covariance[(*i, *i)].is_nan()).collect();
+        let block = DMatrix::from_fn(known.len(), known.len(), |i, j| {
+            covariance[(known[i], known[j])]
+        });
+        let is_symmetric = (&block - block.transpose()).amax() <= 1e-6 * block.amax();
+        if !is_symmetric || block.cholesky().is_none() {
+            let message = "the covariance is not symmetric and positive definite";
+            let advice = "a time and the matrix row by row, variances of m², (m/s)² and rad² on its diagonal";
+            return Err(Error::contents(&name, *line, message).or_hint(advice));
+        }
+    }
+    let times: Vec<f64> = rows.iter().map(|row| row.t_s).collect();
+    let near_s = 0.55 * median_step(&times);
+    let mut matched = 0;
+    for row in rows.iter_mut() {
+        let next = found.partition_point(|(t_s, ..)| *t_s < row.t_s);
+        let beside = found[next.saturating_sub(1)..(next + 1).min(found.len())].iter();
+        let nearest = beside.min_by(|a, b| (a.0 - row.t_s).abs().total_cmp(&(b.0 - row.t_s).abs()));
+        if let Some((.., own)) = nearest.filter(|(t_s, ..)| (t_s - row.t_s).abs() <= near_s) {
+            row.covariance = *own;
+            row.has_correlations = is_matrix;
+            matched += 1;
+        }
+    }
+    let span = found.first().zip(found.last());
+    if let Some((first, last)) = span.filter(|_| 2 * matched < rows.len()) {
+        let message = format!(
+            "times {} to {} s fit {matched} of the {} rows of the solution, {} to {} s",
+            first.0,
+            last.0,
+            rows.len(),
+            times[0],
+            times[times.len() - 1]
+        );
+        return Err(Error::contents(&name, Place::Within, message)
+            .or_hint("write both with the same time stamps"));
+    }
+    Ok(())
+}
+
+/// A covariance from its numbers, row by row; angles in degrees, NaN where a state is not in it.
+fn of_matrix(numbers: &[f64]) -> Covariance {
+    let mut covariance = Covariance::from_diagonal_element(f64::NAN);
+    let size = [(9, 3), (36, 6), (81, 9)];
+    let size = size.iter().find(|(count, _)| *count == numbers.len());
+    let size = size.map_or(0, |(_, size)| *size);
+    // Where each number stands, and its sign: the pose of ROS is east, north, up.
+    let place = |i: usize| match (size, i) {
+        (6, 0 | 1) => (1 - i, 1.0),
+        (6, 2) => (2, -1.0),
+        (6, 3 | 4) => (10 - i, 1.0),
+        (6, 5) => (8, -1.0),
+        _ => (i, 1.0),
+    };
+    let unit = |i: usize| if i < 6 { 1.0 } else { DEG };
+    for i in 0..size {
+        for j in 0..size {
+            let ((row, a), (column, b)) = (place(i), place(j));
+            covariance[(row, column)] = a * b * numbers[size * i + j] / (unit(row) * unit(column));
+        }
+    }
+    covariance
+}
+
 #[cfg(test)]
 mod tests;
 
@@ -91,7 +297,7 @@ const MAX_DURATION_S: f64 = 86_400.0;
 
 /// Quantities of a trajectory; x, y, z and quaternions are in the axes of ROS ([REP 103](https://www.ros.org/reps/rep-0103.html)):
 /// position east, north, up of the origin; body forward, left, up.
-static QUANTITIES: [Quantity; 23] = [
+static QUANTITIES: [Quantity; 32] = [
     Quantity::time("t time timestamp"),
     Quantity::number("week", "week gps_week"),
     Quantity::angle("lat_deg", "lat latitude").within(LATITUDE),
@@ -116,6 +322,15 @@ static QUANTITIES: [Quantity; 23] = [
     Quantity::number("qy", "qy q_y"),
     Quantity::number("qz", "qz q_z"),
     Quantity::number("qw", "qw q_w"),
+    Quantity::length("sd_n_m", SD_N).positive(),
+    Quantity::length("sd_e_m", SD_E).positive(),
+    Quantity::length("sd_d_m", SD_D).positive(),
+    Quantity::speed("sd_vn_m_s", SD_VN).positive(),
+    Quantity::speed("sd_ve_m_s", SD_VE).positive(),
+    Quantity::speed("sd_vd_m_s", SD_VD).positive(),
+    Quantity::angle("sd_roll_deg", "sd_roll std_roll roll_std sigma_roll").positive(),
+    Quantity::angle("sd_pitch_deg", "sd_pitch std_pitch pitch_std sigma_pitch").positive(),
+    Quantity::angle("sd_yaw_deg", "sd_yaw std_yaw yaw_std sigma_yaw sd_heading").positive(),
 ];
 const N: Quantity = Quantity::length("n_m", "n north").with_unit();
 const E: Quantity = Quantity::length("e_m", "e east").with_unit();
@@ -141,6 +356,21 @@ const GEODETIC: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
 const LOCAL: [&str; 3] = ["n_m", "e_m", "d_m"];
 const ATTITUDE: [&str; 3] = ["roll_deg", "pitch_deg", "yaw_deg"];
 const VELOCITY: [&str; 3] = ["v_n_m_s", "v_e_m_s", "v_d_m_s"];
+/// Standard deviations, in the order of the reported states.
+const SIGMAS: [&str; 9] = [
+    "sd_n_m",
+    "sd_e_m",
+    "sd_d_m",
+    "sd_vn_m_s",
+    "sd_ve_m_s",
+    "sd_vd_m_s",
+    "sd_roll_deg",
+    "sd_pitch_deg",
+    "sd_yaw_deg",
+];
+/// Standard deviations of KF-GINS: those of position, velocity and attitude, then of twelve errors of the IMU.
+const KF_GINS_SIGMAS: &str = "t_s sd_n_m sd_e_m sd_d_m sd_vn_m_s sd_ve_m_s sd_vd_m_s sd_roll_deg sd_pitch_deg \
+    sd_yaw_deg i1 i2 i3 i4 i5 i6 i7 i8 i9 i10 i11 i12";
 
 /// Samples of a file of any format, and the line that each comes from.
 #[derive(Debug, Default)]
@@ -153,6 +383,8 @@ struct Rows {
     follows_path: bool,
     /// Velocities in n that the positions are compared with (m/s), one for each sample or none at all.
     velocities: Vec<DVec3>,
+    /// Standard deviations in the order of the reported states (m, m/s, rad; NaN: not stated), one for each sample.
+    sigmas: Vec<[f64; 9]>,
     /// Whether positions are latitude and longitude, which may have been given in the wrong unit.
     geodetic: bool,
     doubts: Vec<String>,
@@ -316,6 +548,7 @@ fn rows(
         geodetic: !is_local,
         ..Rows::default()
     };
+    rows.sigmas = sigmas(&table);
     if let Some(own) = velocity {
         rows.velocities = all.map(|row| triad(own, row).into()).collect();
     }
@@ -330,6 +563,13 @@ fn rows(
         rows.doubt(None, text);
     }
     Ok(rows)
+}
+
+/// The standard deviations of each row (m, m/s, rad); NaN where it has none.
+fn sigmas(table: &Table) -> Vec<[f64; 9]> {
+    let columns = SIGMAS.map(|name| table.get(name));
+    let of_row = |row| columns.map(|column| column.map_or(f64::NAN, |column| column.si(row)));
+    (0..table.rows()).map(of_row).collect()
 }
 
 /// Refuses angles of the attitude without a unit in their names, of which none is too large for radians.

@@ -21,8 +21,8 @@ use std::ops::Range;
 /// How far off the filter is run (m; s).
 const OFF: [f64; 4] = [0.3, 0.3, 0.3, 0.03];
 /// The antenna's and the delay's among the four.
-const ANTENNA: Range<usize> = 0..3;
-const DELAY: Range<usize> = 3..4;
+pub(super) const ANTENNA: Range<usize> = 0..3;
+pub(super) const DELAY: Range<usize> = 3..4;
 /// How much of a recording is looked at (s).
 const MOST_S: f64 = 1200.0;
 /// Gauss-Newton steps at most, and the share of the NIS that another one must take away: a solution that is far off makes
@@ -165,14 +165,14 @@ fn scale(innovations: &[Option<FixRecord>]) -> f64 {
 }
 
 /// Least squares: the inverse of the information about the four, and the gradient.
-struct Normal {
-    inverse: Matrix4<f64>,
-    gradient: Vector4<f64>,
+pub(super) struct Normal {
+    pub(super) inverse: Matrix4<f64>,
+    pub(super) gradient: Vector4<f64>,
 }
 
 impl Normal {
     /// What the absence of a part costs in −2 ln(likelihood), the others as good as they can be.
-    fn cost(&self, x: &Vector4<f64>, part: Range<usize>) -> Option<f64> {
+    pub(super) fn cost(&self, x: &Vector4<f64>, part: Range<usize>) -> Option<f64> {
         let n = part.len();
         let block = self
             .inverse
@@ -183,7 +183,7 @@ impl Normal {
     }
 
     /// The parts that `x` owes its gain to. Costs count `scale` times less.
-    fn needed(&self, x: &Vector4<f64>, scale: f64) -> Option<Vec<Range<usize>>> {
+    pub(super) fn needed(&self, x: &Vector4<f64>, scale: f64) -> Option<Vec<Range<usize>>> {
         let [antenna, delay] = [self.cost(x, ANTENNA)?, self.cost(x, DELAY)?];
         let limit = COSTLY * scale;
         Some(match (antenna > limit, delay > limit) {
@@ -195,7 +195,7 @@ impl Normal {
     }
 
     /// The best values of the parts that are kept where the others are zero, and their covariance.
-    fn without_the_rest(
+    pub(super) fn without_the_rest(
         &self,
         x: &Vector4<f64>,
         kept: &[Range<usize>],

@@ -47,6 +47,7 @@
 pub mod alignment;
 mod clocks;
 mod displaced;
+pub mod judge;
 pub mod mounting;
 mod outcome;
 mod run;
@@ -79,6 +80,11 @@ use serde::{Deserialize, Serialize};
 
 /// Position (m, north, east, down), velocity (m/s), roll, pitch, yaw (degrees).
 type Nine = [f64; 9];
+
+/// Horizontal distance.
+fn horizontal(values: &Nine) -> f64 {
+    values[0].hypot(values[1])
+}
 
 /// What was recorded, each in order of time.
 #[derive(Debug, Clone, Copy)]

@@ -1,6 +1,8 @@
 //! Figures of a fusion: fixes used, consistency, errors at the ends of outages. They serialize as `summary.json` has them.
 
-use super::{AidInnovations, FixRecord, Nine, Row, RowError, Solution, Weighed, aid_innovations};
+use super::{
+    AidInnovations, FixRecord, Nine, Row, RowError, Solution, Weighed, aid_innovations, horizontal,
+};
 use crate::linalg::{by_value, mean, median};
 use crate::metrics::{PerState, VerdictKind};
 use crate::sensors::outage::Outage;
@@ -198,10 +200,6 @@ fn from_reference(rows: &[Row]) -> Option<FromReference> {
         nees_dof: rmse.len(),
         velocity_sigma_m_s: rms(&|e| e.velocity_sigma),
     })
-}
-
-fn horizontal(values: &Nine) -> f64 {
-    values[0].hypot(values[1])
 }
 
 fn smoothed(filtered: &[Row], smoothed: &[Row], outages: &[Outage]) -> SmoothedOutcome {

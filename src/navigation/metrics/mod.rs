@@ -30,5 +30,6 @@ pub use summary::{
     Requirement, Spread, Summary, TOLERANCE,
 };
 pub use verdict::{
-    ALL_STATES, Basis, NormalisedErrors, OutageVerdict, StateName, Verdict, VerdictKind,
+    ALL_STATES, Basis, DriveVerdict, NormalisedErrors, OutageVerdict, StateName, Verdict,
+    VerdictKind,
 };

@@ -11,7 +11,7 @@
 //! A filter that does not alarm is consistent only where the samples would have found errors that matter: 25 % above the
 //! filter's standard deviations in all states together, 50 % in one of them. Fewer samples leave it undecided.
 
-use super::estimate::{Estimate, SampleSize, chi_square_interval};
+use super::estimate::{Estimate, PerState, SampleSize, chi_square_interval};
 use crate::simulation::{NEES_DOF, OutageRecord, REPORTED, REPORTED_NAMES, RunRecord, TOLERANCE};
 use serde::Serialize;
 
@@ -64,7 +64,7 @@ pub type StateName = &'static str;
 pub const ALL_STATES: StateName = "all";
 
 /// The verdict on the filter of an experiment.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Verdict {
     /// In one word.
     pub kind: VerdictKind,
@@ -137,8 +137,26 @@ pub struct NormalisedErrors {
     pub nees: Option<f64>,
 }
 
+/// The verdict on a recorded drive and what it is made of.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DriveVerdict {
+    /// On the drive.
+    #[serde(flatten)]
+    pub verdict: Verdict,
+    /// Known states: the NEES of a right filter.
+    pub nees_dof: usize,
+    /// Root mean square of error over standard deviation in each state over the drive; NaN where not known.
+    pub error_over_sigma: PerState<f64>,
+    /// Its standard error.
+    pub error_over_sigma_std_error: PerState<f64>,
+    /// Samples that the errors of each state are worth.
+    pub independent_samples: PerState<f64>,
+    /// At the end of each outage, where there is one sample.
+    pub outages: Vec<OutageVerdict>,
+}
+
 /// The verdict on the filter at the end of one outage.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct OutageVerdict {
     /// In one word.
     pub kind: VerdictKind,
@@ -204,7 +222,7 @@ impl Verdict {
 
     /// Of one recorded drive with outages (start, end) (s): errors in order of time. None without errors over their
     /// standard deviations.
-    pub fn of_drive(errors: &[NormalisedErrors], outages: &[(f64, f64)]) -> Option<Self> {
+    pub fn of_drive(errors: &[NormalisedErrors], outages: &[(f64, f64)]) -> Option<DriveVerdict> {
         let column = |state: usize| errors.iter().map(move |e| e.over_sigma[state]);
         let known: Vec<usize> = (0..REPORTED)
             .filter(|state| column(*state).any(f64::is_finite))
@@ -241,7 +259,7 @@ impl Verdict {
                 .fold((0.0, 0), |(sum, n), x| (sum + x, n + 1));
             sum / f64::from(count)
         };
-        let limit = chi_square_interval(known.len().max(1), 1.0, 1.0 - COVERAGE).lower;
+        let limit = chi_square_interval(known.len().max(1), 1.0, 1.0 - COVERAGE).upper;
         let end = |&(start_s, end_s): &(f64, f64)| {
             let within = errors
                 .iter()
@@ -265,34 +283,45 @@ impl Verdict {
             return None;
         }
         let independent = size(&known) * together;
+        let samples_of_state: [f64; REPORTED] = std::array::from_fn(|state| size(&[state]));
         let samples = |outage: Option<usize>, state: Option<usize>| match (outage, state) {
             (Some(_), _) => 1.0,
-            (_, Some(state)) => size(&[state]),
+            (_, Some(state)) => samples_of_state[state],
             _ => independent,
         };
         let mut judge = Judge::new(&[&record], outages.len(), None, known.len(), samples);
         // Slow errors that are small by chance leave fast ones, which look like many samples.
-        let few = judge.statistics.iter_mut().filter(|s| s.freedom.1.min(independent) < FEW);
+        let few = judge.statistics.iter_mut();
+        let few = few.filter(|s| s.freedom.1.min(independent) < FEW);
         few.for_each(|s| s.limits.0 = 0.0);
+        // the scatter of the root of a chi-square mean
+        for s in &mut judge.statistics {
+            let degrees = s.freedom.0 as f64 * s.freedom.1;
+            s.ratio.std_error = s.ratio.value * (0.5 / degrees).sqrt();
+        }
         let verdict = judge.verdict(judge.kind(None), (&[&record], None));
-        // the scatter of a chi-square mean of so many independent samples
-        let dof = known.len() as f64;
-        let error = |freedom: f64| (2.0 / freedom).sqrt();
-        let ratio_samples = match (verdict.worst_outage, verdict.worst_state) {
-            (Some(_), _) => 1.0,
-            (_, ALL_STATES) => dof * independent,
-            (_, name) => {
-                let state = REPORTED_NAMES.iter().position(|own| *own == name);
-                size(&[state.unwrap_or_default()])
+        let degrees = known.len() as f64 * independent;
+        let of_states = |of: fn(&Estimate) -> f64| {
+            let mut values = [f64::NAN; REPORTED];
+            let whole = judge.statistics.iter().filter(|s| s.outage.is_none());
+            for (state, s) in whole.filter_map(|s| Some((s.state?, s))) {
+                values[state] = of(&s.ratio);
             }
+            PerState(values)
         };
-        Some(Self {
-            basis: Basis::Drive,
-            independent_samples: independent,
-            nees_std_error: verdict.nees * error(dof * independent),
-            coverage_std_error: (COVERAGE * (1.0 - COVERAGE) / independent).sqrt(),
-            ratio_std_error: 0.5 * verdict.ratio * error(ratio_samples),
-            ..verdict
+        Some(DriveVerdict {
+            error_over_sigma: of_states(|ratio| ratio.value),
+            error_over_sigma_std_error: of_states(|ratio| ratio.std_error),
+            independent_samples: PerState(samples_of_state),
+            nees_dof: known.len(),
+            outages: judge.outages(outages.len(), None),
+            verdict: Self {
+                basis: Basis::Drive,
+                independent_samples: independent,
+                nees_std_error: verdict.nees * (2.0 / degrees).sqrt(),
+                coverage_std_error: (COVERAGE * (1.0 - COVERAGE) / independent).sqrt(),
+                ..verdict
+            },
         })
     }
 

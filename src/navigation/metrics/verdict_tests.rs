@@ -301,13 +301,15 @@ fn a_long_drive_decides() {
 fn a_short_drive_is_rarely_called_wrong() {
     for times in [1, 3, 10, 30] {
         let wrong = |seed: &u64| {
-            let verdict = Verdict::of_drive(&drive(*seed, times, 1.0), &[]).unwrap();
+            let verdict = Verdict::of_drive(&drive(*seed, times, 1.0), &[])
+                .unwrap()
+                .verdict;
             verdict.kind > VerdictKind::Undecided
         };
         let count = (0..600).filter(wrong).count();
         assert!(count <= 16, "{count} of 600 at {times}");
     }
-    let short = Verdict::of_drive(&drive(1, 10, 1.0), &[]).unwrap();
+    let short = Verdict::of_drive(&drive(1, 10, 1.0), &[]).unwrap().verdict;
     assert_eq!(
         (short.kind, short.basis),
         (VerdictKind::Undecided, Basis::Drive)
@@ -316,7 +318,7 @@ fn a_short_drive_is_rarely_called_wrong() {
     assert!(longer > 1.0, "{longer}");
     let enough = drive(1, (10.0 * longer * 1.5) as usize, 1.0);
     assert_eq!(
-        Verdict::of_drive(&enough, &[]).unwrap().kind,
+        Verdict::of_drive(&enough, &[]).unwrap().verdict.kind,
         VerdictKind::Consistent
     );
 }
@@ -333,7 +335,7 @@ fn states_whose_errors_are_the_same_are_one() {
             ..e
         })
         .collect();
-    let verdict = Verdict::of_drive(&alike, &[]).unwrap();
+    let verdict = Verdict::of_drive(&alike, &[]).unwrap().verdict;
     let one = SampleSize::of_series([alike.iter().map(|e| e.over_sigma[0])].into_iter());
     assert!((verdict.independent_samples * 3.0 / one.independent - 1.0).abs() < 1e-9);
     assert!(Verdict::of_drive(&[], &[]).is_none());

@@ -2,7 +2,7 @@
 //! what can be compared with are the stretches between them.
 
 use super::{MAX_ROTATION, Trajectory, TrajectorySample};
-use crate::earth::geodetic_to_ecef;
+use crate::earth::{geodetic_to_ecef, moved};
 use crate::frames::NavState;
 use crate::linalg::median;
 use crate::units::DEG;
@@ -103,6 +103,31 @@ impl Reference {
     /// Position, velocity and attitude at an instant; none where nothing is known.
     pub fn state(&self, t_s: f64) -> Option<NavState> {
         Some(self.stretch(t_s)?.curve.state(t_s))
+    }
+
+    /// The same of a point of the vehicle that is `arm_b` (front, right, down, m) from the reference's.
+    pub fn state_of_point(&self, t_s: f64, arm_b: DVec3) -> Option<NavState> {
+        let curve = &self.stretch(t_s)?.curve;
+        let state = curve.state(t_s);
+        let rotation_b = curve.kinematics(t_s).omega_eb_b.cross(arm_b);
+        let [lat, lon, h] = moved(state.place(), state.q_b_n * arm_b);
+        let v_n = state.v_n + state.q_b_n * rotation_b;
+        Some(NavState {
+            lat,
+            lon,
+            h,
+            v_n,
+            ..state
+        })
+    }
+
+    /// First and last instant (s).
+    pub fn span_s(&self) -> (f64, f64) {
+        let ends = |curve: &Trajectory| (curve.start_s(), curve.end_s());
+        let spans = self.stretches.iter().map(|s| ends(&s.curve));
+        spans.fold((f64::INFINITY, f64::NEG_INFINITY), |all, own| {
+            (all.0.min(own.0), all.1.max(own.1))
+        })
     }
 
     /// How well the velocity is known at an instant (m/s, each axis): it follows from the positions, and is as uneven

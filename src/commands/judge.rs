@@ -1,0 +1,319 @@
+//! `nav-sim judge`: the solution of any filter against a reference.
+
+use super::fuse::{Columns, TIME, table};
+use crate::app::{Command, Context, Failure, Out, PlainAnswer, Result};
+use crate::io::trajectory_file::{load_reference, load_solution, parse_origin};
+use crate::parse::numbers;
+use crate::report::json;
+use crate::report::verdict::{drive_line, tone};
+use nav_sim_document::{Axis, Cell, Chart, Colour, Document, Mark, Panel, Series, Table, readable};
+use nav_sim_navigation::fusion::judge::{
+    Doubt, Judgement, ReferenceOffset, StatedErrors, judge, rough_delay_s,
+};
+use nav_sim_navigation::metrics::{DriveVerdict, VerdictKind};
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_navigation::simulation::REPORTED_NAMES;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Judge the solution of any filter: are its errors as large as it states?
+///
+/// SOLUTION: t_s, lat_deg, lon_deg, h_m (or n_m, e_m, d_m), velocities v_n_m_s … and roll_deg, pitch_deg, yaw_deg where
+/// they are known, with standard deviations sd_n_m, sd_e_m, sd_d_m, sd_vn_m_s … sd_yaw_deg; a solution of RTKLIB (.pos); a
+/// TUM trajectory or a KF-GINS result (.nav) with --covariance. Errors are compared with the standard deviations state by
+/// state and together (NEES), by as many samples as the errors are worth: how long they last is found from them. A clock or
+/// a point of the vehicle that is not the reference's is found and named. Writes summary.json, errors.csv, report.html,
+/// manifest.json. Exit code 3: the solution is overconfident.
+#[derive(clap::Args, Debug, Clone)]
+#[command(before_help = "\
+Examples:
+  nav-sim trajectory record trajectories/figure_eight.toml calib_data/tactical.toml -o drive
+  nav-sim fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml -o out/fused
+  nav-sim judge out/fused/solution.csv --reference drive/reference.csv -o out/judged")]
+pub struct Judge {
+    /// Solution (.csv, .tsv, .txt, .pos, .nav, .tum, also .gz)
+    #[arg(value_name = "SOLUTION")]
+    solution: PathBuf,
+    /// Reference trajectory; stretches where it jumps are left out
+    #[arg(long, value_name = "TRAJECTORY")]
+    reference: PathBuf,
+    /// Standard deviations or covariances of SOLUTION in a file of their own: a table of t_s, sd_n_m, …; that of KF-GINS; rows
+    /// of a time and a matrix: position north, east, down (9 numbers), the pose of ROS (36), or position, velocity and rotation
+    /// about north, east, down (81)
+    #[arg(long, value_name = "FILE")]
+    covariance: Option<PathBuf>,
+    /// Window in which SOLUTION had no fixes, in seconds on its clock (repeatable)
+    #[arg(long = "outage", value_name = "START:END")]
+    outages: Vec<Outage>,
+    /// Time by which the stamps of the reference are late (s)
+    #[arg(
+        long = "reference-delay",
+        value_name = "S",
+        default_value = "0",
+        hide_default_value = true,
+        allow_hyphen_values = true
+    )]
+    reference_delay_s: f64,
+    /// Point of the reference from that of SOLUTION: front, right, down (m)
+    #[arg(long = "reference-arm", value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
+        hide_default_value = true, allow_hyphen_values = true)]
+    reference_arm_m: [f64; 3],
+    /// Origin of local coordinates
+    #[arg(long, value_name = "LAT_DEG,LON_DEG,H_M", value_parser = origin, allow_hyphen_values = true)]
+    origin: Option<[f64; 3]>,
+}
+
+fn arm(text: &str) -> Result<[f64; 3], &'static str> {
+    numbers(text).ok_or("expected 3 numbers between commas")
+}
+
+fn origin(text: &str) -> Result<[f64; 3], &'static str> {
+    parse_origin(text).ok_or("expected latitude and longitude in degrees and a height in m")
+}
+
+impl Command for Judge {
+    type Answer = PlainAnswer;
+    const NAME: &'static str = "judge";
+    const OUT: Out = Out::Directory {
+        path: "out/judge",
+        files: &["summary.json", "errors.csv"],
+    };
+
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
+        let (reference, warnings) = load_reference(&self.reference, self.origin)?;
+        context.warn_each(&warnings);
+        let covariance = self.covariance.as_deref();
+        let (rows, warnings) =
+            load_solution(&self.solution, covariance, self.origin, reference.span_s())?;
+        context.warn_each(&warnings);
+        let given = ReferenceOffset {
+            delay_s: self.reference_delay_s,
+            lever_arm_m: self.reference_arm_m.into(),
+        };
+        let outages: Vec<_> = self.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
+        let judgement = judge(&rows, &reference, given, &outages).ok_or_else(|| {
+            let (start, end) = reference.span_s();
+            let ends = rows.first().zip(rows.last());
+            let ends = ends.map_or((0.0, 0.0), |(a, b)| (a.t_s, b.t_s));
+            let message = format!(
+                "{} is of {:.2} to {:.2} s, the reference of {start:.2} to {end:.2} s",
+                self.solution.display(),
+                ends.0,
+                ends.1
+            );
+            let hint = match rough_delay_s(&rows, &reference, given) {
+                Some(delay_s) => format!("--reference-delay={delay_s} brings them together"),
+                None => "give both on one clock, or --reference-delay S".to_owned(),
+            };
+            Failure::input(message).hint(hint)
+        })?;
+        let is_overconfident = judgement.kind == VerdictKind::Overconfident;
+        let unmet = is_overconfident.then(|| {
+            Failure::bound("the solution is overconfident").hint(
+                "larger process noise or measurement noise in the filter: errors.csv shows where",
+            )
+        });
+        let summary = summary(&judgement, &outages);
+        let document = page(&judgement, &outages);
+        let files = [
+            ("summary.json", json(&summary)),
+            ("errors.csv", errors_csv(&judgement)),
+        ];
+        Ok(PlainAnswer::new(summary, document)
+            .with(files)
+            .judged(unmet))
+    }
+}
+
+fn summary(judgement: &Judgement, outages: &[(f64, f64)]) -> serde_json::Value {
+    let stated = judgement.stated.as_ref();
+    let mut verdict = stated.map_or(json!({}), |s| json!(s.verdict));
+    verdict["kind"] = json!(judgement.kind);
+    let outage = |(k, (start_s, end_s)): (usize, &(f64, f64))| {
+        let within = judgement.errors.iter();
+        let last = within
+            .filter(|e| e.t_s > *start_s && e.t_s <= end_s + 1e-6)
+            .last();
+        json!({
+            "start_s": start_s,
+            "end_s": end_s,
+            "verdict": stated.and_then(|s| s.outages.get(k)),
+            "horizontal_error_end_m": last.map(|e| e.values[0].hypot(e.values[1])),
+            "horizontal_sigma_end_m": last.map(|e| e.sigma[0].hypot(e.sigma[1])),
+        })
+    };
+    json!({
+        "schema_version": 1,
+        "method": "judge",
+        "verdict": verdict,
+        "doubts": judgement.doubts,
+        "without_offset": judgement.without_offset,
+        "rows": judgement.rows,
+        "nees": stated.map(|s| json!({ "dof": s.nees_dof, "mean": s.verdict.nees })),
+        "coverage": stated.map(|s| json!({ "level": 0.95, "mean": s.verdict.coverage })),
+        "rmse": judgement.rmse,
+        "horizontal_rmse_m": judgement.horizontal_rmse_m,
+        "horizontal_max_m": judgement.horizontal_max_m,
+        "error_over_sigma": stated.map(|s| s.error_over_sigma),
+        "error_over_sigma_std_error": stated.map(|s| s.error_over_sigma_std_error),
+        "independent_samples": stated.map(|s| s.independent_samples),
+        "outages": outages.iter().enumerate().map(outage).collect::<Vec<_>>(),
+    })
+}
+
+/// Whatever else explains the errors, in a sentence with what to do.
+fn doubt(doubt: &Doubt) -> String {
+    match doubt {
+        Doubt::Apart { metres } => format!(
+            "solution and reference are {} m apart: another origin, latitude and longitude exchanged, or another drive",
+            readable(*metres)
+        ),
+        Doubt::Height { metres } => format!(
+            "heights of the solution are {} m above the reference's all the time: one above sea level, one above the ellipsoid?",
+            readable(*metres)
+        ),
+        Doubt::Axes {
+            angles_deg: [roll, pitch, yaw],
+        } => format!(
+            "the axes of the solution are turned by roll {roll:.0}°, pitch {pitch:.0}°, yaw {yaw:.0}° in those of the reference: write both as front, right, down to north, east, down"
+        ),
+        Doubt::AngleUnit { times } if *times > 1.0 => format!(
+            "attitudes are {} times as far off as stated: are their standard deviations radians under a name of degrees?",
+            readable(*times)
+        ),
+        Doubt::AngleUnit { times } => format!(
+            "attitudes are {} times as near as stated: are their standard deviations degrees under a name of radians?",
+            readable(1.0 / times)
+        ),
+        Doubt::Offset(found) => {
+            let (offset, sigma) = (found.offset, found.sigma);
+            let (arm, arm_sigma) = (offset.lever_arm_m, sigma.lever_arm_m);
+            let delay = format!(
+                "the reference is {:.3} ± {:.3} s late (--reference-delay={:.3})",
+                offset.delay_s, sigma.delay_s, offset.delay_s
+            );
+            let point = format!(
+                "the reference is of a point {:.2},{:.2},{:.2} m front, right, down (± {:.2},{:.2},{:.2}; --reference-arm={0:.2},{1:.2},{2:.2})",
+                arm.x, arm.y, arm.z, arm_sigma.x, arm_sigma.y, arm_sigma.z
+            );
+            match found.parts {
+                [true, true] => format!("{delay}, and {point}"),
+                [true, false] => delay,
+                _ => point,
+            }
+        }
+    }
+}
+
+fn lines(judgement: &Judgement, outages: &[(f64, f64)]) -> Vec<String> {
+    let own = match &judgement.stated {
+        Some(stated) => drive_line(&stated.verdict, stated.nees_dof, outages),
+        None => "undecided: the solution states no standard deviations; errors only".to_owned(),
+    };
+    if judgement.doubts.is_empty() {
+        return vec![own];
+    }
+    let mut lines: Vec<String> = judgement.doubts.iter().map(doubt).collect();
+    lines[0] = format!("{}: {}", judgement.kind, lines[0]);
+    let without = judgement.without_offset.as_ref();
+    lines.extend(without.map(|s| {
+        format!(
+            "without that, {}",
+            drive_line(&s.verdict, s.nees_dof, outages)
+        )
+    }));
+    lines.push(format!("as it is, {own}"));
+    lines
+}
+
+fn page(judgement: &Judgement, outages: &[(f64, f64)]) -> Document {
+    let mut document = Document::new(
+        "A solution against a reference",
+        tone(judgement.kind),
+        lines(judgement, outages),
+    );
+    let ends = judgement.errors.first().zip(judgement.errors.last());
+    if let Some((first, last)) = ends {
+        document.text(&format!(
+            "{} rows, {:.2}–{:.2} s",
+            judgement.rows, first.t_s, last.t_s
+        ));
+    }
+    document.section("States");
+    let mut table = Table::new([
+        "state",
+        "RMSE",
+        "error over σ, rms",
+        "±",
+        "independent samples",
+    ]);
+    for (i, name) in REPORTED_NAMES.iter().enumerate() {
+        if judgement.rmse.0[i].is_nan() {
+            continue;
+        }
+        let of = |key: &str, value: f64| Cell::number(value, &format!("/{key}/{name}"));
+        let stated = judgement.stated.as_ref();
+        let figure = |of: fn(&DriveVerdict) -> &[f64; 9]| stated.map_or(f64::NAN, |s| of(s)[i]);
+        table.row([
+            (*name).into(),
+            of("rmse", judgement.rmse.0[i]),
+            of("error_over_sigma", figure(|s| &s.error_over_sigma.0)),
+            of(
+                "error_over_sigma_std_error",
+                figure(|s| &s.error_over_sigma_std_error.0),
+            ),
+            of("independent_samples", figure(|s| &s.independent_samples.0)),
+        ]);
+    }
+    document.table(table.without_unknown());
+    if !outages.is_empty() {
+        document.section("Outages");
+        let columns = [
+            ("outage", "{start_s}–{end_s} s"),
+            ("verdict", "verdict/kind"),
+            ("horizontal error at the end (m)", "horizontal_error_end_m"),
+            ("1 σ", "horizontal_sigma_end_m"),
+        ];
+        let table = Table::of(&summary(judgement, outages), "/outages/*", &columns);
+        document.table(table.without_unknown());
+    }
+    document.section("Errors");
+    document.charts(
+        &charts(judgement, outages),
+        "Lines: solution less reference. Bands: ± 3 σ as stated.",
+    );
+    document
+}
+
+fn charts(judgement: &Judgement, outages: &[(f64, f64)]) -> Vec<Chart> {
+    let known = (0..REPORTED_NAMES.len()).filter(|i| !judgement.rmse.0[*i].is_nan());
+    let chart = |i: usize| {
+        let errors = &judgement.errors;
+        let band = errors
+            .iter()
+            .map(|e| (e.t_s, -3.0 * e.sigma[i], 3.0 * e.sigma[i]));
+        let line = errors.iter().map(|e| (e.t_s, e.values[i]));
+        let series = vec![
+            Series::new("3 σ", Colour::BELIEVED, Mark::Band(band.collect())),
+            Series::line("error", Colour::REAL, line.collect()),
+        ];
+        let panel = Panel::new(Axis::linear(REPORTED_NAMES[i]), series);
+        Chart::over_time(REPORTED_NAMES[i], vec![panel], outages).small()
+    };
+    known.map(chart).collect()
+}
+
+/// A row for each of the solution: errors, standard deviations, NEES where correlations are stated.
+fn errors_csv(judgement: &Judgement) -> String {
+    const COLUMNS: [Columns; 4] = [
+        TIME,
+        ("err_", &REPORTED_NAMES, Some(6)),
+        ("sd_", &REPORTED_NAMES, Some(6)),
+        ("", &["nees"], Some(4)),
+    ];
+    let row = |e: &StatedErrors| {
+        let nees = e.nees.unwrap_or(f64::NAN);
+        [&[e.t_s], &e.values[..], &e.sigma, &[nees]].concat()
+    };
+    table(&COLUMNS, judgement.errors.iter().map(row))
+}

@@ -1,0 +1,518 @@
+//! The solution of any filter against a reference: its errors, whether they are as large as it states, and what else may
+//! explain them: another clock, another point of the vehicle, other axes, heights or units.
+
+use super::displaced::{ANTENNA, DELAY, Normal};
+use super::{Nine, horizontal};
+use crate::frames::{NavState, RollPitchYaw};
+use crate::linalg::{mean, median};
+use crate::metrics::{DriveVerdict, NormalisedErrors, PerState, Verdict, VerdictKind};
+use crate::simulation::{REPORTED, TOLERANCE, reported_error};
+use crate::trajectory::reference::Reference;
+use crate::units::DEG;
+use glam::{DQuat, DVec3, DVec4};
+use nalgebra::{DMatrix, DVector, Matrix4, SMatrix, Vector4};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// A row of a solution.
+#[derive(Debug, Clone)]
+pub struct StatedRow {
+    /// Time (s).
+    pub t_s: f64,
+    /// Position; velocity and attitude where they are known.
+    pub state: NavState,
+    /// Whether the solution has a velocity, and an attitude.
+    pub has: [bool; 2],
+    /// Covariance of position (m, north, east, down), velocity (m/s), roll, pitch, yaw (degrees): NaN where none is stated.
+    pub covariance: SMatrix<f64, REPORTED, REPORTED>,
+    /// Whether its correlations are stated too.
+    pub has_correlations: bool,
+}
+
+/// Clock and point of a reference beside those of a solution.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct ReferenceOffset {
+    /// How late the stamps of the reference are (s).
+    pub delay_s: f64,
+    /// The reference's point from the solution's: front, right, down (m).
+    pub lever_arm_m: DVec3,
+}
+
+impl ReferenceOffset {
+    fn vector(&self) -> Vector4<f64> {
+        let [x, y, z] = self.lever_arm_m.to_array();
+        Vector4::new(x, y, z, self.delay_s)
+    }
+
+    fn of(x: &Vector4<f64>) -> Self {
+        Self {
+            delay_s: x[3],
+            lever_arm_m: DVec3::new(x[0], x[1], x[2]),
+        }
+    }
+}
+
+/// Errors of a row: solution less reference.
+#[derive(Debug, Clone, Copy)]
+pub struct StatedErrors {
+    /// Time (s).
+    pub t_s: f64,
+    /// In each state; NaN where one of the two does not have it.
+    pub values: Nine,
+    /// Standard deviations stated, the velocity's with that of the reference.
+    pub sigma: Nine,
+    /// Normalised by the covariance of all known states; none without correlations.
+    pub nees: Option<f64>,
+}
+
+/// An offset that was found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FoundOffset {
+    /// It, beside what was given.
+    #[serde(flatten)]
+    pub offset: ReferenceOffset,
+    /// Standard deviations.
+    pub sigma: ReferenceOffset,
+    /// Whether the clock is part of it, and the point.
+    #[serde(skip)]
+    pub parts: [bool; 2],
+}
+
+/// Errors that are no fault of a filter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(tag = "doubt", rename_all = "snake_case")]
+pub enum Doubt {
+    /// Both are so far apart all the time (m).
+    Apart {
+        /// Median horizontal distance (m).
+        metres: f64,
+    },
+    /// Heights differ by so much all the time.
+    Height {
+        /// Solution above reference (m).
+        metres: f64,
+    },
+    /// The axes of the body are turned.
+    Axes {
+        /// Roll, pitch and yaw of the solution's axes in the reference's (degrees).
+        angles_deg: [f64; 3],
+    },
+    /// Standard deviations of the attitude are in another unit.
+    AngleUnit {
+        /// Errors over standard deviations, root mean square.
+        times: f64,
+    },
+    /// Another clock or another point of the vehicle.
+    Offset(FoundOffset),
+}
+
+/// A solution judged by a reference.
+#[derive(Debug, Clone, Serialize)]
+pub struct Judgement {
+    /// In one word.
+    pub kind: VerdictKind,
+    /// What the errors over their standard deviations tell; none without standard deviations.
+    pub stated: Option<DriveVerdict>,
+    /// The same without the offset that was found.
+    pub without_offset: Option<DriveVerdict>,
+    /// What else explains the errors.
+    pub doubts: Vec<Doubt>,
+    /// Root mean square errors; NaN where not known.
+    pub rmse: PerState<f64>,
+    /// Of the horizontal distance (m).
+    pub horizontal_rmse_m: f64,
+    /// Largest horizontal distance (m).
+    pub horizontal_max_m: f64,
+    /// Rows that the reference reaches.
+    pub rows: usize,
+    /// Their errors.
+    #[serde(skip)]
+    pub errors: Vec<StatedErrors>,
+}
+
+/// Judges a solution with outages (start, end) (s); none where the reference reaches no row.
+pub fn judge(
+    rows: &[StatedRow],
+    reference: &Reference,
+    given: ReferenceOffset,
+    outages: &[(f64, f64)],
+) -> Option<Judgement> {
+    let errors = errors(rows, reference, given);
+    let of_state = |state: usize| errors.iter().map(move |e| e.values[state]);
+    let rmse: Nine = std::array::from_fn(|state| {
+        let known = of_state(state).filter(|x| x.is_finite());
+        mean(known.map(|x| x * x)).sqrt()
+    });
+    if errors.is_empty() {
+        return None;
+    }
+    let stated = Verdict::of_drive(&normalised(&errors), outages);
+    let mut doubts = doubts(rows, reference, given, &errors, stated.as_ref());
+    let found = found_offset(rows, reference, given);
+    let judged = |found: &FoundOffset| {
+        let errors = self::errors(rows, reference, found.offset);
+        Verdict::of_drive(&normalised(&errors), outages)
+    };
+    let mut without_offset = found.as_ref().and_then(judged);
+    if let Some(found) = found {
+        // worth a word where it explains a fault, or errors that are larger by what is let pass
+        let matters = match (&stated, &without_offset) {
+            (Some(with), Some(without)) => {
+                let lost = (with.verdict.nees / without.verdict.nees).sqrt();
+                without.verdict.kind < with.verdict.kind || lost > 1.0 + TOLERANCE
+            }
+            _ => true,
+        };
+        match matters {
+            true => doubts.push(Doubt::Offset(found)),
+            false => without_offset = None,
+        }
+    }
+    let own = stated
+        .as_ref()
+        .map_or(VerdictKind::Undecided, |s| s.verdict.kind);
+    let kind = match doubts.is_empty() {
+        true => own,
+        false => VerdictKind::Doubtful,
+    };
+    let horizontal_max_m = errors
+        .iter()
+        .map(|e| horizontal(&e.values))
+        .fold(0.0, f64::max);
+    Some(Judgement {
+        kind,
+        without_offset,
+        doubts,
+        rmse: PerState(rmse),
+        horizontal_rmse_m: rmse[0].hypot(rmse[1]),
+        horizontal_max_m,
+        rows: errors.len(),
+        stated,
+        errors,
+    })
+}
+
+/// Errors of the rows that a reference reaches.
+pub fn errors(
+    rows: &[StatedRow],
+    reference: &Reference,
+    offset: ReferenceOffset,
+) -> Vec<StatedErrors> {
+    let with_nees = |row: &StatedRow| {
+        let found = error(row, reference, offset)?;
+        let nees = row.has_correlations.then(|| {
+            let known: Vec<usize> = (0..REPORTED)
+                .filter(|i| found.values[*i].is_finite() && found.sigma[*i].is_finite())
+                .collect();
+            let x = DVector::from_iterator(known.len(), known.iter().map(|i| found.values[*i]));
+            let p = DMatrix::from_fn(known.len(), known.len(), |i, j| match i == j {
+                true => found.sigma[known[i]].powi(2),
+                false => row.covariance[(known[i], known[j])],
+            });
+            p.cholesky().map_or(f64::NAN, |c| x.dot(&c.solve(&x)))
+        });
+        Some(StatedErrors { nees, ..found })
+    };
+    rows.iter().filter_map(with_nees).collect()
+}
+
+/// The errors of a row, without their NEES.
+fn error(row: &StatedRow, reference: &Reference, offset: ReferenceOffset) -> Option<StatedErrors> {
+    let t_s = row.t_s + offset.delay_s;
+    let truth = reference.state_of_point(t_s, -offset.lever_arm_m)?;
+    let velocity_sigma = reference.velocity_sigma(t_s)?;
+    let (mut values, _) = reported_error(&row.state, &truth);
+    for (block, has) in [1, 2].into_iter().zip(row.has) {
+        if !has {
+            values[3 * block..3 * block + 3].fill(f64::NAN);
+        }
+    }
+    let sigma = std::array::from_fn(|i| {
+        let of_reference = if (3..6).contains(&i) {
+            velocity_sigma
+        } else {
+            0.0
+        };
+        row.covariance[(i, i)].sqrt().hypot(of_reference)
+    });
+    Some(StatedErrors {
+        t_s: row.t_s,
+        values,
+        sigma,
+        nees: None,
+    })
+}
+
+fn normalised(errors: &[StatedErrors]) -> Vec<NormalisedErrors> {
+    let of = |e: &StatedErrors| NormalisedErrors {
+        t_s: e.t_s,
+        over_sigma: std::array::from_fn(|i| e.values[i] / e.sigma[i]),
+        nees: e.nees,
+    };
+    errors.iter().map(of).collect()
+}
+
+// What else explains errors.
+
+/// Farther apart than this all the time is another place (m).
+const APART_M: f64 = 1000.0;
+/// Heights that differ by more (m) and so many times their scatter are counted from another level: geoids are up to 100 m
+/// from the ellipsoid, and constant over a drive.
+const HEIGHT: (f64, f64) = (5.0, 10.0);
+/// Axes that are turned by more (degrees) and so many times what the attitudes scatter about it.
+const AXES: (f64, f64) = (10.0, 4.0);
+/// Radians under a name of degrees, or degrees under one of radians, within this factor in each of the three angles while
+/// position is not off by as much.
+const UNIT: f64 = 4.0;
+
+fn doubts(
+    rows: &[StatedRow],
+    reference: &Reference,
+    given: ReferenceOffset,
+    errors: &[StatedErrors],
+    stated: Option<&DriveVerdict>,
+) -> Vec<Doubt> {
+    let mut found = Vec::new();
+    let metres = median(errors.iter().map(|e| horizontal(&e.values))).unwrap_or(0.0);
+    if metres > APART_M {
+        found.push(Doubt::Apart { metres });
+    }
+    let down = || errors.iter().map(|e| e.values[2]);
+    let middle = median(down()).unwrap_or(0.0);
+    let scatter = median(down().map(|d| (d - middle).abs())).unwrap_or(0.0);
+    let sigma = median(errors.iter().map(|e| e.sigma[2]).filter(|s| s.is_finite()));
+    let scatter = scatter.max(sigma.unwrap_or(0.0));
+    if middle.abs() > HEIGHT.0.max(HEIGHT.1 * scatter) {
+        found.push(Doubt::Height { metres: -middle });
+    }
+    found.extend(turned_axes(rows, reference, given));
+    if let Some(stated) = stated {
+        let ratios = stated.error_over_sigma.0;
+        let times = ratios[6..].iter().product::<f64>().cbrt();
+        let is_unit = |unit: f64| {
+            ratios[6..]
+                .iter()
+                .all(|r| (r / unit).ln().abs() < UNIT.ln())
+        };
+        let others = (ratios[..3].iter().product::<f64>().cbrt()).ln().abs();
+        let unit = if times > 1.0 { 1.0 / DEG } else { DEG };
+        if is_unit(unit) && others < UNIT.ln() {
+            found.push(Doubt::AngleUnit { times });
+        }
+    }
+    found
+}
+
+/// The rotation between the bodies' axes, where it is large and hardly changes.
+fn turned_axes(rows: &[StatedRow], reference: &Reference, given: ReferenceOffset) -> Option<Doubt> {
+    let relative = |row: &StatedRow| {
+        let truth = reference.state(row.t_s + given.delay_s)?;
+        Some(truth.q_b_n.inverse() * row.state.q_b_n)
+    };
+    let all: Vec<DQuat> = rows
+        .iter()
+        .filter(|row| row.has[1])
+        .filter_map(relative)
+        .collect();
+    // q and −q are one rotation: all on the side of the first
+    let first = DVec4::from(*all.first()?);
+    let sum: DVec4 = all
+        .iter()
+        .map(|q| DVec4::from(*q))
+        .map(|q| q * q.dot(first).signum())
+        .sum();
+    let middle = DQuat::from_vec4(sum.try_normalize()?);
+    let angle = 2.0 * middle.xyz().length().min(1.0).asin() / DEG;
+    let apart = all.iter().map(|q| middle.angle_between(*q) / DEG);
+    let scatter = median(apart)?;
+    (angle > AXES.0.max(AXES.1 * scatter)).then(|| {
+        let rpy = RollPitchYaw::from_quat(middle);
+        Doubt::Axes {
+            angles_deg: [rpy.roll, rpy.pitch, rpy.yaw].map(|a| a / DEG),
+        }
+    })
+}
+
+// Clock and point of the reference, from the errors. To first order a clock that is late by δ makes the error of position
+// vδ, a point at l −C l; velocities and attitudes tell the two apart where v and the front axis hardly do. Least squares over
+// all rows; errors last, so the covariance of the four is that of sums over blocks of rows ([Huber's sandwich](https://doi.org/10.2307/1912934)).
+
+/// Blocks of a drive.
+const BLOCKS: usize = 40;
+/// A part whose absence costs less than this is none: χ² of three and 37 degrees, level 1e-4 (F = 9.2).
+const COSTLY: f64 = 30.0;
+/// Gauss-Newton steps, the difference that slopes are taken over (s, m), and rows at most.
+const STEPS: usize = 5;
+const OFF: f64 = 0.01;
+const FITTED: usize = 5000;
+/// A point farther off is another frame (m).
+const FARTHEST_M: f64 = 30.0;
+/// Rows that are looked at for a rough clock, and how far it is looked for (s), in steps (s).
+const LOOKS: usize = 200;
+const SEARCH_S: (f64, f64) = (120.0, 0.5);
+/// Distance that the right clock leaves at most of what there was.
+const NEARER: f64 = 0.3;
+
+/// Clock and point that the errors of position ask for beside what was given.
+fn found_offset(
+    rows: &[StatedRow],
+    reference: &Reference,
+    given: ReferenceOffset,
+) -> Option<FoundOffset> {
+    let mut start = given.vector();
+    start[3] = rough_delay_s(rows, reference, given).unwrap_or(given.delay_s);
+    let solve = |parts: [bool; 2]| least_squares(rows, reference, start, parts);
+    let both = solve([true; 2]);
+    let parts = match &both {
+        None => [true, false],
+        Some((x, normal)) => {
+            let off = x - given.vector();
+            if normal.cost(&off, 0..4)? < COSTLY {
+                return None;
+            }
+            let needed = normal.needed(&off, COSTLY / 20.0)?;
+            [needed.contains(&DELAY), needed.contains(&ANTENNA)]
+        }
+    };
+    let (x, normal) = match both {
+        Some(both) if parts == [true; 2] => both,
+        _ => solve(parts)?,
+    };
+    let off = x - given.vector();
+    let variance = normal.inverse.diagonal();
+    let sigma = ReferenceOffset::of(&variance.map(|v| v.max(0.0).sqrt()));
+    let is_delay = parts[0] && off[3].powi(2) > COSTLY * variance[3];
+    let is_far = off.fixed_rows::<3>(0).norm() > FARTHEST_M;
+    (!is_far && (parts[1] || is_delay)).then(|| FoundOffset {
+        offset: ReferenceOffset::of(&x),
+        sigma,
+        parts,
+    })
+}
+
+/// Lever arm (m) and delay (s) from a start, the parts that are not wanted as they are, and the inverse of the information.
+fn least_squares(
+    rows: &[StatedRow],
+    reference: &Reference,
+    start: Vector4<f64>,
+    [delay, arm]: [bool; 2],
+) -> Option<(Vector4<f64>, Normal)> {
+    let wanted = [arm, arm, arm, delay];
+    let looks: Vec<&StatedRow> = rows.iter().step_by(rows.len().div_ceil(FITTED)).collect();
+    let mut x = start;
+    let mut step = 0;
+    loop {
+        let terms: Vec<(Vector4<f64>, Matrix4<f64>)> = looks
+            .par_iter()
+            .filter_map(|row| {
+                let now = normalised_error(row, reference, &x)?;
+                let mut slopes = [[0.0; 4]; REPORTED];
+                for k in (0..4).filter(|k| wanted[*k]) {
+                    let aside = normalised_error(row, reference, &(x + Vector4::ith(k, OFF)))?;
+                    for i in 0..REPORTED {
+                        slopes[i][k] = (aside[i] - now[i]) / OFF;
+                    }
+                }
+                let (mut gradient, mut information) = (Vector4::zeros(), Matrix4::zeros());
+                for (slope, error) in slopes.map(Vector4::from).iter().zip(now) {
+                    gradient += slope * error;
+                    information += slope * slope.transpose();
+                }
+                Some((gradient, information))
+            })
+            .collect();
+        let length = terms.len().div_ceil(BLOCKS).max(1);
+        let blocks: Vec<Vector4<f64>> = terms
+            .chunks(length)
+            .map(|block| block.iter().map(|(gradient, _)| gradient).sum())
+            .collect();
+        let gradient: Vector4<f64> = blocks.iter().sum();
+        let mut information: Matrix4<f64> = terms.iter().map(|(_, own)| own).sum();
+        for k in 0..4 {
+            information[(k, k)] += f64::from(u8::from(!wanted[k])); // what is not wanted stays
+        }
+        let inverse = information.try_inverse()?;
+        if step == STEPS {
+            let spread: Matrix4<f64> = blocks.iter().map(|g| g * g.transpose()).sum();
+            let inverse = inverse * spread * inverse;
+            return Some((x, Normal { inverse, gradient }));
+        }
+        x -= inverse * gradient;
+        step += 1;
+    }
+}
+
+/// Errors of a row over their standard deviations with clock and point of the reference at `x`: 0 where one is not known; of
+/// positions without standard deviations those of a metre.
+fn normalised_error(row: &StatedRow, reference: &Reference, x: &Vector4<f64>) -> Option<Nine> {
+    let offset = ReferenceOffset::of(x);
+    let found = error(row, reference, offset)?;
+    Some(std::array::from_fn(|i| {
+        let z = found.values[i] / found.sigma[i];
+        match z.is_finite() {
+            true => z,
+            false if i < 3 => found.values[i],
+            false => 0.0,
+        }
+    }))
+}
+
+/// How late the stamps of a reference are, to half a second, where another clock brings it much nearer; none where the
+/// given one is as good.
+pub fn rough_delay_s(
+    rows: &[StatedRow],
+    reference: &Reference,
+    given: ReferenceOffset,
+) -> Option<f64> {
+    const HOUR_S: f64 = 3600.0;
+    let looks: Vec<&StatedRow> = rows
+        .iter()
+        .step_by(rows.len().div_ceil(LOOKS).max(1))
+        .collect();
+    let (first, last) = (rows.first()?.t_s, rows.last()?.t_s);
+    let span = reference.span_s();
+    let distance = |delay_s: f64| {
+        let apart = |row: &&&StatedRow| {
+            let truth = reference.state(row.t_s + delay_s)?;
+            Some(horizontal(&reported_error(&row.state, &truth).0))
+        };
+        let apart: Vec<f64> = looks.iter().filter_map(|row| apart(&row)).collect();
+        // a few rows at the ends are near by chance
+        let is_enough = apart.len() * 4 >= looks.len();
+        let apart = median(apart).filter(|_| is_enough);
+        apart.unwrap_or(f64::INFINITY)
+    };
+    let now = distance(given.delay_s);
+    let overlaps = span.0 <= last + given.delay_s && first + given.delay_s <= span.1;
+    let centres: Vec<f64> = match overlaps {
+        true => (-14..=14)
+            .map(|h| given.delay_s + HOUR_S * f64::from(h))
+            .collect(),
+        // clocks that begin together, or end together
+        false => vec![span.0 - first, span.1 - last],
+    };
+    let (reach, step) = SEARCH_S;
+    let steps = (reach / step) as i32;
+    let tried: Vec<f64> = centres
+        .iter()
+        .flat_map(|c| {
+            (-steps..=steps).map(move |k| (c / step).round() * step + step * f64::from(k))
+        })
+        .collect();
+    let (best, delay_s) = tried
+        .par_iter()
+        .map(|delay_s| (distance(*delay_s), *delay_s))
+        .min_by(|a, b| a.0.total_cmp(&b.0))?;
+    // Where nothing overlaps there is nothing to be nearer than but what the other clocks make.
+    let usual = match now.is_finite() {
+        true => now,
+        false => median(
+            tried
+                .iter()
+                .step_by(8)
+                .map(|d| distance(*d))
+                .filter(|d| d.is_finite()),
+        )?,
+    };
+    (best < NEARER * usual).then_some(delay_s)
+}
