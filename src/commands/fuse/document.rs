@@ -10,7 +10,7 @@ use nav_sim_document::{
 };
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::frames::NavState;
-use nav_sim_navigation::fusion::{ClocksApart, Finding, FixRecord, Row, Solution};
+use nav_sim_navigation::fusion::{ClocksApart, Finding, FixRecord, OwnNoise, Row, Solution};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 
 impl FuseAnswer {
@@ -38,6 +38,9 @@ impl FuseAnswer {
         if solution.rows.iter().any(|row| row.error.is_some()) {
             document.section("Errors against the reference");
             document.charts(&errors(solution, &outages), ERRORS);
+        }
+        for noise in &summary.imu_noise {
+            document.note(Importance::Warning, own_noise(noise));
         }
         document.section("Fixes");
         document.chart(&innovations(solution, &outages), FIXES);
@@ -265,6 +268,18 @@ fn evidence(finding: &Finding) -> String {
             c.error_over_sigma, c.worst_error_over_sigma, c.worst_state
         ),
     }
+}
+
+/// Noise that is believed instead of the model's, and the line to paste there.
+fn own_noise(noise: &OwnNoise) -> String {
+    let OwnNoise {
+        sensor,
+        times_model,
+        sigma2,
+    } = noise;
+    format!(
+        "{sensor}: the white noise of the recording is {times_model:.1} times the model's and is believed instead; in the model, section [{sensor}]: {{ type = \"WN\", sigma2 = {sigma2:.3e} }}"
+    )
 }
 
 /// Clocks that are not the same, and the option that makes them so.

@@ -20,10 +20,10 @@ use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
 use nav_sim_navigation::fusion::mounting::{self, Mounting};
 use nav_sim_navigation::fusion::{
     Assessment, ClocksApart, Correlation, Displaced, Finding, FixRecord, Found, FusionError,
-    Heading, Levelling, Outcome, Recorded, Row, Settings, Solution, Start, Weighed, WheelSpeed,
-    Whiteness, aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier, fuse,
-    fuse_correlated, interval_s, outcome, rest_of_origin, rough_origin, vehicle_velocities,
-    wheel_ratio,
+    Heading, Levelling, Outcome, OwnNoise, Recorded, Row, Settings, Solution, Start, Weighed,
+    WheelSpeed, Whiteness, aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier,
+    fuse, fuse_correlated, interval_s, outcome, own_noise, predicts_better, rest_of_origin,
+    rough_origin, vehicle_velocities, wheel_ratio,
 };
 use nav_sim_navigation::gnss::{FixSigma, GnssFix};
 use nav_sim_navigation::linalg::median;
@@ -497,12 +497,20 @@ impl<'a> Drive<'a> {
             "gnss_delay_s": self.request.gnss_delay_s,
             "aiding": aiding,
         });
-        let (belief, reduction) = belief(
-            (&self.model.model, self.request.filter, &self.expected),
-            self.imu_rate_hz,
-            &self.gnss,
-            &settings.outages,
-        )?;
+        let stated = &self.model.model;
+        let mut noise = own_noise(&self.imu, self.imu_rate_hz, stated);
+        let mut own = stated.clone();
+        noise.iter().for_each(|noise| noise.put_into(&mut own));
+        let lengths: Vec<f64> = settings
+            .outages
+            .iter()
+            .map(|o| o.end_s - o.start_s)
+            .collect();
+        let belief = |model: &Model| {
+            let filter = (model, self.request.filter, &self.expected);
+            belief(filter, self.imu_rate_hz, &self.gnss, &lengths)
+        };
+        let (mut believed, mut reduction) = belief(&own)?;
         let plan = OutagePlan {
             fixed: settings.outages,
             ..OutagePlan::default()
@@ -513,7 +521,7 @@ impl<'a> Drive<'a> {
         settings.outages = placed.windows;
         let mounting = match self.request.mounting {
             Some(MountingChoice::Auto) => Some(
-                mounting::find(&recorded, &settings, &belief)
+                mounting::find(&recorded, &settings, &believed)
                     .map_err(|e| Failure::input(e).hint(NOT_MOUNTED))?,
             ),
             _ => None,
@@ -521,7 +529,7 @@ impl<'a> Drive<'a> {
         if let Some(Mounting { q_s_b, sigma_b, .. }) = mounting {
             (settings.q_s_b, settings.mounting_sigma_b) = (q_s_b, sigma_b);
         }
-        let rest_s = origin_s.map_or(0.0, |_| rest_of_origin(&recorded, &belief, &settings));
+        let rest_s = origin_s.map_or(0.0, |_| rest_of_origin(&recorded, &believed, &settings));
         let gnss = earlier(recorded.gnss, rest_s);
         recorded.gnss = &gnss;
         let delay_s = self.request.gnss_delay_s + origin_s.unwrap_or(0.0) + rest_s;
@@ -535,8 +543,8 @@ impl<'a> Drive<'a> {
                 start: beside_mounting(start.clone(), &settings),
                 doubts: Vec::new(),
             }),
-            (None, Some(heading)) => towards(&recorded, &settings, &belief, heading),
-            (None, None) => coarse(&recorded, &settings, &belief),
+            (None, Some(heading)) => towards(&recorded, &settings, &believed, heading),
+            (None, None) => coarse(&recorded, &settings, &believed),
         };
         let Alignment { start, doubts } = aligned.map_err(|e| {
             Failure::input(e).hint(match self.request.given_heading() {
@@ -560,7 +568,15 @@ impl<'a> Drive<'a> {
         self.check_wheel(&recorded, &settings.outages)?;
         let aids = vehicle_velocities(&recorded, &self.wheel, &aiding, &settings.outages);
         recorded.aids = &aids;
-        let belief = belief.with_vehicle(aiding.state_sigmas());
+        if !noise.is_empty() {
+            let as_stated = belief(stated)?;
+            let both = [&believed, &as_stated.0];
+            if !predicts_better(&recorded, both, &start, &settings) {
+                (believed, reduction) = as_stated;
+                noise.clear();
+            }
+        }
+        let belief = believed.with_vehicle(aiding.state_sigmas());
         let asked = (self.reference.as_ref(), self.request.gnss_correlation);
         let weighed = fuse_correlated(&recorded, &belief, &start, &settings, asked)?;
         if self.reference.is_some() && weighed.solution.rows.iter().all(|row| row.error.is_none()) {
@@ -624,6 +640,7 @@ impl<'a> Drive<'a> {
             horizontal_sigma_rms_m: (squares.sum::<f64>() / rows.len() as f64).sqrt(),
             gnss_correlation: fix_correlation(&weighed),
             vehicle: vehicle(&weighed.solution, &aiding),
+            imu_noise: noise,
             outcome,
         };
         Ok(FuseAnswer {
@@ -802,10 +819,9 @@ fn belief(
     (model, states, initial): (&Model, FilterStates, &InitialSettings),
     rate_hz: f64,
     gnss: &[GnssFix],
-    outages: &[Outage],
+    lengths: &[f64],
 ) -> Result<(Belief, Option<ReductionQuality>)> {
     let model = at_rate(model, rate_hz).refuse_within("the model")?;
-    let lengths: Vec<f64> = outages.iter().map(|o| o.end_s - o.start_s).collect();
     let interval_s = interval_s(gnss).unwrap_or(1.0);
     let window_s = reduction::window_s(lengths.iter().copied().fold(0.0, f64::max));
     let belief = Belief::new(&model, states, interval_s, window_s).refuse_within("the model")?;
@@ -814,7 +830,7 @@ fn belief(
             &model,
             &ImuSettings::default(),
             &receiver(gnss, interval_s),
-            &lengths,
+            lengths,
         )
     };
     let Some(track) = states.is_reduced().then(drive).flatten() else {
@@ -927,6 +943,9 @@ pub struct FuseSummary {
     /// What the vehicle knows, where that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vehicle: Option<Value>,
+    /// White noise of the recording that is believed instead of the model's.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub imu_noise: Vec<OwnNoise>,
     /// Fixes, NIS, errors at the ends of outages and against the reference.
     #[serde(flatten)]
     pub outcome: Outcome,

@@ -53,6 +53,7 @@ mod run;
 mod vehicle;
 #[cfg(test)]
 mod vehicle_tests;
+mod white_noise;
 
 pub use clocks::{ClocksApart, clocks_apart, earlier, rest_of_origin, rough_origin};
 pub use displaced::{
@@ -67,6 +68,7 @@ pub use vehicle::{
     AidInnovations, AidRecord, VehicleVelocity, WheelSpeed, aid_innovations, vehicle_velocities,
     wheel_ratio,
 };
+pub use white_noise::{OwnNoise, own_noise, predicts_better};
 
 use crate::earth::GravityModel;
 use crate::ekf::InitialSettings;

@@ -21,7 +21,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-fn settings() -> Settings {
+pub(super) fn settings() -> Settings {
     Settings {
         q_s_b: DQuat::IDENTITY,
         mounting_sigma_b: DVec3::ZERO,
