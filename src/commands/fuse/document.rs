@@ -72,7 +72,7 @@ impl FuseAnswer {
                 nees.unwrap_or_default()
             )
         });
-        let mut lines = vec![format!("{}: {first}", verdict.kind)];
+        let mut lines = vec![format!("{}{}: {first}", verdict.kind, self.widened())];
         lines.extend(verdict.cause.as_ref().map(cause));
         lines.extend(evidence.take(2));
         lines.extend(summary.mounting.as_ref().map(|m| {
@@ -83,6 +83,23 @@ impl FuseAnswer {
             )
         }));
         lines
+    }
+
+    /// ` with position sigmas × 11.9`, where those of the fixes are not as stated.
+    fn widened(&self) -> String {
+        let factors = ["pos_sigma_factor", "vel_sigma_factor"].map(|key| {
+            let correlation = self.summary.gnss_correlation.as_ref();
+            let factor = correlation.and_then(|found| found[key].as_f64());
+            factor.filter(|factor| *factor > 1.0)
+        });
+        let of_part = ["position", "velocity"].into_iter().zip(factors);
+        let parts: Vec<String> = of_part
+            .filter_map(|(part, factor)| Some(format!("{part} sigmas × {:.1}", factor?)))
+            .collect();
+        match parts.is_empty() {
+            true => String::new(),
+            false => format!(" with {}", parts.join(", ")),
+        }
     }
 
     /// What helps where the solution is overconfident.
@@ -235,12 +252,9 @@ fn evidence(finding: &Finding) -> String {
             "NIS {} per component: the stated errors of the fixes are too large; a reference decides",
             readable(per_component)
         ),
-        Finding::Correlated {
-            lag_1,
-            pos_sigma_factor,
-        } => format!(
-            "the errors of the fixes last (correlation {lag_1:.2} from one to the next): positions count as {pos_sigma_factor:.1} times as uncertain"
-        ),
+        Finding::Correlated { lag_1, .. } => {
+            format!("the errors of the fixes last (correlation {lag_1:.2} from one to the next)")
+        }
         Finding::Minutes {
             bad,
             of,

@@ -21,9 +21,9 @@ use nav_sim_navigation::fusion::mounting::{self, Mounting};
 use nav_sim_navigation::fusion::{
     Assessment, ClocksApart, Correlation, Displaced, Finding, FixRecord, Found, FusionError,
     Heading, Levelling, Outcome, OwnNoise, Recorded, Row, Settings, Solution, Start, Weighed,
-    WheelSpeed, Whiteness, aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier,
-    fuse, fuse_correlated, interval_s, outcome, own_noise, predicts_better, rest_of_origin,
-    rough_origin, vehicle_velocities, wheel_ratio,
+    WheelSpeed, aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier, fuse,
+    fuse_correlated, interval_s, outcome, own_noise, predicts_better, rest_of_origin, rough_origin,
+    vehicle_velocities, wheel_ratio,
 };
 use nav_sim_navigation::gnss::{FixSigma, GnssFix};
 use nav_sim_navigation::linalg::median;
@@ -165,7 +165,7 @@ pub struct Fuse {
     /// Time by which receiver or logger stamp the fixes late (s)
     #[arg(long = "gnss-delay", value_name = "S", value_parser = number, default_value = "0", allow_hyphen_values = true)]
     gnss_delay_s: f64,
-    /// How long errors of positions last: as the innovations show, no longer than a fix, or so many seconds
+    /// How long errors of fixes last: as the innovations show, no longer than a fix, or so many seconds (of positions)
     #[arg(long, value_name = "auto|none|SECONDS", value_parser = correlation, default_value = "auto")]
     gnss_correlation: Correlation,
     /// Road vehicle: its rear axle moves neither sideways nor up; needs the mounting of the IMU
@@ -588,10 +588,7 @@ impl<'a> Drive<'a> {
         context.warn_each(doubt_heading(&weighed.solution, &settings.outages));
         let outcome = outcome(&weighed.solution, &settings.outages);
         let Assessment { verdict, findings } = assess(&weighed, &outcome, &doubts);
-        let is_correlated = weighed
-            .whiteness
-            .as_ref()
-            .is_some_and(Whiteness::is_correlated);
+        let is_correlated = weighed.correlation().is_some();
         let is_unexplained =
             verdict >= VerdictKind::Doubtful || verdict == VerdictKind::Undecided && is_correlated;
         let scene = Scene {
@@ -1121,14 +1118,21 @@ fn vehicle(solution: &Solution, settings: &AidingSettings) -> Option<Value> {
 
 /// Errors of fixes that last: the correlation of their innovations, standard deviations as stated, and the filter's answer.
 fn fix_correlation(weighed: &Weighed) -> Option<Value> {
-    let white = weighed.whiteness?;
-    Some(json!({
+    let [white, of_velocity] = weighed.whiteness;
+    let (white, [pos_sigma_factor, vel_sigma_factor]) = (white?, weighed.sigma_factors);
+    let mut found = json!({
         "lag_1": white.lag_1,
         "limit": white.limit,
-        "is_correlated": white.is_correlated(),
-        "pos_sigma_factor": weighed.pos_sigma_factor,
+        "is_correlated": weighed.correlation().is_some(),
+        "pos_sigma_factor": pos_sigma_factor,
         "nis_as_stated": outcome(weighed.judged(), &[]).nis_per_component,
-    }))
+    });
+    if let Some(white) = of_velocity {
+        found["vel_lag_1"] = json!(white.lag_1);
+        found["vel_limit"] = json!(white.limit);
+        found["vel_sigma_factor"] = json!(vel_sigma_factor);
+    }
+    Some(found)
 }
 
 // Files of a fusion directory: tables, track for maps, summary, page.

@@ -217,11 +217,12 @@ impl Normal {
     }
 }
 
-// Errors of fixes that last: found in the innovations, answered by larger standard deviations of the position.
+// Errors of fixes that last: found in the innovations, answered by larger standard deviations, of the position and of the
+// velocity each by itself.
 //
 // The innovations of a right filter are white ([Mehra](crate::bibliography::Mehra70)). Where the errors of the fixes
-// last, those of the position are correlated from one fix to the next, however small they are, and a filter that
-// averages them states too little. White noise with the sum of the autocorrelations of ρᵏ has (1 + ρ)/(1 − ρ) times
+// last, they are correlated from one fix to the next, however small they are, and a filter that averages them states
+// too little. White noise with the sum of the autocorrelations of ρᵏ has (1 + ρ)/(1 − ρ) times
 // the variance, which is what the filter is then told.
 
 /// Quantile of a normal distribution at 0.999: white innovations are called correlated once in a thousand recordings.
@@ -235,7 +236,11 @@ const LARGEST: f64 = 0.998;
 /// Fixes this many times the median interval apart are no neighbours.
 const APART: f64 = 1.5;
 
-/// How long the errors of a receiver's positions last.
+/// Components of the position and of the velocity.
+const POSITION: Range<usize> = 0..3;
+const VELOCITY: Range<usize> = 3..6;
+
+/// How long the errors of a receiver's fixes last.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Correlation {
@@ -244,11 +249,11 @@ pub enum Correlation {
     Auto,
     /// No longer than one fix.
     None,
-    /// So many seconds.
+    /// Those of positions so many seconds, those of velocities no longer than one fix.
     Seconds(f64),
 }
 
-/// Autocorrelation of normalised innovations (of a fix, those of position) from one to the next.
+/// Autocorrelation of normalised innovations from one to the next.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Whiteness {
     /// Autocorrelation at lag 1: 0 if right.
@@ -258,11 +263,26 @@ pub struct Whiteness {
 }
 
 impl Whiteness {
-    /// Of the fixes used; none where they are few.
+    /// Of the positions of the fixes used; none where they are few.
     pub fn of<'a>(fixes: impl IntoIterator<Item = &'a FixRecord>) -> Option<Self> {
+        Self::of_part(fixes, POSITION)
+    }
+
+    /// The same of some of their components.
+    fn of_part<'a>(
+        fixes: impl IntoIterator<Item = &'a FixRecord>,
+        part: Range<usize>,
+    ) -> Option<Self> {
+        let normalised = |f: &FixRecord| {
+            let part = part.start..part.end.min(f.innovation.len());
+            part.map(|i| f.innovation[i] / f.sigma[i])
+                .collect::<Vec<_>>()
+        };
         let used = fixes.into_iter().filter(|f| f.used);
-        let position = |f: &FixRecord| [0, 1, 2].map(|i| f.innovation[i] / f.sigma[i]);
-        let all: Vec<(f64, [f64; 3])> = used.map(|f| (f.t_s, position(f))).collect();
+        let all: Vec<(f64, Vec<f64>)> = used
+            .map(|f| (f.t_s, normalised(f)))
+            .filter(|(_, normalised)| !normalised.is_empty())
+            .collect();
         Self::of_series(&all)
     }
 
@@ -277,7 +297,7 @@ impl Whiteness {
             let [a, b] = [0, 1].map(|k: usize| pair[k].1.as_ref());
             product += a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
             square += a.iter().chain(b).map(|z| z * z).sum::<f64>() / 2.0;
-            pairs += a.len();
+            pairs += a.len().min(b.len());
         }
         // The estimate of n independent pairs is normal about 0 with variance 1/n (Mehra, sec. III).
         let limit = LEAST.max(QUANTILE / (pairs as f64).sqrt());
@@ -300,10 +320,10 @@ pub struct Weighed {
     pub solution: Solution,
     /// The solution with standard deviations as stated, where they are not.
     pub as_stated: Option<Solution>,
-    /// Whiteness of the innovations with standard deviations as stated.
-    pub whiteness: Option<Whiteness>,
-    /// How many times the stated standard deviations of position.
-    pub pos_sigma_factor: f64,
+    /// Whiteness of the innovations with standard deviations as stated: of position, of velocity.
+    pub whiteness: [Option<Whiteness>; 2],
+    /// How many times the stated standard deviations of these.
+    pub sigma_factors: [f64; 2],
     /// The fixes with these.
     pub gnss: Vec<GnssFix>,
 }
@@ -313,9 +333,16 @@ impl Weighed {
     pub fn judged(&self) -> &Solution {
         self.as_stated.as_ref().unwrap_or(&self.solution)
     }
+
+    /// The largest correlation of errors that last.
+    pub fn correlation(&self) -> Option<f64> {
+        let lasting = self.whiteness.iter().flatten();
+        let lasting = lasting.filter(|w| w.is_correlated()).map(|w| w.lag_1);
+        lasting.reduce(f64::max)
+    }
 }
 
-/// [`fuse`] with the standard deviations of position that the correlation of the fixes asks for.
+/// [`fuse`] with the standard deviations that the correlation of the fixes asks for.
 ///
 /// # Errors
 /// Those of [`fuse`].
@@ -327,25 +354,29 @@ pub fn fuse_correlated(
     (reference, correlation): (Option<&Reference>, Correlation),
 ) -> Result<Weighed, FusionError> {
     let stated = fuse(recorded, belief, start, settings, reference)?;
-    let whiteness = Whiteness::of(&stated.fixes);
+    let whiteness = [POSITION, VELOCITY].map(|part| Whiteness::of_part(&stated.fixes, part));
     let lag_1 = match correlation {
-        Correlation::Auto => whiteness.filter(Whiteness::is_correlated).map(|w| w.lag_1),
-        Correlation::None => None,
+        Correlation::Auto => {
+            whiteness.map(|w| w.filter(Whiteness::is_correlated).map(|white| white.lag_1))
+        }
+        Correlation::None => [None; 2],
         // a Gauss-Markov process from one fix to the next
         Correlation::Seconds(seconds) => {
-            interval_s(recorded.gnss).map(|step_s| (-step_s / seconds).exp())
+            let lag_1 = interval_s(recorded.gnss).map(|step_s| (-step_s / seconds).exp());
+            [lag_1, None]
         }
     };
-    let pos_sigma_factor = lag_1.map_or(1.0, sigma_factor);
+    let sigma_factors = lag_1.map(|lag_1| lag_1.map_or(1.0, sigma_factor));
+    let [position, velocity] = sigma_factors;
     let gnss: Vec<GnssFix> = recorded
         .gnss
         .iter()
-        .map(|f| f.with_sigmas_times(pos_sigma_factor, 1.0))
+        .map(|f| f.with_sigmas_times(position, velocity))
         .collect();
     let recorded = recorded.with_gnss(&gnss);
     let (solution, as_stated) = match lag_1 {
-        None => (stated, None),
-        Some(_) => (
+        [None, None] => (stated, None),
+        _ => (
             fuse(&recorded, belief, start, settings, reference)?,
             Some(stated),
         ),
@@ -354,7 +385,7 @@ pub fn fuse_correlated(
         solution,
         as_stated,
         whiteness,
-        pos_sigma_factor,
+        sigma_factors,
         gnss,
     })
 }

@@ -318,10 +318,12 @@ pub enum Finding {
     },
     /// Errors of the fixes that last.
     Correlated {
-        /// Autocorrelation of the innovations of position from one fix to the next.
+        /// Autocorrelation of the innovations from one fix to the next, of position or velocity.
         lag_1: f64,
         /// How many times the stated standard deviation of position the filter believes.
         pos_sigma_factor: f64,
+        /// The same of velocity.
+        vel_sigma_factor: f64,
     },
     /// Mean NIS of the fixes used.
     Nis {
@@ -453,20 +455,18 @@ pub(super) fn is_contradicted(solution: &Solution, of_start: &[(VerdictKind, Fin
         .any(|(verdict, _)| *verdict == VerdictKind::Overconfident)
 }
 
-/// Errors that last: with standard deviations as stated, those of the position are too small.
+/// Errors that last: standard deviations as stated are then too small.
 fn correlated(weighed: &Weighed) -> Option<(VerdictKind, Finding)> {
-    let lag_1 = weighed
-        .whiteness
-        .filter(super::Whiteness::is_correlated)?
-        .lag_1;
-    let pos_sigma_factor = weighed.pos_sigma_factor;
-    let verdict = match pos_sigma_factor > 1.0 {
+    let lag_1 = weighed.correlation()?;
+    let [pos_sigma_factor, vel_sigma_factor] = weighed.sigma_factors;
+    let verdict = match pos_sigma_factor.max(vel_sigma_factor) > 1.0 {
         true => VerdictKind::Undecided,
         false => VerdictKind::Doubtful,
     };
     let found = Finding::Correlated {
         lag_1,
         pos_sigma_factor,
+        vel_sigma_factor,
     };
     Some((verdict, found))
 }
@@ -667,8 +667,8 @@ mod assessment_tests {
         Weighed {
             solution: solution.clone(),
             as_stated: None,
-            whiteness: crate::fusion::Whiteness::of(&solution.fixes),
-            pos_sigma_factor: 1.0,
+            whiteness: [crate::fusion::Whiteness::of(&solution.fixes), None],
+            sigma_factors: [1.0; 2],
             gnss: Vec::new(),
         }
     }
@@ -754,6 +754,7 @@ mod assessment_tests {
         let Finding::Correlated {
             lag_1,
             pos_sigma_factor,
+            ..
         } = found.findings[0].1
         else {
             panic!("{found:?}")
@@ -772,7 +773,7 @@ mod assessment_tests {
             "{found:?}"
         );
         let answered = Weighed {
-            pos_sigma_factor: 4.3,
+            sigma_factors: [1.0, 4.3],
             ..weighed(&all)
         };
         let found = assess(&answered, &outcome(&all, &[]), &[]);
