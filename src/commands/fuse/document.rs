@@ -10,7 +10,10 @@ use nav_sim_document::{
 };
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::frames::NavState;
-use nav_sim_navigation::fusion::{ClocksApart, Finding, FixRecord, OwnNoise, Row, Solution};
+use nav_sim_navigation::fusion::{
+    ClocksApart, Finding, FixRecord, Outliers, OwnNoise, Row, Solution,
+};
+use nav_sim_navigation::metrics::VerdictKind;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 
 impl FuseAnswer {
@@ -38,6 +41,13 @@ impl FuseAnswer {
         if solution.rows.iter().any(|row| row.error.is_some()) {
             document.section("Errors against the reference");
             document.charts(&errors(solution, &outages), ERRORS);
+        }
+        if let Some(outliers) = &summary.outcome.outliers {
+            let importance = match outliers.share > MANY {
+                true => Importance::Warning,
+                false => Importance::Remark,
+            };
+            document.note(importance, rejected(outliers));
         }
         for noise in &summary.imu_noise {
             document.note(Importance::Warning, own_noise(noise));
@@ -96,7 +106,8 @@ impl FuseAnswer {
         let parts: Vec<String> = of_part
             .filter_map(|(part, factor)| Some(format!("{part} sigmas × {:.1}", factor?)))
             .collect();
-        match parts.is_empty() {
+        // of what is overconfident the solution may make them
+        match parts.is_empty() || self.summary.verdict.kind == VerdictKind::Overconfident {
             true => String::new(),
             false => format!(" with {}", parts.join(", ")),
         }
@@ -131,7 +142,7 @@ impl FuseAnswer {
         document.section("Figures");
         let rows = [
             (
-                "NIS per component, {fixes/used} fixes used, {fixes/withheld} withheld",
+                "NIS per component, {fixes/used} fixes used, {fixes/rejected} rejected, {fixes/withheld} withheld",
                 "nis_per_component -",
             ),
             (
@@ -282,6 +293,36 @@ fn evidence(finding: &Finding) -> String {
             c.error_over_sigma, c.worst_error_over_sigma, c.worst_state
         ),
     }
+}
+
+/// Share of rejected fixes that is worth a warning.
+const MANY: f64 = 0.01;
+/// Times that a sentence names.
+const NAMED: usize = 20;
+
+/// Fixes that were left out, by time.
+fn rejected(outliers: &Outliers) -> String {
+    let times = |t_s: &[f64]| {
+        let named: Vec<String> = t_s.iter().take(NAMED).map(|t| seconds(*t)).collect();
+        let more = match t_s.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!(" and {more} more (summary.json)"),
+        };
+        format!("{} s{more}", named.join(", "))
+    };
+    let reopened = match outliers.gate_reopened_s.as_slice() {
+        [] => String::new(),
+        t_s => format!(
+            "; too many in a row, so that fixes are used again from {}",
+            times(t_s)
+        ),
+    };
+    format!(
+        "{} fixes ({:.1} %) are outliers and left out (--gate): at {}{reopened}",
+        outliers.t_s.len(),
+        100.0 * outliers.share,
+        times(&outliers.t_s)
+    )
 }
 
 /// Noise that is believed instead of the model's, and the line to paste there.
@@ -441,11 +482,13 @@ fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
             Colour::RIGHT,
             Mark::Zone(-1.96, 1.96),
         )];
-        for (used, name, colour) in [
-            (true, "used", Colour::BELIEVED),
-            (false, "withheld", Colour::Soft),
+        for (fate, name, colour) in [
+            ((true, false), "used", Colour::BELIEVED),
+            ((false, false), "withheld", Colour::Soft),
+            ((false, true), "rejected", Colour::REAL),
         ] {
-            let of_fate = solution.fixes.iter().filter(|f| f.used == used);
+            let of_fate = solution.fixes.iter();
+            let of_fate = of_fate.filter(|f| (f.used, f.rejected_above.is_some()) == fate);
             let points: Vec<_> = of_fate.map(|f| (f.t_s, normalised(f), f64::NAN)).collect();
             series.extend((!points.is_empty()).then(|| Series::points(name, colour, points)));
         }

@@ -22,8 +22,8 @@ use nav_sim_navigation::fusion::{
     Assessment, ClocksApart, Correlation, Displaced, Finding, FixRecord, Found, FusionError,
     Heading, Levelling, Outcome, OwnNoise, Recorded, Row, Settings, Solution, Start, Weighed,
     WheelSpeed, aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier, fuse,
-    fuse_correlated, interval_s, outcome, own_noise, predicts_better, rest_of_origin, rough_origin,
-    vehicle_velocities, wheel_ratio,
+    fuse_correlated, interval_s, outcome, own_noise, predicts_as_well, rest_of_origin,
+    rough_origin, vehicle_velocities, wheel_ratio,
 };
 use nav_sim_navigation::gnss::{FixSigma, GnssFix};
 use nav_sim_navigation::linalg::median;
@@ -168,6 +168,9 @@ pub struct Fuse {
     /// How long errors of fixes last: as the innovations show, no longer than a fix, or so many seconds (of positions)
     #[arg(long, value_name = "auto|none|SECONDS", value_parser = correlation, default_value = "auto")]
     gnss_correlation: Correlation,
+    /// Fixes are left out as outliers whose normalised innovation a right filter exceeds less often than 1 - LEVEL
+    #[arg(long, value_name = "LEVEL|none", value_parser = gate, default_value = "0.9999")]
+    gate: GateLevel,
     /// Road vehicle: its rear axle moves neither sideways nor up; needs the mounting of the IMU
     #[arg(long)]
     nhc: bool,
@@ -222,6 +225,7 @@ impl Fuse {
             lever_arm_b: self.lever_arm_m.into(),
             gravity: GravityModel::default(),
             outages: self.outages.clone(),
+            gate: self.gate.0,
             rows_hz: ROWS_HZ,
             smooth: self.smooth,
         }
@@ -296,6 +300,20 @@ fn correlation(text: &str) -> Result<Correlation, &'static str> {
         _ => positive(text)
             .map(Correlation::Seconds)
             .map_err(|_| "expected auto, none, or a correlation time in seconds"),
+    }
+}
+
+/// Level of the gate; none where every fix is used.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct GateLevel(Option<f64>);
+
+fn gate(text: &str) -> Result<GateLevel, &'static str> {
+    let level = text.parse().ok().filter(|level| (0.5..1.0).contains(level));
+    match text {
+        "none" => Ok(GateLevel(None)),
+        _ => Ok(GateLevel(Some(level.ok_or(
+            "expected none, or a probability from 0.5 to below 1, such as 0.9999",
+        )?))),
     }
 }
 
@@ -571,7 +589,7 @@ impl<'a> Drive<'a> {
         if !noise.is_empty() {
             let as_stated = belief(stated)?;
             let both = [&believed, &as_stated.0];
-            if !predicts_better(&recorded, both, &start, &settings) {
+            if !predicts_as_well(&recorded, both, &start, &settings) {
                 (believed, reduction) = as_stated;
                 noise.clear();
             }

@@ -6,6 +6,7 @@
 //! here). What was found is a cause only if the NIS of the filter, run with it, is smaller: an explanation is tested by
 //! taking the cause away.
 
+use super::gate::Gate;
 use super::outcome::total_nis;
 use super::{FixRecord, FusionError, Recorded, Settings, Solution, Start, earlier, fuse};
 use crate::ekf::Belief;
@@ -233,6 +234,8 @@ const LEAST: f64 = 0.1;
 const FEWEST: usize = 50;
 /// Largest correlation that is believed: 32 times the standard deviation.
 const LARGEST: f64 = 0.998;
+/// Innovations count as this many times their median deviation at most: normal ones reach it once in 17 000 (4 σ).
+const FAR: f64 = 6.0;
 /// Fixes this many times the median interval apart are no neighbours.
 const APART: f64 = 1.5;
 
@@ -279,10 +282,15 @@ impl Whiteness {
                 .collect::<Vec<_>>()
         };
         let used = fixes.into_iter().filter(|f| f.used);
-        let all: Vec<(f64, Vec<f64>)> = used
+        let mut all: Vec<(f64, Vec<f64>)> = used
             .map(|f| (f.t_s, normalised(f)))
             .filter(|(_, normalised)| !normalised.is_empty())
             .collect();
+        // outliers, which are in no order, must not hide it
+        let each = || all.iter().flat_map(|(_, z)| z);
+        let far = FAR * median(each().map(|z| z.abs()))?;
+        let parts = all.iter_mut().flat_map(|(_, z)| z);
+        parts.for_each(|z| *z = z.clamp(-far, far));
         Self::of_series(&all)
     }
 
@@ -324,7 +332,7 @@ pub struct Weighed {
     pub whiteness: [Option<Whiteness>; 2],
     /// How many times the stated standard deviations of these.
     pub sigma_factors: [f64; 2],
-    /// The fixes with these.
+    /// The fixes with that of position. Velocities as stated tell a delay best.
     pub gnss: Vec<GnssFix>,
 }
 
@@ -353,7 +361,11 @@ pub fn fuse_correlated(
     settings: &Settings,
     (reference, correlation): (Option<&Reference>, Correlation),
 ) -> Result<Weighed, FusionError> {
-    let stated = fuse(recorded, belief, start, settings, reference)?;
+    let ungated = Settings {
+        gate: None,
+        ..settings.clone()
+    };
+    let stated = fuse(recorded, belief, start, &ungated, reference)?;
     let whiteness = [POSITION, VELOCITY].map(|part| Whiteness::of_part(&stated.fixes, part));
     let lag_1 = match correlation {
         Correlation::Auto => {
@@ -368,26 +380,41 @@ pub fn fuse_correlated(
     };
     let sigma_factors = lag_1.map(|lag_1| lag_1.map_or(1.0, sigma_factor));
     let [position, velocity] = sigma_factors;
-    let gnss: Vec<GnssFix> = recorded
-        .gnss
-        .iter()
-        .map(|f| f.with_sigmas_times(position, velocity))
-        .collect();
-    let recorded = recorded.with_gnss(&gnss);
+    let widened = |velocity: f64| -> Vec<GnssFix> {
+        let fixes = recorded.gnss.iter();
+        fixes
+            .map(|f| f.with_sigmas_times(position, velocity))
+            .collect()
+    };
+    let again = || {
+        let gnss = widened(velocity);
+        fuse(
+            &recorded.with_gnss(&gnss),
+            belief,
+            start,
+            settings,
+            reference,
+        )
+    };
     let (solution, as_stated) = match lag_1 {
-        [None, None] => (stated, None),
-        _ => (
-            fuse(&recorded, belief, start, settings, reference)?,
-            Some(stated),
-        ),
+        [None, None] if !gates(&stated, settings.gate) => (stated, None),
+        [None, None] => (again()?, None),
+        _ => (again()?, Some(stated)),
     };
     Ok(Weighed {
         solution,
         as_stated,
         whiteness,
         sigma_factors,
-        gnss,
+        gnss: widened(1.0),
     })
+}
+
+/// Whether a gate would reject any fix.
+fn gates(solution: &Solution, level: Option<f64>) -> bool {
+    let is_far =
+        |f: &FixRecord, level: f64| f.used && f.nis > Gate::bound(level, f.innovation.len());
+    level.is_some_and(|level| solution.fixes.iter().any(|f| is_far(f, level)))
 }
 
 /// Standard deviation of white noise that counts as much as one of 1 whose autocorrelation is ρᵏ.

@@ -53,6 +53,19 @@ pub struct FixCounts {
     pub used: usize,
     /// In an outage.
     pub withheld: usize,
+    /// Beyond the gate.
+    pub rejected: usize,
+}
+
+/// Fixes that the gate rejected.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Outliers {
+    /// Share of the fixes that were not withheld.
+    pub share: f64,
+    /// Their times (s).
+    pub t_s: Vec<f64>,
+    /// Times at which so many were rejected in a row that the gate was opened (s).
+    pub gate_reopened_s: Vec<f64>,
 }
 
 /// Figures of a solution.
@@ -60,8 +73,12 @@ pub struct FixCounts {
 pub struct Outcome {
     /// Fixes.
     pub fixes: FixCounts,
-    /// Mean NIS of the fixes used, divided by their number of components: 1 if all is as believed.
+    /// Mean NIS of the fixes used or rejected, divided by their number of components: 1 if all is as believed. A rejected
+    /// one counts as much as the gate lets pass.
     pub nis_per_component: f64,
+    /// Outliers, where there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outliers: Option<Outliers>,
     /// Errors at the end of each outage.
     pub outages: Vec<OutageDrift>,
     /// The ends of all outages and gaps, where there are any.
@@ -124,12 +141,16 @@ pub struct SmoothedOutage {
 
 /// The figures of a solution with these outages.
 pub fn outcome(solution: &Solution, outages: &[Outage]) -> Outcome {
-    let used = used(solution).count();
+    let outliers = outliers(solution);
+    let rejected = outliers.as_ref().map_or(0, |outliers| outliers.t_s.len());
+    let used = solution.fixes.iter().filter(|f| f.used).count();
     Outcome {
         fixes: FixCounts {
             used,
-            withheld: solution.fixes.len() - used,
+            withheld: solution.fixes.len() - used - rejected,
+            rejected,
         },
+        outliers,
         nis_per_component: nis_per_component(solution),
         outages: outages.iter().map(|o| drift(solution, *o)).collect(),
         ends: ends(solution),
@@ -141,8 +162,18 @@ pub fn outcome(solution: &Solution, outages: &[Outage]) -> Outcome {
     }
 }
 
+fn outliers(solution: &Solution) -> Option<Outliers> {
+    let rejected = used(solution).filter(|f| !f.used);
+    let t_s: Vec<f64> = rejected.map(|f| f.t_s).collect();
+    (!t_s.is_empty()).then(|| Outliers {
+        share: t_s.len() as f64 / used(solution).count() as f64,
+        t_s,
+        gate_reopened_s: solution.gate_reopened_s.clone(),
+    })
+}
+
 /// Time without a fix from which one is a test of the IMU (s), and how many of their median interval.
-const APART: (f64, f64) = (10.0, 5.0);
+pub(super) const APART: (f64, f64) = (10.0, 5.0);
 
 /// The fixes that nothing was used before for so long. Their horizontal innovations are two normal numbers each, and the
 /// sum of m of their squares, normalised, is chi-square of 2m degrees.
@@ -174,7 +205,8 @@ pub(super) fn nis_per_component(solution: &Solution) -> f64 {
 /// Sum of the NIS of fixes, and of how many components.
 pub(super) fn total_nis<'a>(fixes: impl Iterator<Item = &'a FixRecord>) -> (f64, usize) {
     fixes.fold((0.0, 0), |(nis, components), fix| {
-        (nis + fix.nis, components + fix.innovation.len())
+        let counted = fix.nis.min(fix.rejected_above.unwrap_or(f64::INFINITY));
+        (nis + counted, components + fix.innovation.len())
     })
 }
 
@@ -471,8 +503,10 @@ fn correlated(weighed: &Weighed) -> Option<(VerdictKind, Finding)> {
     Some((verdict, found))
 }
 
+/// The fixes that were used, or would have been but for the gate.
 pub(super) fn used(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
-    solution.fixes.iter().filter(|f| f.used)
+    let fixes = solution.fixes.iter();
+    fixes.filter(|f| f.used || f.rejected_above.is_some())
 }
 
 fn nis(solution: &Solution) -> (VerdictKind, Finding) {
@@ -646,6 +680,7 @@ mod assessment_tests {
         let fix = |k: usize| FixRecord {
             t_s: k as f64,
             used: true,
+            rejected_above: None,
             innovation: vec![0.0; 3],
             sigma: vec![1.0; 3],
             nis: 3.0 * nis(k),

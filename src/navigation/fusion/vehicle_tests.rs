@@ -28,6 +28,7 @@ pub(super) fn settings() -> Settings {
         lever_arm_b: DVec3::ZERO,
         gravity: crate::earth::GravityModel::default(),
         outages: Vec::new(),
+        gate: None,
         rows_hz: 1.0,
         smooth: false,
     }

@@ -2,7 +2,7 @@
 //! drive, and one of another unit knows nothing at all.
 //!
 //! Fourth differences of white noise have 70 times its variance, and hardly contain the motion of a vehicle. Where
-//! they are far larger than the model's, the recording's own white noise is proposed; the fixes decide, since at a low rate
+//! they are far larger than the model's, the recording's own white noise is taken unless the fixes disagree: at a low rate
 //! motion can still be read as noise.
 
 use super::outcome::{total_nis, used};
@@ -24,8 +24,8 @@ const OF_FOURTH: f64 = 70.0;
 const FEWEST: usize = 200;
 /// Standard deviation of a normal distribution over its median absolute deviation.
 const OF_MAD: f64 = 1.482_602;
-/// Gain in −2 ln(likelihood) from which the fixes agree better: odds of e^10.
-const DECIDES: f64 = 20.0;
+/// Loss in −2 ln(likelihood) from which the fixes disagree: odds of e^5. On a drive that hardly tells, it is 5 by chance.
+const DECIDES: f64 = 10.0;
 /// How much of a recording is looked at (s).
 const MOST_S: f64 = 1200.0;
 
@@ -100,9 +100,9 @@ impl OwnNoise {
     }
 }
 
-/// Whether the first belief predicts the fixes better than the second. What receivers state is right to a factor, so one
+/// Whether the first belief predicts the fixes as well as the second. What receivers state is right to a factor, so one
 /// factor of all deviations is left open.
-pub fn predicts_better(
+pub fn predicts_as_well(
     recorded: &Recorded<'_>,
     beliefs: [&Belief; 2],
     start: &Start,
@@ -116,7 +116,7 @@ pub fn predicts_better(
     };
     let costs: Vec<_> = beliefs.into_par_iter().map(cost).collect();
     match (costs[0], costs[1]) {
-        (Some(first), Some(second)) => first + DECIDES < second,
+        (Some(first), Some(second)) => first < second + DECIDES,
         (first, _) => first.is_some(),
     }
 }
@@ -177,8 +177,8 @@ mod tests {
                 gnss: &recording.gnss,
                 aids: &[],
             };
-            let better = predicts_better(&recorded, [&larger, &stated], &start, &settings());
-            assert_eq!(better, found == 2, "{times}");
+            let as_well = predicts_as_well(&recorded, [&larger, &stated], &start, &settings());
+            assert_eq!(as_well, found == 2, "{times}");
         }
     }
 
