@@ -258,6 +258,7 @@ def fuse(
     gnss_sigma: float | Mapping[str, Any] | None = None,
     gnss_delay_s: float = 0.0,
     gnss_correlation: str | float = "auto",
+    gate: str | float = 0.9999,
     nhc: bool = False,
     zupt: bool = False,
     odometer: StrPath | Table | None = None,
@@ -296,7 +297,9 @@ def fuse(
     gnss_delay_s
         How late fixes are stamped (s).
     gnss_correlation
-        How long errors of positions last: "auto", "none", or seconds.
+        How long errors of fixes last: "auto", "none", or seconds (of positions).
+    gate
+        Probability that the normalised innovation of a right fix is below the gate, or "none": every fix is used.
     nhc
         Road vehicle: its rear axle moves neither sideways nor up.
     zupt
@@ -339,6 +342,7 @@ def fuse(
             gnss_sigma=_sigma(gnss_sigma),
             gnss_delay_s=gnss_delay_s,
             gnss_correlation=gnss_correlation,
+            gate=gate,
             nhc=nhc,
             zupt=zupt,
             odometer=None if odometer is None else staging.table(odometer, "odometer"),

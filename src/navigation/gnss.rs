@@ -86,9 +86,15 @@ impl GnssFix {
     /// How many components were measured: what is open adds nothing to the NIS, and counts for nothing in it. They stand
     /// in the order of north, east, down of the position and of the velocity.
     pub fn components(&self) -> usize {
-        3 + self
-            .velocity
-            .map_or(0, |measured| 2 + usize::from(measured.down.is_some()))
+        self.sigmas().count()
+    }
+
+    /// Standard deviations of the components (m, m/s).
+    pub fn sigmas(&self) -> impl Iterator<Item = f64> {
+        let horizontal = self.velocity.map(|v| v.horizontal_sigma.to_array());
+        let down = self.velocity.and_then(|v| v.down).map(|(_, sigma)| sigma);
+        let velocity = horizontal.into_iter().flatten().chain(down);
+        self.pos_sigma_n.to_array().into_iter().chain(velocity)
     }
 }
 

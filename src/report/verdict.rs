@@ -130,6 +130,7 @@ fn samples(verdict: &Verdict) -> String {
     match verdict.basis {
         Basis::Drive => format!("a drive worth {worth} independent samples"),
         Basis::Windows => format!("runs on {worth} independent windows of the recording"),
+        Basis::Withheld => format!("{worth} withheld windows"),
         Basis::Expectation => "covariance analysis".to_owned(),
         Basis::Runs if verdict.independent_samples == 1.0 => "1 run".to_owned(),
         Basis::Runs => format!("{} runs", verdict.independent_samples),
@@ -137,16 +138,17 @@ fn samples(verdict: &Verdict) -> String {
 }
 
 /// What would decide.
-fn deciding(verdict: &Verdict) -> String {
+pub(crate) fn deciding(verdict: &Verdict) -> String {
     let times = verdict.times_to_decide.unwrap_or(1.0);
+    let longer = (10.0 * times).ceil() / 10.0;
     match verdict.basis {
         Basis::Runs | Basis::Expectation => {
             // a whole number is met to rounding
             let runs = (times * verdict.independent_samples - 1e-6).ceil();
             format!("{runs} would decide")
         }
-        Basis::Windows => format!("a recording {times:.1} times as long would decide"),
-        Basis::Drive => format!("a drive {times:.1} times as long would decide"),
+        Basis::Windows => format!("a recording {longer:.1} times as long would decide"),
+        Basis::Drive | Basis::Withheld => format!("a drive {longer:.1} times as long would decide"),
     }
 }
 

@@ -187,6 +187,7 @@ pub(crate) fn settings() -> Settings {
         lever_arm_b: DVec3::ZERO,
         gravity: GravityModel::default(),
         outages: Vec::new(),
+        gate: None,
         rows_hz: 10.0,
         smooth: false,
     }

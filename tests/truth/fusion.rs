@@ -42,6 +42,7 @@ pub(crate) fn settings() -> Settings {
         lever_arm_b: DVec3::ZERO,
         gravity: GravityModel::default(),
         outages: Vec::new(),
+        gate: None,
         rows_hz: 1.0,
         smooth: false,
     }

@@ -111,6 +111,7 @@ fn twelve_mountings_are_found_and_fused_with() {
         let settings = Settings {
             q_s_b: mounting.q_s_b,
             mounting_sigma_b: mounting.sigma_b,
+            gate: None,
             rows_hz: 1.0,
             ..settings()
         };

@@ -351,6 +351,7 @@ fn smoothing_changes_nothing_that_it_should_not() {
                 fixes,
                 start,
                 &Settings {
+                    gate: None,
                     rows_hz,
                     smooth,
                     ..plain.clone()
@@ -370,7 +371,7 @@ fn smoothing_changes_nothing_that_it_should_not() {
             (rows(&coarse).last(), rows(&coarse).len()),
             (coarse.rows.last(), coarse.rows.len())
         );
-        let FixCounts { used, withheld } = outcome(&coarse, &[]).fixes;
+        let FixCounts { used, withheld, .. } = outcome(&coarse, &[]).fixes;
         assert!(used > 70 && withheld == 20, "{used} {withheld}");
         for (filtered, smoothed) in coarse.rows.iter().zip(rows(&coarse)) {
             assert_eq!(filtered.t_s, smoothed.t_s);
@@ -455,6 +456,7 @@ fn a_tape_that_is_too_long_is_refused() {
                 aids: &[],
             };
             let long = Settings {
+                gate: None,
                 rows_hz: 30_000.0,
                 smooth: true,
                 ..settings()

@@ -2,6 +2,7 @@
 
 use super::{Cause, FuseAnswer};
 use crate::report::trajectory::track_map;
+use crate::report::verdict::{deciding, drive_line};
 use crate::report::{reduction_doubt, reduction_line, tone};
 use glam::DVec3;
 use nav_sim_document::{
@@ -10,7 +11,10 @@ use nav_sim_document::{
 };
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::frames::NavState;
-use nav_sim_navigation::fusion::{ClocksApart, Finding, FixRecord, Row, Solution};
+use nav_sim_navigation::fusion::{
+    ClocksApart, Finding, FixRecord, Outliers, OwnNoise, Row, Solution, Withheld,
+};
+use nav_sim_navigation::metrics::VerdictKind;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 
 impl FuseAnswer {
@@ -39,6 +43,16 @@ impl FuseAnswer {
             document.section("Errors against the reference");
             document.charts(&errors(solution, &outages), ERRORS);
         }
+        if let Some(outliers) = &summary.outcome.outliers {
+            let importance = match outliers.share > MANY {
+                true => Importance::Warning,
+                false => Importance::Remark,
+            };
+            document.note(importance, rejected(outliers));
+        }
+        for noise in &summary.imu_noise {
+            document.note(Importance::Warning, own_noise(noise));
+        }
         document.section("Fixes");
         document.chart(&innovations(solution, &outages), FIXES);
         if let Some(quality) = &self.reduction {
@@ -56,20 +70,30 @@ impl FuseAnswer {
     fn verdict(&self) -> Vec<String> {
         let summary = &self.summary;
         let verdict = &summary.verdict;
-        let mut evidence = verdict.evidence.iter().map(evidence);
+        let outages = summary.outcome.outages.iter();
+        let outages: Vec<_> = outages
+            .map(|o| (o.outage.start_s, o.outage.end_s))
+            .collect();
+        let mut evidence = verdict.evidence.iter().map(|f| evidence(f, &outages));
         let first = evidence.next().unwrap_or_else(|| {
             let outcome = &summary.outcome;
             let nees = outcome
                 .reference
+                .as_ref()
                 .map(|r| format!(", NEES {} (9 if right)", readable(r.nees_mean)));
             let nis = readable(outcome.nis_per_component);
+            let withheld = summary
+                .withheld
+                .as_ref()
+                .map(|w| format!(", {}", at_windows(w)));
             format!(
-                "NIS {nis} per component over {} fixes{}",
+                "NIS {nis} per component over {} fixes{}{}",
                 outcome.fixes.used,
+                withheld.unwrap_or_default(),
                 nees.unwrap_or_default()
             )
         });
-        let mut lines = vec![format!("{}: {first}", verdict.kind)];
+        let mut lines = vec![format!("{}{}: {first}", verdict.kind, self.widened())];
         lines.extend(verdict.cause.as_ref().map(cause));
         lines.extend(evidence.take(2));
         lines.extend(summary.mounting.as_ref().map(|m| {
@@ -80,6 +104,24 @@ impl FuseAnswer {
             )
         }));
         lines
+    }
+
+    /// ` with position sigmas × 11.9`, where those of the fixes are not as stated.
+    fn widened(&self) -> String {
+        let factors = ["pos_sigma_factor", "vel_sigma_factor"].map(|key| {
+            let correlation = self.summary.gnss_correlation.as_ref();
+            let factor = correlation.and_then(|found| found[key].as_f64());
+            factor.filter(|factor| *factor > 1.0)
+        });
+        let of_part = ["position", "velocity"].into_iter().zip(factors);
+        let parts: Vec<String> = of_part
+            .filter_map(|(part, factor)| Some(format!("{part} sigmas × {:.1}", factor?)))
+            .collect();
+        // of what is overconfident the solution may make them
+        match parts.is_empty() || self.summary.verdict.kind == VerdictKind::Overconfident {
+            true => String::new(),
+            false => format!(" with {}", parts.join(", ")),
+        }
     }
 
     /// What helps where the solution is overconfident.
@@ -111,7 +153,7 @@ impl FuseAnswer {
         document.section("Figures");
         let rows = [
             (
-                "NIS per component, {fixes/used} fixes used, {fixes/withheld} withheld",
+                "NIS per component, {fixes/used} fixes used, {fixes/rejected} rejected, {fixes/withheld} withheld",
                 "nis_per_component -",
             ),
             (
@@ -204,8 +246,21 @@ impl FuseAnswer {
     }
 }
 
+/// `errors 1.02 ± 0.08 times sigma at the ends of 12 withheld windows of 20 s`
+fn at_windows(found: &Withheld) -> String {
+    if found.windows == 0 {
+        return "too short for windows without fixes".to_owned();
+    }
+    let (ratio, error) = (found.verdict.ratio, found.verdict.ratio_std_error);
+    let (windows, length_s) = (found.windows, found.length_s);
+    format!(
+        "errors {} ± {error:.2} times sigma at the ends of {windows} withheld windows of {length_s} s",
+        readable(ratio)
+    )
+}
+
 /// Evidence in a sentence.
-fn evidence(finding: &Finding) -> String {
+fn evidence(finding: &Finding, outages: &[(f64, f64)]) -> String {
     match *finding {
         Finding::NoFix => "no fix was used".to_owned(),
         Finding::Start { nis_per_component } => format!(
@@ -232,12 +287,9 @@ fn evidence(finding: &Finding) -> String {
             "NIS {} per component: the stated errors of the fixes are too large; a reference decides",
             readable(per_component)
         ),
-        Finding::Correlated {
-            lag_1,
-            pos_sigma_factor,
-        } => format!(
-            "the errors of the fixes last (correlation {lag_1:.2} from one to the next): positions count as {pos_sigma_factor:.1} times as uncertain"
-        ),
+        Finding::Correlated { lag_1, .. } => {
+            format!("the errors of the fixes last (correlation {lag_1:.2} from one to the next)")
+        }
         Finding::Minutes {
             bad,
             of,
@@ -260,11 +312,61 @@ fn evidence(finding: &Finding) -> String {
             readable(nis_per_component),
             nis_per_component.sqrt()
         ),
-        Finding::Reference(c) => format!(
-            "errors against the reference are {:.1} times as large as stated (NEES), {:.1} times in {}",
-            c.error_over_sigma, c.worst_error_over_sigma, c.worst_state
-        ),
+        Finding::Reference { ref verdict } => {
+            let line = drive_line(verdict, REPORTED_NAMES.len(), outages);
+            format!("against the reference {line}")
+        }
+        Finding::Withheld(ref found) => {
+            let is_undecided = found.verdict.kind == VerdictKind::Undecided;
+            let decides = match is_undecided {
+                true => format!("; {}", deciding(&found.verdict)),
+                false => String::new(),
+            };
+            format!("{}{decides}", at_windows(found))
+        }
     }
+}
+
+/// Share of rejected fixes that is worth a warning.
+const MANY: f64 = 0.01;
+/// Times that a sentence names.
+const NAMED: usize = 20;
+
+/// Fixes that were left out, by time.
+fn rejected(outliers: &Outliers) -> String {
+    let times = |t_s: &[f64]| {
+        let named: Vec<String> = t_s.iter().take(NAMED).map(|t| seconds(*t)).collect();
+        let more = match t_s.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!(" and {more} more (summary.json)"),
+        };
+        format!("{} s{more}", named.join(", "))
+    };
+    let reopened = match outliers.gate_reopened_s.as_slice() {
+        [] => String::new(),
+        t_s => format!(
+            "; too many in a row, so that fixes are used again from {}",
+            times(t_s)
+        ),
+    };
+    format!(
+        "{} fixes ({:.1} %) are outliers and left out (--gate): at {}{reopened}",
+        outliers.t_s.len(),
+        100.0 * outliers.share,
+        times(&outliers.t_s)
+    )
+}
+
+/// Noise that is believed instead of the model's, and the line to paste there.
+fn own_noise(noise: &OwnNoise) -> String {
+    let OwnNoise {
+        sensor,
+        times_model,
+        sigma2,
+    } = noise;
+    format!(
+        "{sensor}: the white noise of the recording is {times_model:.1} times the model's and is believed instead; in the model, section [{sensor}]: {{ type = \"WN\", sigma2 = {sigma2:.3e} }}"
+    )
 }
 
 /// Clocks that are not the same, and the option that makes them so.
@@ -412,11 +514,13 @@ fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
             Colour::RIGHT,
             Mark::Zone(-1.96, 1.96),
         )];
-        for (used, name, colour) in [
-            (true, "used", Colour::BELIEVED),
-            (false, "withheld", Colour::Soft),
+        for (fate, name, colour) in [
+            ((true, false), "used", Colour::BELIEVED),
+            ((false, false), "withheld", Colour::Soft),
+            ((false, true), "rejected", Colour::REAL),
         ] {
-            let of_fate = solution.fixes.iter().filter(|f| f.used == used);
+            let of_fate = solution.fixes.iter();
+            let of_fate = of_fate.filter(|f| (f.used, f.rejected_above.is_some()) == fate);
             let points: Vec<_> = of_fate.map(|f| (f.t_s, normalised(f), f64::NAN)).collect();
             series.extend((!points.is_empty()).then(|| Series::points(name, colour, points)));
         }

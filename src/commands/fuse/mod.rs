@@ -20,10 +20,10 @@ use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
 use nav_sim_navigation::fusion::mounting::{self, Mounting};
 use nav_sim_navigation::fusion::{
     Assessment, ClocksApart, Correlation, Displaced, Finding, FixRecord, Found, FusionError,
-    Heading, Levelling, Outcome, Recorded, Row, Settings, Solution, Start, Weighed, WheelSpeed,
-    Whiteness, aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier, fuse,
-    fuse_correlated, interval_s, outcome, rest_of_origin, rough_origin, vehicle_velocities,
-    wheel_ratio,
+    Heading, Levelling, Outcome, OwnNoise, Recorded, Row, Settings, Solution, Start, Weighed,
+    WheelSpeed, Withheld, aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier,
+    fuse, fuse_correlated, interval_s, outcome, own_noise, predicts_as_well, rest_of_origin,
+    rough_origin, vehicle_velocities, wheel_ratio, withheld,
 };
 use nav_sim_navigation::gnss::{FixSigma, GnssFix};
 use nav_sim_navigation::linalg::median;
@@ -165,9 +165,15 @@ pub struct Fuse {
     /// Time by which receiver or logger stamp the fixes late (s)
     #[arg(long = "gnss-delay", value_name = "S", value_parser = number, default_value = "0", allow_hyphen_values = true)]
     gnss_delay_s: f64,
-    /// How long errors of positions last: as the innovations show, no longer than a fix, or so many seconds
+    /// How long errors of fixes last: as the innovations show, no longer than a fix, or so many seconds (of positions)
     #[arg(long, value_name = "auto|none|SECONDS", value_parser = correlation, default_value = "auto")]
     gnss_correlation: Correlation,
+    /// Fixes are left out as outliers whose normalised innovation a right filter exceeds less often than 1 - LEVEL
+    #[arg(long, value_name = "LEVEL|none", value_parser = gate, default_value = "0.9999")]
+    gate: GateLevel,
+    /// Windows of fixes that a second run withholds, to learn from their ends whether the filter is right; none with --outage
+    #[arg(long, value_name = "auto|none", value_parser = ["auto", "none"], default_value = "auto")]
+    withhold: String,
     /// Road vehicle: its rear axle moves neither sideways nor up; needs the mounting of the IMU
     #[arg(long)]
     nhc: bool,
@@ -222,6 +228,7 @@ impl Fuse {
             lever_arm_b: self.lever_arm_m.into(),
             gravity: GravityModel::default(),
             outages: self.outages.clone(),
+            gate: self.gate.0,
             rows_hz: ROWS_HZ,
             smooth: self.smooth,
         }
@@ -296,6 +303,20 @@ fn correlation(text: &str) -> Result<Correlation, &'static str> {
         _ => positive(text)
             .map(Correlation::Seconds)
             .map_err(|_| "expected auto, none, or a correlation time in seconds"),
+    }
+}
+
+/// Level of the gate; none where every fix is used.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct GateLevel(Option<f64>);
+
+fn gate(text: &str) -> Result<GateLevel, &'static str> {
+    let level = text.parse().ok().filter(|level| (0.5..1.0).contains(level));
+    match text {
+        "none" => Ok(GateLevel(None)),
+        _ => Ok(GateLevel(Some(level.ok_or(
+            "expected none, or a probability from 0.5 to below 1, such as 0.9999",
+        )?))),
     }
 }
 
@@ -497,12 +518,20 @@ impl<'a> Drive<'a> {
             "gnss_delay_s": self.request.gnss_delay_s,
             "aiding": aiding,
         });
-        let (belief, reduction) = belief(
-            (&self.model.model, self.request.filter, &self.expected),
-            self.imu_rate_hz,
-            &self.gnss,
-            &settings.outages,
-        )?;
+        let stated = &self.model.model;
+        let mut noise = own_noise(&self.imu, self.imu_rate_hz, stated);
+        let mut own = stated.clone();
+        noise.iter().for_each(|noise| noise.put_into(&mut own));
+        let lengths: Vec<f64> = settings
+            .outages
+            .iter()
+            .map(|o| o.end_s - o.start_s)
+            .collect();
+        let belief = |model: &Model| {
+            let filter = (model, self.request.filter, &self.expected);
+            belief(filter, self.imu_rate_hz, &self.gnss, &lengths)
+        };
+        let (mut believed, mut reduction) = belief(&own)?;
         let plan = OutagePlan {
             fixed: settings.outages,
             ..OutagePlan::default()
@@ -513,7 +542,7 @@ impl<'a> Drive<'a> {
         settings.outages = placed.windows;
         let mounting = match self.request.mounting {
             Some(MountingChoice::Auto) => Some(
-                mounting::find(&recorded, &settings, &belief)
+                mounting::find(&recorded, &settings, &believed)
                     .map_err(|e| Failure::input(e).hint(NOT_MOUNTED))?,
             ),
             _ => None,
@@ -521,7 +550,7 @@ impl<'a> Drive<'a> {
         if let Some(Mounting { q_s_b, sigma_b, .. }) = mounting {
             (settings.q_s_b, settings.mounting_sigma_b) = (q_s_b, sigma_b);
         }
-        let rest_s = origin_s.map_or(0.0, |_| rest_of_origin(&recorded, &belief, &settings));
+        let rest_s = origin_s.map_or(0.0, |_| rest_of_origin(&recorded, &believed, &settings));
         let gnss = earlier(recorded.gnss, rest_s);
         recorded.gnss = &gnss;
         let delay_s = self.request.gnss_delay_s + origin_s.unwrap_or(0.0) + rest_s;
@@ -535,8 +564,8 @@ impl<'a> Drive<'a> {
                 start: beside_mounting(start.clone(), &settings),
                 doubts: Vec::new(),
             }),
-            (None, Some(heading)) => towards(&recorded, &settings, &belief, heading),
-            (None, None) => coarse(&recorded, &settings, &belief),
+            (None, Some(heading)) => towards(&recorded, &settings, &believed, heading),
+            (None, None) => coarse(&recorded, &settings, &believed),
         };
         let Alignment { start, doubts } = aligned.map_err(|e| {
             Failure::input(e).hint(match self.request.given_heading() {
@@ -560,7 +589,15 @@ impl<'a> Drive<'a> {
         self.check_wheel(&recorded, &settings.outages)?;
         let aids = vehicle_velocities(&recorded, &self.wheel, &aiding, &settings.outages);
         recorded.aids = &aids;
-        let belief = belief.with_vehicle(aiding.state_sigmas());
+        if !noise.is_empty() {
+            let as_stated = belief(stated)?;
+            let both = [&believed, &as_stated.0];
+            if !predicts_as_well(&recorded, both, &start, &settings) {
+                (believed, reduction) = as_stated;
+                noise.clear();
+            }
+        }
+        let belief = believed.with_vehicle(aiding.state_sigmas());
         let asked = (self.reference.as_ref(), self.request.gnss_correlation);
         let weighed = fuse_correlated(&recorded, &belief, &start, &settings, asked)?;
         if self.reference.is_some() && weighed.solution.rows.iter().all(|row| row.error.is_none()) {
@@ -571,11 +608,13 @@ impl<'a> Drive<'a> {
         }
         context.warn_each(doubt_heading(&weighed.solution, &settings.outages));
         let outcome = outcome(&weighed.solution, &settings.outages);
-        let Assessment { verdict, findings } = assess(&weighed, &outcome, &doubts);
-        let is_correlated = weighed
-            .whiteness
-            .as_ref()
-            .is_some_and(Whiteness::is_correlated);
+        let withholds = settings.outages.is_empty() && self.request.withhold == "auto";
+        let withheld = match withholds {
+            true => withheld(&recorded, &belief, &start, &settings, &weighed)?,
+            false => None,
+        };
+        let Assessment { verdict, findings } = assess(&weighed, &outcome, &doubts, withheld);
+        let is_correlated = weighed.correlation().is_some();
         let is_unexplained =
             verdict >= VerdictKind::Doubtful || verdict == VerdictKind::Undecided && is_correlated;
         let scene = Scene {
@@ -624,6 +663,8 @@ impl<'a> Drive<'a> {
             horizontal_sigma_rms_m: (squares.sum::<f64>() / rows.len() as f64).sqrt(),
             gnss_correlation: fix_correlation(&weighed),
             vehicle: vehicle(&weighed.solution, &aiding),
+            imu_noise: noise,
+            withheld,
             outcome,
         };
         Ok(FuseAnswer {
@@ -802,10 +843,9 @@ fn belief(
     (model, states, initial): (&Model, FilterStates, &InitialSettings),
     rate_hz: f64,
     gnss: &[GnssFix],
-    outages: &[Outage],
+    lengths: &[f64],
 ) -> Result<(Belief, Option<ReductionQuality>)> {
     let model = at_rate(model, rate_hz).refuse_within("the model")?;
-    let lengths: Vec<f64> = outages.iter().map(|o| o.end_s - o.start_s).collect();
     let interval_s = interval_s(gnss).unwrap_or(1.0);
     let window_s = reduction::window_s(lengths.iter().copied().fold(0.0, f64::max));
     let belief = Belief::new(&model, states, interval_s, window_s).refuse_within("the model")?;
@@ -814,7 +854,7 @@ fn belief(
             &model,
             &ImuSettings::default(),
             &receiver(gnss, interval_s),
-            &lengths,
+            lengths,
         )
     };
     let Some(track) = states.is_reduced().then(drive).flatten() else {
@@ -927,6 +967,12 @@ pub struct FuseSummary {
     /// What the vehicle knows, where that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vehicle: Option<Value>,
+    /// White noise of the recording that is believed instead of the model's.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub imu_noise: Vec<OwnNoise>,
+    /// Errors at the ends of windows that were withheld in a second run; none where outages were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub withheld: Option<Withheld>,
     /// Fixes, NIS, errors at the ends of outages and against the reference.
     #[serde(flatten)]
     pub outcome: Outcome,
@@ -1102,14 +1148,21 @@ fn vehicle(solution: &Solution, settings: &AidingSettings) -> Option<Value> {
 
 /// Errors of fixes that last: the correlation of their innovations, standard deviations as stated, and the filter's answer.
 fn fix_correlation(weighed: &Weighed) -> Option<Value> {
-    let white = weighed.whiteness?;
-    Some(json!({
+    let [white, of_velocity] = weighed.whiteness;
+    let (white, [pos_sigma_factor, vel_sigma_factor]) = (white?, weighed.sigma_factors);
+    let mut found = json!({
         "lag_1": white.lag_1,
         "limit": white.limit,
-        "is_correlated": white.is_correlated(),
-        "pos_sigma_factor": weighed.pos_sigma_factor,
+        "is_correlated": weighed.correlation().is_some(),
+        "pos_sigma_factor": pos_sigma_factor,
         "nis_as_stated": outcome(weighed.judged(), &[]).nis_per_component,
-    }))
+    });
+    if let Some(white) = of_velocity {
+        found["vel_lag_1"] = json!(white.lag_1);
+        found["vel_limit"] = json!(white.limit);
+        found["vel_sigma_factor"] = json!(vel_sigma_factor);
+    }
+    Some(found)
 }
 
 // Files of a fusion directory: tables, track for maps, summary, page.

@@ -6,6 +6,7 @@
 //! here). What was found is a cause only if the NIS of the filter, run with it, is smaller: an explanation is tested by
 //! taking the cause away.
 
+use super::gate::Gate;
 use super::outcome::total_nis;
 use super::{FixRecord, FusionError, Recorded, Settings, Solution, Start, earlier, fuse};
 use crate::ekf::Belief;
@@ -217,11 +218,12 @@ impl Normal {
     }
 }
 
-// Errors of fixes that last: found in the innovations, answered by larger standard deviations of the position.
+// Errors of fixes that last: found in the innovations, answered by larger standard deviations, of the position and of the
+// velocity each by itself.
 //
 // The innovations of a right filter are white ([Mehra](crate::bibliography::Mehra70)). Where the errors of the fixes
-// last, those of the position are correlated from one fix to the next, however small they are, and a filter that
-// averages them states too little. White noise with the sum of the autocorrelations of ρᵏ has (1 + ρ)/(1 − ρ) times
+// last, they are correlated from one fix to the next, however small they are, and a filter that averages them states
+// too little. White noise with the sum of the autocorrelations of ρᵏ has (1 + ρ)/(1 − ρ) times
 // the variance, which is what the filter is then told.
 
 /// Quantile of a normal distribution at 0.999: white innovations are called correlated once in a thousand recordings.
@@ -232,10 +234,16 @@ const LEAST: f64 = 0.1;
 const FEWEST: usize = 50;
 /// Largest correlation that is believed: 32 times the standard deviation.
 const LARGEST: f64 = 0.998;
+/// Innovations count as this many times their median deviation at most: normal ones reach it once in 17 000 (4 σ).
+const FAR: f64 = 6.0;
 /// Fixes this many times the median interval apart are no neighbours.
 const APART: f64 = 1.5;
 
-/// How long the errors of a receiver's positions last.
+/// Components of the position and of the velocity.
+const POSITION: Range<usize> = 0..3;
+const VELOCITY: Range<usize> = 3..6;
+
+/// How long the errors of a receiver's fixes last.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Correlation {
@@ -244,11 +252,11 @@ pub enum Correlation {
     Auto,
     /// No longer than one fix.
     None,
-    /// So many seconds.
+    /// Those of positions so many seconds, those of velocities no longer than one fix.
     Seconds(f64),
 }
 
-/// Autocorrelation of normalised innovations (of a fix, those of position) from one to the next.
+/// Autocorrelation of normalised innovations from one to the next.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Whiteness {
     /// Autocorrelation at lag 1: 0 if right.
@@ -258,11 +266,31 @@ pub struct Whiteness {
 }
 
 impl Whiteness {
-    /// Of the fixes used; none where they are few.
+    /// Of the positions of the fixes used; none where they are few.
     pub fn of<'a>(fixes: impl IntoIterator<Item = &'a FixRecord>) -> Option<Self> {
+        Self::of_part(fixes, POSITION)
+    }
+
+    /// The same of some of their components.
+    fn of_part<'a>(
+        fixes: impl IntoIterator<Item = &'a FixRecord>,
+        part: Range<usize>,
+    ) -> Option<Self> {
+        let normalised = |f: &FixRecord| {
+            let part = part.start..part.end.min(f.innovation.len());
+            part.map(|i| f.innovation[i] / f.sigma[i])
+                .collect::<Vec<_>>()
+        };
         let used = fixes.into_iter().filter(|f| f.used);
-        let position = |f: &FixRecord| [0, 1, 2].map(|i| f.innovation[i] / f.sigma[i]);
-        let all: Vec<(f64, [f64; 3])> = used.map(|f| (f.t_s, position(f))).collect();
+        let mut all: Vec<(f64, Vec<f64>)> = used
+            .map(|f| (f.t_s, normalised(f)))
+            .filter(|(_, normalised)| !normalised.is_empty())
+            .collect();
+        // outliers, which are in no order, must not hide it
+        let each = || all.iter().flat_map(|(_, z)| z);
+        let far = FAR * median(each().map(|z| z.abs()))?;
+        let parts = all.iter_mut().flat_map(|(_, z)| z);
+        parts.for_each(|z| *z = z.clamp(-far, far));
         Self::of_series(&all)
     }
 
@@ -277,7 +305,7 @@ impl Whiteness {
             let [a, b] = [0, 1].map(|k: usize| pair[k].1.as_ref());
             product += a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
             square += a.iter().chain(b).map(|z| z * z).sum::<f64>() / 2.0;
-            pairs += a.len();
+            pairs += a.len().min(b.len());
         }
         // The estimate of n independent pairs is normal about 0 with variance 1/n (Mehra, sec. III).
         let limit = LEAST.max(QUANTILE / (pairs as f64).sqrt());
@@ -300,11 +328,11 @@ pub struct Weighed {
     pub solution: Solution,
     /// The solution with standard deviations as stated, where they are not.
     pub as_stated: Option<Solution>,
-    /// Whiteness of the innovations with standard deviations as stated.
-    pub whiteness: Option<Whiteness>,
-    /// How many times the stated standard deviations of position.
-    pub pos_sigma_factor: f64,
-    /// The fixes with these.
+    /// Whiteness of the innovations with standard deviations as stated: of position, of velocity.
+    pub whiteness: [Option<Whiteness>; 2],
+    /// How many times the stated standard deviations of these.
+    pub sigma_factors: [f64; 2],
+    /// The fixes with that of position. Velocities as stated tell a delay best.
     pub gnss: Vec<GnssFix>,
 }
 
@@ -313,9 +341,16 @@ impl Weighed {
     pub fn judged(&self) -> &Solution {
         self.as_stated.as_ref().unwrap_or(&self.solution)
     }
+
+    /// The largest correlation of errors that last.
+    pub fn correlation(&self) -> Option<f64> {
+        let lasting = self.whiteness.iter().flatten();
+        let lasting = lasting.filter(|w| w.is_correlated()).map(|w| w.lag_1);
+        lasting.reduce(f64::max)
+    }
 }
 
-/// [`fuse`] with the standard deviations of position that the correlation of the fixes asks for.
+/// [`fuse`] with the standard deviations that the correlation of the fixes asks for.
 ///
 /// # Errors
 /// Those of [`fuse`].
@@ -326,37 +361,60 @@ pub fn fuse_correlated(
     settings: &Settings,
     (reference, correlation): (Option<&Reference>, Correlation),
 ) -> Result<Weighed, FusionError> {
-    let stated = fuse(recorded, belief, start, settings, reference)?;
-    let whiteness = Whiteness::of(&stated.fixes);
+    let ungated = Settings {
+        gate: None,
+        ..settings.clone()
+    };
+    let stated = fuse(recorded, belief, start, &ungated, reference)?;
+    let whiteness = [POSITION, VELOCITY].map(|part| Whiteness::of_part(&stated.fixes, part));
     let lag_1 = match correlation {
-        Correlation::Auto => whiteness.filter(Whiteness::is_correlated).map(|w| w.lag_1),
-        Correlation::None => None,
+        Correlation::Auto => {
+            whiteness.map(|w| w.filter(Whiteness::is_correlated).map(|white| white.lag_1))
+        }
+        Correlation::None => [None; 2],
         // a Gauss-Markov process from one fix to the next
         Correlation::Seconds(seconds) => {
-            interval_s(recorded.gnss).map(|step_s| (-step_s / seconds).exp())
+            let lag_1 = interval_s(recorded.gnss).map(|step_s| (-step_s / seconds).exp());
+            [lag_1, None]
         }
     };
-    let pos_sigma_factor = lag_1.map_or(1.0, sigma_factor);
-    let gnss: Vec<GnssFix> = recorded
-        .gnss
-        .iter()
-        .map(|f| f.with_sigmas_times(pos_sigma_factor, 1.0))
-        .collect();
-    let recorded = recorded.with_gnss(&gnss);
+    let sigma_factors = lag_1.map(|lag_1| lag_1.map_or(1.0, sigma_factor));
+    let [position, velocity] = sigma_factors;
+    let widened = |velocity: f64| -> Vec<GnssFix> {
+        let fixes = recorded.gnss.iter();
+        fixes
+            .map(|f| f.with_sigmas_times(position, velocity))
+            .collect()
+    };
+    let again = || {
+        let gnss = widened(velocity);
+        fuse(
+            &recorded.with_gnss(&gnss),
+            belief,
+            start,
+            settings,
+            reference,
+        )
+    };
     let (solution, as_stated) = match lag_1 {
-        None => (stated, None),
-        Some(_) => (
-            fuse(&recorded, belief, start, settings, reference)?,
-            Some(stated),
-        ),
+        [None, None] if !gates(&stated, settings.gate) => (stated, None),
+        [None, None] => (again()?, None),
+        _ => (again()?, Some(stated)),
     };
     Ok(Weighed {
         solution,
         as_stated,
         whiteness,
-        pos_sigma_factor,
-        gnss,
+        sigma_factors,
+        gnss: widened(1.0),
     })
+}
+
+/// Whether a gate would reject any fix.
+fn gates(solution: &Solution, level: Option<f64>) -> bool {
+    let is_far =
+        |f: &FixRecord, level: f64| f.used && f.nis > Gate::bound(level, f.innovation.len());
+    level.is_some_and(|level| solution.fixes.iter().any(|f| is_far(f, level)))
 }
 
 /// Standard deviation of white noise that counts as much as one of 1 whose autocorrelation is ρᵏ.

@@ -33,6 +33,7 @@
 //!     lever_arm_b: DVec3::ZERO,
 //!     gravity: GravityModel::Wgs84,
 //!     outages: vec![],
+//!     gate: None,
 //!     rows_hz: 1.0,
 //!     smooth: false,
 //! };
@@ -47,6 +48,7 @@
 pub mod alignment;
 mod clocks;
 mod displaced;
+mod gate;
 pub mod judge;
 pub mod mounting;
 mod outcome;
@@ -54,20 +56,25 @@ mod run;
 mod vehicle;
 #[cfg(test)]
 mod vehicle_tests;
+mod white_noise;
+mod withheld;
 
 pub use clocks::{ClocksApart, clocks_apart, earlier, rest_of_origin, rough_origin};
 pub use displaced::{
     Correlation, Displaced, Weighed, Whiteness, displaced, fuse_correlated, interval_s,
 };
+pub use gate::GATE_LEVEL;
 pub use outcome::{
-    Assessment, Confidence, Drift, Ends, Finding, FixCounts, FromReference, FusionError,
-    OutageDrift, Outcome, SmoothedOutage, SmoothedOutcome, assess, outcome,
+    Assessment, Drift, Ends, Finding, FixCounts, FromReference, FusionError, OutageDrift, Outcome,
+    Outliers, SmoothedOutage, SmoothedOutcome, assess, outcome,
 };
 pub use run::{LONGEST_GAP_S, bridged, fuse};
 pub use vehicle::{
     AidInnovations, AidRecord, VehicleVelocity, WheelSpeed, aid_innovations, vehicle_velocities,
     wheel_ratio,
 };
+pub use white_noise::{OwnNoise, own_noise, predicts_as_well};
+pub use withheld::{Withheld, withheld};
 
 use crate::earth::GravityModel;
 use crate::ekf::InitialSettings;
@@ -119,6 +126,7 @@ impl Settings {
         Self {
             rows_hz: 1e-3,
             smooth: false,
+            gate: None,
             ..self.clone()
         }
     }
@@ -151,6 +159,8 @@ pub struct Settings {
     pub gravity: GravityModel,
     /// When fixes are withheld.
     pub outages: Vec<Outage>,
+    /// Probability that the NIS of a right fix is below the gate; none uses every fix.
+    pub gate: Option<f64>,
     /// Rows of the solution a second.
     pub rows_hz: f64,
     /// Whether every row is estimated a second time, from what was recorded before and after it.
@@ -242,8 +252,10 @@ pub struct RowError {
 pub struct FixRecord {
     /// Time (s).
     pub t_s: f64,
-    /// Whether it was used; in an outage it is not.
+    /// Whether it was used; in an outage it is not, nor is an outlier.
     pub used: bool,
+    /// The bound of the NIS, of an outlier that was rejected.
+    pub rejected_above: Option<f64>,
     /// Estimated less measured: position (m), velocity (m/s), north, east, down.
     pub innovation: Vec<f64>,
     /// Standard deviations of these, by the filter and the receiver together.
@@ -267,6 +279,8 @@ pub struct Solution {
     pub smoothed: Option<Vec<Row>>,
     /// Every fix from start to end of the IMU.
     pub fixes: Vec<FixRecord>,
+    /// When the gate was opened after a run of rejections (s).
+    pub gate_reopened_s: Vec<f64>,
     /// Every measurement of the vehicle by itself.
     pub aids: Vec<AidRecord>,
     /// Wheel scale (1), mounting pitch and yaw (rad) at the end, and their standard deviations, where they are states.

@@ -1,5 +1,6 @@
 //! A run of the filter through recorded data.
 
+use super::gate::{Gate, Passage};
 use super::vehicle::{force, rate};
 use super::{
     AidRecord, FixRecord, FusionError, Nine, Recorded, Row, RowError, Settings, Solution, Start,
@@ -59,6 +60,7 @@ pub fn fuse(
         tape,
         settings,
         reference,
+        gate: Gate::new(settings.gate, recorded.gnss),
         now: start.t_s,
         next_row: start.t_s,
         solution: Solution::default(),
@@ -144,6 +146,7 @@ struct Run<'a> {
     tape: Option<Tape>,
     settings: &'a Settings,
     reference: Option<&'a Reference>,
+    gate: Gate,
     now: f64,
     next_row: f64,
     solution: Solution,
@@ -170,7 +173,17 @@ impl Run<'_> {
     fn fix(&mut self, fix: &GnssFix) -> Result<(), FusionError> {
         let mut record = self.filter.look_at(fix);
         record.error = self.error().map(|e| e.values);
-        record.used = !Outage::any_withholds(&self.settings.outages, fix.t_s);
+        if Outage::any_withholds(&self.settings.outages, fix.t_s) {
+            record.used = false;
+        } else {
+            match self.gate.pass(fix.t_s, record.nis, record.innovation.len()) {
+                Passage::Rejected(bound) => {
+                    (record.used, record.rejected_above) = (false, Some(bound));
+                }
+                Passage::Reopened => self.solution.gate_reopened_s.push(fix.t_s),
+                Passage::Used => {}
+            }
+        }
         if record.used {
             self.taped(|filter| filter.update(fix));
         }
@@ -331,6 +344,7 @@ impl Filter {
             horizontal_sigma_m: (before.x + before.y).sqrt(),
             t_s: fix.t_s,
             used: true,
+            rejected_above: None,
             innovation: z.as_slice()[..components].to_vec(),
             sigma: sigma.as_slice()[..components].to_vec(),
             nis: nis(components),

@@ -21,13 +21,14 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-fn settings() -> Settings {
+pub(super) fn settings() -> Settings {
     Settings {
         q_s_b: DQuat::IDENTITY,
         mounting_sigma_b: DVec3::ZERO,
         lever_arm_b: DVec3::ZERO,
         gravity: crate::earth::GravityModel::default(),
         outages: Vec::new(),
+        gate: None,
         rows_hz: 1.0,
         smooth: false,
     }

@@ -115,6 +115,8 @@ pub enum Basis {
     Windows,
     /// One recorded drive.
     Drive,
+    /// Windows of a recorded drive in which fixes were withheld.
+    Withheld,
     /// Covariance analysis.
     Expectation,
 }
@@ -123,6 +125,7 @@ nav_sim_signal::named!(Basis {
     Runs = "runs",
     Windows = "windows",
     Drive = "drive",
+    Withheld = "withheld",
     Expectation = "expectation",
 }, in files);
 
@@ -322,6 +325,40 @@ impl Verdict {
                 coverage_std_error: (COVERAGE * (1.0 - COVERAGE) / independent).sqrt(),
                 ..verdict
             },
+        })
+    }
+
+    /// Of normalised squares of so many degrees of freedom each, independent of one another; none without any.
+    pub fn of_windows(squares: impl Iterator<Item = (f64, usize)>) -> Option<Self> {
+        let (mut sum, mut degrees, mut windows) = (0.0, 0, 0.0);
+        for (square, own) in squares {
+            (sum, degrees, windows) = (sum + square, degrees + own, windows + 1.0);
+        }
+        let (tail, freedom) = (0.5 * LEVEL, (degrees, 1.0));
+        let ratio = (sum / degrees as f64).sqrt();
+        let together = Statistic {
+            state: None,
+            outage: None,
+            ratio: Estimate {
+                value: ratio,
+                std_error: ratio * (0.5 / degrees as f64).sqrt(),
+            },
+            freedom,
+            limits: ratio_limits(freedom, tail),
+        };
+        let judge = Judge {
+            statistics: vec![together],
+            tail,
+        };
+        let record = RunRecord {
+            nees_mean: sum / windows,
+            covered: f64::NAN,
+            ..RunRecord::default()
+        };
+        (degrees > 0).then(|| Self {
+            basis: Basis::Withheld,
+            independent_samples: windows,
+            ..judge.verdict(judge.kind(None), (&[&record], None))
         })
     }
 

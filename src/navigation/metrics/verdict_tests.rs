@@ -283,6 +283,7 @@ fn a_long_drive_decides() {
         let right = |seed: &u64| {
             Verdict::of_drive(&drive(*seed, 400, scale), &[])
                 .unwrap()
+                .verdict
                 .kind
                 == kind
         };
