@@ -33,8 +33,10 @@ if TYPE_CHECKING:
     from nav_sim._model import Model as Model
     from nav_sim._model import catalogue as catalogue
     from nav_sim._navigation import Fusion as Fusion
+    from nav_sim._navigation import Judgement as Judgement
     from nav_sim._navigation import Run as Run
     from nav_sim._navigation import fuse as fuse
+    from nav_sim._navigation import judge as judge
     from nav_sim._navigation import lincov as lincov
     from nav_sim._navigation import run as run
     from nav_sim._study import Study as Study
@@ -53,7 +55,7 @@ _HOMES = {
     "_decisions": ["Choice", "choose", "compare", "design", "require", "tune"],
     "_errors": ["NavSimError", "NavSimWarning"],
     "_model": ["Model", "catalogue"],
-    "_navigation": ["Fusion", "Run", "fuse", "lincov", "run"],
+    "_navigation": ["Fusion", "Judgement", "Run", "fuse", "judge", "lincov", "run"],
     "_study": ["Study", "StudyAnswer"],
     "_trajectory": ["Trajectory"],
     "_wavelet": ["Curve", "WaveletVariances", "allan_deviation", "wavelet_variance", "wv"],

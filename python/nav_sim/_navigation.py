@@ -352,6 +352,65 @@ def fuse(
         )
 
 
+class Judgement(Answer):
+    """A solution against a reference: `nav-sim judge`. `.verdict`, `.errors` (columns), `.summary()`, `.to_html(path)`."""
+
+    @cached_property
+    def errors(self) -> Columns:
+        """`t_s`, errors `err_…`, standard deviations `sd_…`, `nees`."""
+        return self.table("errors.csv")
+
+
+def judge(
+    solution: StrPath | Table,
+    reference: AnyTrajectory,
+    *,
+    covariance: StrPath | None = None,
+    outages: Sequence[tuple[float, float]] = (),
+    reference_delay_s: float = 0.0,
+    reference_arm_m: Sequence[float] = (0.0, 0.0, 0.0),
+    origin: tuple[float, float, float] | None = None,
+    threads: int | None = None,
+) -> Judgement:
+    """Says whether the errors of a solution, of any filter, are as large as it states: `nav-sim judge`.
+
+    Parameters
+    ----------
+    solution
+        A file, or columns: `t_s`, `lat_deg`, `lon_deg`, `h_m`, velocities and attitude, with standard deviations
+        `sd_n_m` … `sd_yaw_deg`.
+    reference
+        A file, columns or a `Trajectory`.
+    covariance
+        File of standard deviations or covariances.
+    outages
+        Windows in which the solution had no fixes (s).
+    reference_delay_s, reference_arm_m
+        How late the stamps of the reference are (s), and its point from that of the solution: front, right, down (m).
+    origin
+        Latitude, longitude (°) and height (m) of local coordinates.
+
+    Returns
+    -------
+    `.verdict`, `.errors`, `.summary()`, `.to_html(path)`, `.write(directory)`.
+    """
+    with Staging() as staging:
+        return ask(
+            Judgement,
+            "judge",
+            staging,
+            None,
+            threads,
+            solution=staging.table(solution, "solution"),
+            reference=_reference(reference, staging),
+            covariance=None if covariance is None else staging.table(covariance, "covariance"),
+            outage=windows(outages or None),
+            reference_delay=reference_delay_s,
+            reference_arm=numbers(reference_arm_m, "reference_arm_m", 3),
+            origin=None if origin is None else _joined(origin),
+        )
+
+
 def _joined(values: Any) -> str:
     return ",".join(repr(float(value)) for value in values)
 

@@ -28,6 +28,7 @@ mod file_commands;
 mod fuse;
 mod help_examples;
 mod hints;
+mod judge;
 mod laboratory;
 mod logs;
 mod pages;

@@ -703,12 +703,14 @@ mod attitude_tests {
             ("v_up_m_s", "v_d_m_s", -1.0),
             ("up_m", "d_m", -1.0),
             ("e_m", "e_m", 1.0),
+            ("sd_roll_deg", "sd_roll_deg", DEG),
+            ("std_n_m", "sd_n_m", 1.0),
         ] {
             let found = find(&QUANTITIES, name).map(|(own, factor)| (own.name, factor));
             assert_eq!(found, Some((quantity, Some(factor))), "{name}");
         }
         for name in [
-            "sd_roll_deg",
+            "sd_roll_m",
             "gnss",
             "e",
             "n",

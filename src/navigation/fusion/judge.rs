@@ -350,6 +350,8 @@ const FARTHEST_M: f64 = 30.0;
 /// Rows that are looked at for a rough clock, and how far it is looked for (s), in steps (s).
 const LOOKS: usize = 200;
 const SEARCH_S: (f64, f64) = (120.0, 0.5);
+/// Distance at which there is no other clock to look for (m).
+const NEAR_M: f64 = 10.0;
 /// Distance that the right clock leaves at most of what there was.
 const NEARER: f64 = 0.3;
 
@@ -483,6 +485,9 @@ pub fn rough_delay_s(
         apart.unwrap_or(f64::INFINITY)
     };
     let now = distance(given.delay_s);
+    if now < NEAR_M {
+        return None; // what is left least squares find
+    }
     let overlaps = span.0 <= last + given.delay_s && first + given.delay_s <= span.1;
     let centres: Vec<f64> = match overlaps {
         true => (-14..=14)
@@ -516,3 +521,7 @@ pub fn rough_delay_s(
     };
     (best < NEARER * usual).then_some(delay_s)
 }
+
+#[cfg(test)]
+#[path = "judge_tests.rs"]
+mod tests;
