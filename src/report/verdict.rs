@@ -90,9 +90,11 @@ fn sentence(
         }
         VerdictKind::Undecided => {
             let percent = 100.0 * (verdict.detectable_state_ratio - 1.0);
+            let is_one = verdict.basis == Basis::Drive || verdict.independent_samples == 1.0;
+            let miss = if is_one { "misses" } else { "miss" };
             let (samples, decides) = (samples(verdict), deciding(verdict));
             format!(
-                "undecided: {samples} cannot show errors below {percent:.0} % in one state; {decides}"
+                "undecided: {samples} {miss} errors below {percent:.0} % in one state; {decides}"
             )
         }
         VerdictKind::Doubtful => {
@@ -130,7 +132,7 @@ fn samples(verdict: &Verdict) -> String {
     match verdict.basis {
         Basis::Drive => format!("a drive worth {worth} independent samples"),
         Basis::Windows => format!("runs on {worth} independent windows of the recording"),
-        Basis::Withheld => format!("{worth} withheld windows"),
+        Basis::Withheld => format!("withheld windows ({worth})"),
         Basis::Expectation => "covariance analysis".to_owned(),
         Basis::Runs if verdict.independent_samples == 1.0 => "1 run".to_owned(),
         Basis::Runs => format!("{} runs", verdict.independent_samples),
@@ -411,7 +413,7 @@ mod verdict_tests {
         );
         let few = line(8, 1.0);
         assert!(
-            few.starts_with("undecided: 8 runs cannot show") && few.ends_with(" would decide"),
+            few.starts_with("undecided: 8 runs miss") && few.ends_with(" would decide"),
             "{few}"
         );
     }

@@ -486,7 +486,7 @@ fn alignment_from_positions_alone_is_as_good_as_it_says() {
             "fuse rec/imu.csv pos.csv imu.toml --reference rec/reference.csv -o out",
         );
         assert!(!ran.stderr.contains("reversing"), "{}", ran.stderr);
-        assert!(ran.stdout.starts_with("consistent"), "{}", ran.stdout);
+        assert!(ran.stdout.starts_with("undecided"), "{}", ran.stdout); // too short for more
         let out = place.path().join("out");
         let (errors, solution) = (
             table(&out.join("errors.csv")),

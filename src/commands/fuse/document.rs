@@ -252,9 +252,13 @@ fn at_windows(found: &Withheld) -> String {
         return "too short for windows without fixes".to_owned();
     }
     let (ratio, error) = (found.verdict.ratio, found.verdict.ratio_std_error);
-    let (windows, length_s) = (found.windows, found.length_s);
+    let length_s = found.length_s;
+    let windows = match found.windows {
+        1 => "the end of a withheld window".to_owned(),
+        n => format!("the ends of {n} withheld windows"),
+    };
     format!(
-        "errors {} ± {error:.2} times sigma at the ends of {windows} withheld windows of {length_s} s",
+        "errors {} ± {error:.2} times sigma at {windows} of {length_s} s",
         readable(ratio)
     )
 }

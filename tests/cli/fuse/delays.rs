@@ -27,7 +27,7 @@ fn late_fixes_are_told_and_their_delay_is_an_option() {
     );
     let sound = done(place.path(), &format!("{command} sound --gnss-delay 0.4"));
     assert!(
-        sound.stdout.starts_with("consistent: NIS"),
+        sound.stdout.starts_with("undecided: errors "),
         "{}",
         sound.stdout
     );
