@@ -109,11 +109,21 @@ fn toml_kind(table: &toml::Table) -> FileKind {
     }
 }
 
-/// The texts of KF-GINS, numbers between blanks without a header: increments are small, latitudes are not.
+/// Numbers without a header: increments are small, latitudes are not, and three accelerations are 1 g or 9.8 m/s².
 fn bare_kind(text: &str) -> Option<FileKind> {
-    match bare_row(text)?[..] {
-        [_, lat, lon, _, _, _, _] if lat.abs().max(lon.abs()) > 0.5 => Some(FileKind::Gnss),
-        [_, _, _, _, _, _, _] | [_, _, _, _, _, _, _, _] => Some(FileKind::Imu),
+    let (row, delimiter) = bare_row(text)?;
+    let is_place = |lat: f64, lon: f64, h: f64| {
+        let norm = lat.hypot(lon).hypot(h);
+        lat.abs().max(lon.abs()) > 5.0 && ![1.0, 9.8, 1e3].iter().any(|g| (norm / g - 1.0).abs() < 0.1)
+    };
+    match row[..] {
+        [_, lat, lon, _, _, _, _] if delimiter == b' ' && lat.abs().max(lon.abs()) > 0.5 => {
+            Some(FileKind::Gnss)
+        }
+        [_, lat, lon, h, ..] if delimiter != b' ' && is_place(lat, lon, h) => Some(FileKind::Gnss),
+        [_, _, _, _, _, _, _] | [_, _, _, _, _, _, _, _] if delimiter == b' ' => {
+            Some(FileKind::Imu)
+        }
         [_, _, _, _, _, _, _, _, _, _, _, _, _] => Some(FileKind::Gnss),
         _ => None,
     }

@@ -49,15 +49,16 @@ fn of_file(note: Note, path: &str) -> Note {
     Note { text, ..note }
 }
 
-/// The first row of a table of numbers between blanks without a header; none of any other text.
-pub(super) fn bare_row(text: &str) -> Option<Vec<f64>> {
+/// The first row of a table of numbers without a header, and what separates them; none of any other text.
+pub(super) fn bare_row(text: &str) -> Option<(Vec<f64>, u8)> {
     let mut lines = text.lines().map(str::trim);
     let first = lines.find(|l| !(l.is_empty() || l.starts_with(['#', '%', '/'])))?;
-    let row: Option<Vec<f64>> = first
-        .split_whitespace()
-        .map(|cell| cell.parse().ok())
-        .collect();
-    row.filter(|row| row.len() > 1)
+    let (cells, delimiter) = table::cells(first, &FIXES);
+    let row = cells
+        .iter()
+        .map(|cell| table::number(cell.as_bytes(), delimiter));
+    let row: Vec<f64> = row.collect::<Option<_>>()?;
+    (row.len() > 1).then_some((row, delimiter))
 }
 
 /// Refuses times (s) that stand still or go back; `line` is that of the k-th.
@@ -584,25 +585,33 @@ fn rtklib(path: &str, text: &str, (at, names): (usize, &str)) -> Result<Table, E
         let advice = "write the solution in GPS time (out-timesys = gpst)";
         return Err(refuse(at, "times that are not GPST, UTC or JST", advice));
     };
+    // commas separate cells, or are decimal marks
+    let is_comma = names.contains(',');
+    let (separator, mark) = if is_comma { (",", ",") } else { (" ", ".") };
     // angles in degrees, minutes and seconds take three columns each
     let is_dms = names.contains("d'\"");
     // the time, which takes two columns, in one
-    let (mut whole, mut count) = (String::new(), 0);
+    let mut whole = String::new();
     for (i, line) in text.lines().enumerate() {
-        let cells = line.split([' ', ',', ';', '\t', '%']);
+        let line = line.replace(',', mark);
+        let cells = line.split([' ', ';', '\t', '%']);
+        let cells = cells.flat_map(|cell| cell.split(separator));
         let cells: Vec<&str> = cells.filter(|cell| !cell.is_empty()).collect();
         let is_row = !(line.starts_with('%') || cells.is_empty());
         match cells[..] {
             [_, ref names @ ..] if i == at => {
-                count = names.len();
-                whole += &format!("t_s {}", names.join(" ")).replace("d'\"", "deg");
+                let names = [&["t_s"], names].concat().join(separator);
+                whole += &names.replace("d'\"", "deg");
             }
             [first, second, ref rest @ ..] if is_row => {
                 let angles = [rest.get(..3), rest.get(3..6)].map(|dms| dms.and_then(degrees));
                 let angles = is_dms.then_some(angles).and_then(|[lat, lon]| lat.zip(lon));
                 let row = gps_time_s(first, second, *ahead_s).map(|t_s| match angles {
-                    Some((lat, lon)) => format!("{t_s} {lat} {lon} {}", rest[6..].join(" ")),
-                    None => format!("{t_s} {}", rest[..count.min(rest.len())].join(" ")),
+                    Some((lat, lon)) => {
+                        let angles = [t_s, lat, lon].map(|x| x.to_string());
+                        [angles.join(separator), rest[6..].join(separator)].join(separator)
+                    }
+                    None => [&*t_s.to_string(), &rest.join(separator)].join(separator),
                 });
                 whole += &row.ok_or_else(|| {
                     let message = "not a row of time, position, quality, satellites and standard deviations";
@@ -853,7 +862,10 @@ pub(crate) fn read_imu(
     let names = [
         "t_s", "accel.x", "accel.y", "accel.z", "gyro.x", "gyro.y", "gyro.z",
     ];
-    let [time, signals @ ..] = table.columns(names)?;
+    let [time, signals @ ..] = table.columns(names).map_err(|refusal| {
+        let misspelt = recordings::facts::misspelt(&table, |_| true).into_iter();
+        misspelt.fold(refusal, Failure::hint)
+    })?;
     let unit_s = |values| unit_of_step(median_step(values)).0;
     let unit_s = time.factor.unwrap_or_else(|| unit_s(&time.values));
     let from_gravity = gravity_factor(&table)?;
