@@ -48,8 +48,7 @@ pub(crate) mod help {
         "gaps",
         "--gaps split takes the stretches between as recordings of their own",
     );
-    pub(crate) const GAPS_KEEP: (&str, &str) =
-        ("gaps", "--gaps keep leaves out what is missing");
+    pub(crate) const GAPS_KEEP: (&str, &str) = ("gaps", "--gaps keep leaves out what is missing");
     pub(crate) const GAPS_ELSEWHERE: (&str, &str) = (
         "gaps",
         "wv and calibrate leave out what is missing, or have --gaps split and --gaps ignore; fuse bridges gaps of up to 5 s",

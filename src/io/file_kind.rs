@@ -37,6 +37,41 @@ pub(crate) enum FileKind {
     Recording,
 }
 
+impl FileKind {
+    /// Words for it, with the command that takes it; none for what may be anything.
+    const fn described(&self) -> Option<&'static str> {
+        Some(match self {
+            Self::Model => "a noise model: run, fuse, synthesize and export take it",
+            Self::Study => "a study: batch takes it",
+            Self::CatalogueEntry => "data-sheet figures: datasheet makes a model of them",
+            Self::Contamination => "a contamination: synthesize --contaminate takes it",
+            Self::Curve => "wavelet-variance curves: calibrate --curve takes them",
+            Self::Record => "a record beside a result: no command reads it by itself",
+            Self::Trajectory => "a trajectory: run takes it",
+            Self::Initial => "an initial state: fuse --initial takes it",
+            Self::Gnss => "GNSS fixes: fuse takes them as its second file",
+            Self::Imu => "a recording under way: fuse takes it as its first file",
+            Self::Recording => "a table, as of a recording: wv, calibrate and fuse take it",
+            Self::Log => "a log: nav-sim inspect lists its channels",
+            Self::Scenario => return None,
+        })
+    }
+}
+
+/// The refusal of a file that was expected to be of other kinds.
+pub(crate) fn unless(expected: &[FileKind], path: &Path, refusal: Failure) -> Failure {
+    // of what is known no better, the reader's own advice says more
+    let is_vague = |kind: &FileKind| *kind == FileKind::Recording && refusal.advice().is_some();
+    let is_other = |kind: &FileKind| !(expected.contains(kind) || is_vague(kind));
+    let other = of(path).ok().filter(is_other);
+    match other.and_then(|kind| kind.described()) {
+        Some(what) => refusal.hint(format!(
+            "it holds {what}; are the arguments in another order?"
+        )),
+        None => refusal,
+    }
+}
+
 /// What a path holds. A pipe is read, and reads the same again.
 ///
 /// # Errors
@@ -114,7 +149,8 @@ fn bare_kind(text: &str) -> Option<FileKind> {
     let (row, delimiter) = bare_row(text)?;
     let is_place = |lat: f64, lon: f64, h: f64| {
         let norm = lat.hypot(lon).hypot(h);
-        lat.abs().max(lon.abs()) > 5.0 && ![1.0, 9.8, 1e3].iter().any(|g| (norm / g - 1.0).abs() < 0.1)
+        lat.abs().max(lon.abs()) > 5.0
+            && ![1.0, 9.8, 1e3].iter().any(|g| (norm / g - 1.0).abs() < 0.1)
     };
     match row[..] {
         [_, lat, lon, _, _, _, _] if delimiter == b' ' && lat.abs().max(lon.abs()) > 0.5 => {
@@ -136,6 +172,13 @@ fn table_kind(text: &str) -> FileKind {
     let is_position = ["lat_deg", "e_m", "qw"].iter().any(|name| has(&path, name));
     let is_stated = |q: &&Quantity| q.name.starts_with("sd_") || q.name == "week";
     let is_fix = (is_position || has(&fix, "x_ecef_m")) && fix.iter().any(is_stated);
+    // of a trajectory more is known than places
+    let is_whole = ["lat_deg", "lon_deg", "h_m"]
+        .iter()
+        .all(|name| has(&fix, name))
+        && !path
+            .iter()
+            .any(|q| ["v_n_m_s", "roll_deg"].contains(&q.name));
     let is_signal = of(&recordings::DICTIONARY)
         .iter()
         .any(|q| !q.axis.is_empty());
@@ -147,7 +190,7 @@ fn table_kind(text: &str) -> FileKind {
         FileKind::Curve
     } else if is_signal {
         FileKind::Recording
-    } else if is_fix && !has(&path, "yaw_deg") {
+    } else if (is_fix || is_whole) && !has(&path, "yaw_deg") {
         FileKind::Gnss
     } else if is_position {
         FileKind::Trajectory

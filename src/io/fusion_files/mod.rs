@@ -1,8 +1,9 @@
 //! What `fuse` reads: recorded IMU data, GNSS fixes, an initial state. Our own tables, the headers that
 //! recordings may have, the text files of KF-GINS, the solutions of RTKLIB, the sentences of NMEA 0183.
 
+use super::file_kind::{self, FileKind};
 use super::logs::LogOptions;
-use super::recordings::timing::{median_step, unit_of_step};
+use super::recordings::timing::{UNITS, median_step, unit_of_step};
 use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
 use super::table::{Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table};
 use super::toml_file::Source;
@@ -59,6 +60,33 @@ pub(super) fn bare_row(text: &str) -> Option<(Vec<f64>, u8)> {
         .map(|cell| table::number(cell.as_bytes(), delimiter));
     let row: Vec<f64> = row.collect::<Option<_>>()?;
     (row.len() > 1).then_some((row, delimiter))
+}
+
+/// Refuses fixes whose times are seconds by their name and thousandths or less by their steps, over as long as the IMU has.
+fn check_unit(table: &Table, imu_s: Option<(f64, f64)>) -> Result<(), Failure> {
+    /// A step between fixes (s) that is no longer one.
+    const LONG_S: f64 = 20.0;
+    let (Some(time), Some((from_s, to_s))) = (table.get("t_s"), imu_s) else {
+        return Ok(());
+    };
+    let t_s: Vec<f64> = (0..table.rows()).map(|row| time.si(row)).collect();
+    let step = median_step(&t_s);
+    let is_meant = |(unit_s, _): &&(f64, &str)| {
+        let span_s = (t_s[t_s.len() - 1] - t_s[0]) * unit_s;
+        (0.5..2.0).contains(&(span_s / (to_s - from_s)))
+    };
+    match UNITS[1..].iter().find(is_meant).filter(|_| step > LONG_S) {
+        Some((_, unit)) => Err(no_seconds(table, time, step, unit)),
+        None => Ok(()),
+    }
+}
+
+/// The refusal of times in another unit than their name says.
+fn no_seconds(table: &Table, time: &Column, step: f64, unit: &str) -> Failure {
+    let name = &time.name;
+    let text = format!("column \"{name}\" has steps of {step} s: they are {unit}");
+    let ending = unit.replace('µ', "u");
+    (table.refused(text)).or_hint(format!("name the column t_{ending}"))
 }
 
 /// Refuses times (s) that stand still or go back; `line` is that of the k-th.
@@ -330,6 +358,17 @@ pub(crate) fn read_gnss(
     clock_s: Option<(f64, f64)>,
     topic: Option<&str>,
 ) -> Result<(Vec<GnssFix>, Vec<Note>), Error> {
+    use FileKind as K;
+    read_fixes(path, unsaid, clock_s, topic)
+        .map_err(|e| file_kind::unless(&[K::Gnss, K::Trajectory, K::Log], path, e))
+}
+
+fn read_fixes(
+    path: &Path,
+    unsaid: Option<&FixSigma>,
+    clock_s: Option<(f64, f64)>,
+    topic: Option<&str>,
+) -> Result<(Vec<GnssFix>, Vec<Note>), Error> {
     let shown = path.display().to_string();
     let (stated, mut remarks) = match logs::kind_of(path) {
         Some(_) => of_log(path, topic, clock_s)?,
@@ -351,6 +390,7 @@ pub(crate) fn read_gnss(
                 (fixes, remarks)
             } else {
                 let table = table::parse(&shown, &text, &FIXES)?;
+                check_unit(&table, clock_s)?;
                 let velocity = match table.has(GEODETIC[2][0]) {
                     true => ", velocity",
                     false => "",
@@ -812,6 +852,8 @@ mod rtklib_tests {
 
 /// A step this many times the median one is a gap.
 const GAP: f64 = 1.5;
+/// A step from which on it is no IMU's (s).
+const SLOWEST_S: f64 = 2.0;
 /// Mean angular rate above which the unit is doubted (rad/s).
 const FAST: f64 = 2.0;
 
@@ -886,6 +928,9 @@ pub(crate) fn read_imu(
     }
     increasing(&table.path, |k| table.line(k), t_s.iter().copied())?;
     let step = median_step(&t_s);
+    if step > SLOWEST_S && time.factor == Some(1.0) {
+        return Err(no_seconds(&table, time, step, unit_of_step(step).1));
+    }
     let since_s = |k: usize| if k == 0 { step } else { t_s[k] - t_s[k - 1] };
     let samples = (0..t_s.len()).map(|k| {
         // those after a hole last a step like any other

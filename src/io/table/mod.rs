@@ -421,7 +421,8 @@ impl Table {
                 first.name,
                 first.values.len()
             );
-            return Err(Failure::contents(self.path, Place::Within, message));
+            return Err(Failure::contents(self.path, Place::Within, message)
+                .or_hint("write all columns with the same number of rows"));
         }
         if self.columns.first().is_some_and(|c| c.values.is_empty()) {
             return Err(empty(&self.path));
@@ -764,7 +765,10 @@ impl Head {
                     head.names = names;
                     return Ok(head);
                 }
-                if words.iter().any(|(_, cells)| cells.iter().any(|c| is_known(c))) {
+                if words
+                    .iter()
+                    .any(|(_, cells)| cells.iter().any(|c| is_known(c)))
+                {
                     break;
                 }
                 counts.push(cells.len());
@@ -874,9 +878,8 @@ impl Head {
             } else if cells.iter().all(is_empty) {
             } else if cells.len() < expected || !cells[expected..].iter().all(is_empty) {
                 let found = cells.len();
-                let is_split = |cell: &Cow<'_, [u8]>| {
-                    number(cell, b',').is_some() && !cell.contains(&b'.')
-                };
+                let is_split =
+                    |cell: &Cow<'_, [u8]>| number(cell, b',').is_some() && !cell.contains(&b'.');
                 let is_mark = self.delimiter == b','
                     && (expected + 1..=2 * expected).contains(&found)
                     && cells.iter().all(is_split);
