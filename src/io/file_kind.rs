@@ -190,7 +190,7 @@ fn table_kind(text: &str) -> FileKind {
         FileKind::Curve
     } else if is_signal {
         FileKind::Recording
-    } else if (is_fix || is_whole) && !has(&path, "yaw_deg") {
+    } else if is_fix && !has(&path, "roll_deg") || is_whole && !has(&path, "yaw_deg") {
         FileKind::Gnss
     } else if is_position {
         FileKind::Trajectory

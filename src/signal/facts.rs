@@ -289,16 +289,28 @@ const fn motion(sensor: Sensor) -> f64 {
     }
 }
 
-/// Seconds in which a unit moves, and all of them: its mean changes by more than a unit at rest, by more than its white noise
+/// Two axes whose samples are the same, of 64 changes and more: one was written twice.
+#[must_use]
+pub fn copied(axes: &[&[f64]]) -> Option<(usize, usize)> {
+    let is_same = |a: &[f64], b: &[f64]| {
+        let pairs = a.iter().zip(b);
+        let changes = a.windows(2).filter(|x| x[0] != x[1]);
+        pairs.into_iter().all(|(a, b)| a.to_bits() == b.to_bits()) && changes.count() >= 64
+    };
+    let mut pairs = (1..axes.len()).flat_map(|later| (0..later).map(move |first| (first, later)));
+    pairs.find(|(first, later)| is_same(axes[*first], axes[*later]))
+}
+
+/// True for each second in which a unit moves: its mean changes by more than a unit at rest, by more than its white noise
 /// explains, and by more than the steps of all seconds do (those of noise with stationary increments, walks too, are Gaussian of
 /// one size); or samples change by four times as much as usual. Where noise is not stationary because the level of a second
 /// differs more than χ² does, the unit moves most of the time, and the usual step tells nothing.
 #[must_use]
-pub fn moving(recording: &Recording) -> (usize, usize) {
+pub fn moving(recording: &Recording) -> Vec<bool> {
     let width = recording.rate_hz.round() as usize;
     let seconds = recording.len() / width.max(1);
     if width < 10 || seconds < 10 {
-        return (0, seconds);
+        return vec![false; seconds];
     }
     // 3.4 deviations of a median of so many; Gaussian tail of the means of all seconds and axes
     let sampling = 1.0 + 4.0 / (seconds as f64).sqrt();
@@ -357,7 +369,7 @@ pub fn moving(recording: &Recording) -> (usize, usize) {
             moves[k] |= squares[k] > 16.0 * level || k > 0 && steps[k - 1] > limit;
         }
     }
-    (moves.iter().filter(|moves| **moves).count(), seconds)
+    moves
 }
 
 /// Marks of the samples of a sensor, to be found again in another recording: hashes of some of its windows of 64 rows.

@@ -615,11 +615,11 @@ pub(super) fn recordings(
             });
         }
     }
-    for recording in &recordings {
+    for recording in &mut recordings {
         let means = recording.signals.iter().map(|s| (s.channel, s.mean));
         let means: Vec<(Channel, f64)> = means.collect();
         plausible(recording, &means, &mut report)?;
-        facts::examine(recording, &mut report)?;
+        facts::examine(recording, options.gaps, &mut report)?;
         let samples = recording.signals.first().map_or(0, |s| s.samples.len());
         report.samples.push(samples);
         if report.means.is_empty() {
@@ -692,18 +692,12 @@ const SMALLEST: f64 = 1e-45;
 fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
     let from_gravity = gravity_factor(raw)?;
     let factor = |column: &Column| {
-        let channel = column.quantity.name;
-        let [value, others @ ..] = &column.values[..] else {
-            return Ok(1.0);
-        };
-        let is_same = |other: &f64| other.to_bits() == value.to_bits();
-        if !others.is_empty() && others.iter().all(is_same) {
-            let name = &column.name;
-            let message = format!("{channel} (column \"{name}\") is dead: every sample is {value}");
+        if let Some(message) = facts::dead(column) {
             return Err(Failure::contents(&raw.path, Place::Within, message)
                 .or_option(help::CHANNELS)
                 .or_hint("record again"));
         }
+        let channel = column.quantity.name;
         let largest = column
             .values
             .iter()

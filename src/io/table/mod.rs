@@ -760,7 +760,10 @@ impl Head {
                 }
                 head.is_bare = dictionary.names.is_none();
                 let names = dictionary.names.map(<[String]>::to_vec);
-                let bare = || layout(dictionary.bare, cells.len()).filter(|_| words.is_empty());
+                let bare = || {
+                    layout(dictionary.bare, cells.len())
+                        .filter(|_| words.is_empty() && counts.is_empty())
+                };
                 if let Some(names) = names.or_else(bare) {
                     head.names = names;
                     return Ok(head);
