@@ -175,10 +175,10 @@ fn table_kind(text: &str) -> FileKind {
     // of a trajectory more is known than places
     let is_whole = ["lat_deg", "lon_deg", "h_m"]
         .iter()
-        .all(|name| has(&fix, name))
-        && !path
+        .all(|name| has(&path, name))
+        && !["v_n_m_s", "roll_deg", "yaw_deg"]
             .iter()
-            .any(|q| ["v_n_m_s", "roll_deg"].contains(&q.name));
+            .any(|name| has(&path, name));
     let is_signal = of(&recordings::DICTIONARY)
         .iter()
         .any(|q| !q.axis.is_empty());
@@ -190,7 +190,7 @@ fn table_kind(text: &str) -> FileKind {
         FileKind::Curve
     } else if is_signal {
         FileKind::Recording
-    } else if is_fix && !has(&path, "roll_deg") || is_whole && !has(&path, "yaw_deg") {
+    } else if is_fix && !has(&path, "roll_deg") || is_whole {
         FileKind::Gnss
     } else if is_position {
         FileKind::Trajectory
@@ -250,6 +250,21 @@ mod tests {
             table_kind("1 1e-5 2e-5 -1e-5 0.01 0.02 -0.098\n"),
             FileKind::Imu
         );
+        for text in [
+            "0,46.5,6.5,400,2,2,4\n",
+            "0,46.5,6.5,400\n",
+            "0,0 46,5 6,5 400,0 2,0 2,0 4,0\n",
+            "t_s,lat_deg,lon_deg,h_m,status",
+            "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m,yaw_deg",
+        ] {
+            assert_eq!(table_kind(text), FileKind::Gnss, "{text}");
+        }
+        for text in [
+            "0,9.79,0.1,0.2,1e-3,2e-3,1e-3\n",
+            "0.007,1.011,0.038,-0.160\n0.01,7,1.011,0.038,-0.1,0.1,33\n",
+        ] {
+            assert_eq!(table_kind(text), FileKind::Recording, "{text}");
+        }
         assert_eq!(of_toml("= broken"), FileKind::Scenario);
         assert_eq!(
             table_kind("# origin\nt_s, lat_deg, lon_deg"),

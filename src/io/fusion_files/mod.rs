@@ -772,6 +772,34 @@ mod rtklib_tests {
         near(velocity.down.unwrap().1, 0.025_f64.sqrt());
     }
 
+    /// Decimal commas, of numbers and seconds; commas between the cells too, which are told from them by the header alone.
+    #[test]
+    fn decimal_commas_state_the_same_fixes() {
+        let row = "2021/03/01 00:00:01.250 46.5 -6.50001 400.8 5 8 2.0 2.1 4.0\n";
+        let expected = fixes(&format!("{HEAD}{row}"), None).unwrap().0;
+        let comma = |text: &str| text.replace('.', ",");
+        let listed = |text: &str| {
+            let (date, rest) = text.split_once(' ').unwrap();
+            format!("{date} {}", rest.replace(' ', ","))
+        };
+        let names = HEAD.split_once("%  ").unwrap().1;
+        let names: Vec<&str> = names.split_whitespace().collect();
+        let names = format!("% program\n%  {}\n", names.join(","));
+        for text in [
+            format!("{HEAD}{}", comma(row)),
+            format!("{HEAD}{}", comma(row).replace(' ', ";")),
+            format!("{names}{}", listed(row)),
+        ] {
+            assert_eq!(fixes(&text, None).unwrap().0, expected, "{text}");
+        }
+        let both = fixes(&format!("{names}{}", listed(&comma(row))), None).unwrap_err();
+        assert!(
+            both.to_string()
+                .contains("line 3: commas separate the cells"),
+            "{both}"
+        );
+    }
+
     /// 2021-03-01 was a Monday, the second day of GPS week 2147.
     #[test]
     fn dates_and_weeks_are_one_clock() {

@@ -9,7 +9,7 @@ use nav_sim_calibration::percent;
 use nav_sim_signal::facts::{self, Marks, Repeats};
 use nav_sim_signal::imu::{Recording, Sensor, Signal};
 use nav_sim_signal::noise::{Composite, Kind, Model, Process};
-use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
+use nav_sim_signal::units::{DEG, STANDARD_GRAVITY};
 use std::fmt::Display;
 use std::ops::Range;
 
@@ -442,7 +442,7 @@ fn exchanged(found: &[(Channel, f64)]) -> Option<String> {
 }
 
 /// Sensors of a model whose noise is none of a unit: white noise over three times that of the noisiest or under a third of the
-/// quietest's, a floor over ten times the highest, a random walk that rules from a third of a second on.
+/// quietest's over 1 s, a random walk that rules from a third of a second on.
 pub(crate) fn out_of_range(model: &Model) -> Vec<String> {
     let deviation = |noise: &Composite, t_s: f64| {
         let samples = (t_s * model.rate_hz).round().max(1.0);
@@ -456,9 +456,6 @@ pub(crate) fn out_of_range(model: &Model) -> Vec<String> {
     let found: Vec<(Channel, f64)> = noises()
         .map(|(c, noise)| (c, deviation(noise, 1.0)))
         .collect();
-    if let Some(text) = exchanged(&found) {
-        return vec![text];
-    }
     let of = |sensor: Sensor| {
         let own = || {
             noises()
@@ -470,22 +467,8 @@ pub(crate) fn out_of_range(model: &Model) -> Vec<String> {
         if let Some(n) = own().map(|noise| deviation(noise, 1.0)).find(is_out) {
             let [n, low, high] = [n, low, high].map(|n| in_hours(sensor, n));
             let why = "wrong unit, or a standard deviation for a variance?";
-            return Some(format!("{sensor} N {n}, units have {low} to {high}: {why}"));
-        }
-        // of the catalogue, ADIS16405
-        let (floor, unit, name) = match sensor {
-            Sensor::Accel => (0.2, 1e-3 * STANDARD_GRAVITY, "mg"),
-            Sensor::Gyro => (25.2, DEG_PER_HOUR, "deg/h"),
-        };
-        let lowest = |noise| {
-            (0..=10)
-                .map(|k| deviation(noise, f64::from(1 << k)))
-                .fold(f64::INFINITY, f64::min)
-        };
-        if let Some(b) = own().map(lowest).find(|b| *b > 10.0 * floor * unit) {
-            let b = readable(b / unit);
             return Some(format!(
-                "{sensor} B {b} {name}, units have up to {floor}: wrong unit?"
+                "{sensor} N {n} over 1 s, units have {low} to {high}: {why}"
             ));
         }
         let walks = |noise: &Composite| {
@@ -501,7 +484,8 @@ pub(crate) fn out_of_range(model: &Model) -> Vec<String> {
         let text = "random walk exceeds the other noise from 0.3 s on: gamma2 is the variance of an increment";
         own().any(walks).then(|| format!("{sensor} {text}"))
     };
-    Sensor::ALL.into_iter().filter_map(of).collect()
+    let each = Sensor::ALL.into_iter().filter_map(of);
+    exchanged(&found).into_iter().chain(each).collect()
 }
 
 /// A column of one value, in words.

@@ -128,10 +128,9 @@ impl Clock {
         let long = steps.iter().filter(|s| **s > 1.5 * median).count();
         let even = since.last().unwrap_or(&0.0) / steps.len().max(1) as f64;
         let mut strays = (0..).zip(&since).map(|(k, s)| s - f64::from(k) * even);
-        let most_lost = match strays.any(|s| s.abs() > 4.0 * median) {
-            true => MOST_STRAYED,
-            false => MOST_LOST,
-        };
+        // samples that come in bursts have short steps
+        let is_lost = even < 4.0 * median && strays.any(|s| s.abs() > 4.0 * median);
+        let most_lost = if is_lost { MOST_STRAYED } else { MOST_LOST };
         let is_lossy = long > 0
             && (long as f64) < most_lost * since.len() as f64
             && !steps.iter().any(|s| *s < 0.5 * median);
