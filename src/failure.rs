@@ -51,7 +51,7 @@ pub(crate) mod help {
     pub(crate) const GAPS_KEEP: (&str, &str) = ("gaps", "--gaps keep leaves out what is missing");
     pub(crate) const GAPS_ELSEWHERE: (&str, &str) = (
         "gaps",
-        "wv and calibrate leave out what is missing, or have --gaps split and --gaps ignore; fuse bridges gaps of up to 5 s",
+        "wv and calibrate read it with --gaps split or --gaps ignore; fuse bridges gaps of up to 5 s",
     );
     pub(crate) const WRONG_RATE: (&str, &str) = ("rate-hz", "leave --rate-hz out, or correct it");
     pub(crate) const FIX_SIGMA: (&str, &str) = (

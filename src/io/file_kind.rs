@@ -51,7 +51,7 @@ impl FileKind {
             Self::Initial => "an initial state: fuse --initial takes it",
             Self::Gnss => "GNSS fixes: fuse takes them as its second file",
             Self::Imu => "a recording under way: fuse takes it as its first file",
-            Self::Recording => "a table, as of a recording: wv, calibrate and fuse take it",
+            Self::Recording => "a table: wv, calibrate and fuse take one of a recording",
             Self::Log => "a log: nav-sim inspect lists its channels",
             Self::Scenario => return None,
         })

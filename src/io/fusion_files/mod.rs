@@ -631,7 +631,7 @@ fn rtklib(path: &str, text: &str, (at, names): (usize, &str)) -> Result<Table, E
     // angles in degrees, minutes and seconds take three columns each
     let is_dms = names.contains("d'\"");
     // the time, which takes two columns, in one
-    let mut whole = String::new();
+    let (mut whole, mut count) = (String::new(), usize::MAX);
     for (i, line) in text.lines().enumerate() {
         let line = line.replace(',', mark);
         let cells = line.split([' ', ';', '\t', '%']);
@@ -640,6 +640,8 @@ fn rtklib(path: &str, text: &str, (at, names): (usize, &str)) -> Result<Table, E
         let is_row = !(line.starts_with('%') || cells.is_empty());
         match cells[..] {
             [_, ref names @ ..] if i == at => {
+                // of commas one more may be a decimal mark
+                count = if is_comma { usize::MAX } else { names.len() };
                 let names = [&["t_s"], names].concat().join(separator);
                 whole += &names.replace("d'\"", "deg");
             }
@@ -651,7 +653,10 @@ fn rtklib(path: &str, text: &str, (at, names): (usize, &str)) -> Result<Table, E
                         let angles = [t_s, lat, lon].map(|x| x.to_string());
                         [angles.join(separator), rest[6..].join(separator)].join(separator)
                     }
-                    None => [&*t_s.to_string(), &rest.join(separator)].join(separator),
+                    None => {
+                        let rest = rest[..count.min(rest.len())].join(separator);
+                        [&*t_s.to_string(), &rest].join(separator)
+                    }
                 });
                 whole += &row.ok_or_else(|| {
                     let message = "not a row of time, position, quality, satellites and standard deviations";

@@ -343,7 +343,7 @@ fn a_knock_a_dead_band_and_a_misspelt_column_are_told() {
             gaps,
             ..ReadOptions::default()
         };
-        let (recordings, _) = read(&[path.clone()], &options).unwrap();
+        let (recordings, _) = read(std::slice::from_ref(&path), &options).unwrap();
         for signal in &recordings[0].signals {
             let missing = (0..6000).filter(|k| signal.samples[*k].is_nan());
             let expected = (3000..3200).filter(|_| is_missing);
