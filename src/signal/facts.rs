@@ -301,16 +301,16 @@ pub fn copied(axes: &[&[f64]]) -> Option<(usize, usize)> {
     pairs.find(|(first, later)| is_same(axes[*first], axes[*later]))
 }
 
-/// True for each second in which a unit moves: its mean changes by more than a unit at rest, by more than its white noise
+/// Seconds in which a unit moves, and all of them: its mean changes by more than a unit at rest, by more than its white noise
 /// explains, and by more than the steps of all seconds do (those of noise with stationary increments, walks too, are Gaussian of
 /// one size); or samples change by four times as much as usual. Where noise is not stationary because the level of a second
 /// differs more than χ² does, the unit moves most of the time, and the usual step tells nothing.
 #[must_use]
-pub fn moving(recording: &Recording) -> Vec<bool> {
+pub fn moving(recording: &Recording) -> (usize, usize) {
     let width = recording.rate_hz.round() as usize;
     let seconds = recording.len() / width.max(1);
     if width < 10 || seconds < 10 {
-        return vec![false; seconds];
+        return (0, seconds);
     }
     // 3.4 deviations of a median of so many; Gaussian tail of the means of all seconds and axes
     let sampling = 1.0 + 4.0 / (seconds as f64).sqrt();
@@ -369,7 +369,7 @@ pub fn moving(recording: &Recording) -> Vec<bool> {
             moves[k] |= squares[k] > 16.0 * level || k > 0 && steps[k - 1] > limit;
         }
     }
-    moves
+    (moves.iter().filter(|moves| **moves).count(), seconds)
 }
 
 /// Marks of the samples of a sensor, to be found again in another recording: hashes of some of its windows of 64 rows.

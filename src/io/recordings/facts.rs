@@ -17,8 +17,6 @@ use std::ops::Range;
 const MOST_REPEATED: f64 = 0.1;
 /// Seconds in motion from which on a recording is not static.
 const MOST_MOVING: f64 = 0.5;
-/// The same up to which they are left out.
-const LEFT_OUT: f64 = 0.1;
 
 fn axes(table: &Table, is: impl Fn(Channel) -> bool) -> Vec<&[f64]> {
     let own = |c: &&Column| channel_of(c).is_some_and(&is);
@@ -340,17 +338,12 @@ impl Repair {
     }
 }
 
-/// Warnings of a static recording in SI units; the seconds in which it moves are left out, where there are few and gaps are kept.
+/// Warnings of a static recording in SI units.
 ///
 /// # Errors
 /// When it moves in most of its seconds.
-pub(super) fn examine(
-    recording: &mut Recording,
-    gaps: Gaps,
-    report: &mut FileReport,
-) -> Result<(), Failure> {
-    let moves = facts::moving(recording);
-    let (seconds, moving) = (moves.len(), moves.iter().filter(|moves| **moves).count());
+pub(super) fn examine(recording: &Recording, report: &mut FileReport) -> Result<(), Failure> {
+    let (moving, seconds) = facts::moving(recording);
     let share = moving as f64 / seconds.max(1) as f64;
     if share > MOST_MOVING {
         let text = format!("moves in {} of its seconds: not static", percent(share));
@@ -358,19 +351,8 @@ pub(super) fn examine(
             .or_hint("record with the unit at rest; nav-sim fuse reads drives and flights"));
     }
     if moving > 0 {
-        let is_left_out = gaps == Gaps::Keep && share < LEFT_OUT;
-        let width = recording.rate_hz.round() as usize;
-        for signal in recording.signals.iter_mut().filter(|_| is_left_out) {
-            let seconds = signal.samples.chunks_mut(width).zip(&moves);
-            let moving = seconds.filter(|(_, moves)| **moves);
-            moving.for_each(|(second, _)| second.fill(f64::NAN));
-        }
-        let what = match is_left_out {
-            true => ": left out as missing",
-            false => "",
-        };
         report.warn(format!(
-            "moves in {moving} of its {seconds} seconds, or was knocked{what}"
+            "moves in {moving} of its {seconds} seconds, or was knocked"
         ));
     }
     let noise = |signal: &Signal| facts::white_noise(&signal.samples, recording.rate_hz);

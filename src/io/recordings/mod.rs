@@ -615,11 +615,11 @@ pub(super) fn recordings(
             });
         }
     }
-    for recording in &mut recordings {
+    for recording in &recordings {
         let means = recording.signals.iter().map(|s| (s.channel, s.mean));
         let means: Vec<(Channel, f64)> = means.collect();
         plausible(recording, &means, &mut report)?;
-        facts::examine(recording, options.gaps, &mut report)?;
+        facts::examine(recording, &mut report)?;
         let samples = recording.signals.first().map_or(0, |s| s.samples.len());
         report.samples.push(samples);
         if report.means.is_empty() {
