@@ -44,6 +44,11 @@ pub(crate) mod help {
         "--gaps split takes the stretches between as recordings of their own; --gaps ignore takes the samples as evenly \
          spaced (stamped late, none lost)",
     );
+    pub(crate) const GAPS_LOST: (&str, &str) = (
+        "gaps",
+        "--gaps split takes the stretches between as recordings of their own",
+    );
+    pub(crate) const GAPS_KEEP: (&str, &str) = ("gaps", "--gaps keep leaves out what is missing");
     pub(crate) const GAPS_ELSEWHERE: (&str, &str) = (
         "gaps",
         "wv and calibrate read it with --gaps split or --gaps ignore; fuse bridges gaps of up to 5 s",

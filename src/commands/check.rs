@@ -24,8 +24,8 @@ use std::path::{Path, PathBuf};
 /// waypoints a motion profile; with [run] beside [vary], or a trajectory in it, a study of `batch`; with operations
 /// one for `synthesize --contaminate`; with lat_deg and yaw_deg an initial state of `fuse`; with [unit] an entry of
 /// the catalogue of IMUs; any other is a scenario. A table with lat_deg or n_m is a trajectory, as are .nav, .tum
-/// and .gpx; with standard deviations it is GNSS fixes; with tau_samples (or a .wv.json) a curve; any other table or
-/// .npy is a static recording.
+/// and .gpx; with standard deviations, or heights and neither attitude nor velocity, it is GNSS fixes; with tau_samples
+/// (or a .wv.json) a curve; any other table or .npy is a static recording.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:

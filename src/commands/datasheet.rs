@@ -5,6 +5,7 @@ use crate::io::datasheet::{
     CATALOGUE, Datasheet, Entry, Figure, GRADE, Quantity, catalogued, measured, read,
 };
 use crate::io::model_file;
+use crate::io::recordings::facts::out_of_range;
 use crate::io::suggest::nearest;
 use crate::parse;
 use nav_sim_document::{Document, Tone};
@@ -86,6 +87,7 @@ impl Command for DatasheetArgs {
             .into_iter()
             .flat_map(|sensor| lacking(&sheet, sensor))
             .chain(made.doubts)
+            .chain(out_of_range(&made.file.model))
             .for_each(|doubt| context.warn(doubt));
         context.remark("an assumption, not a calibration");
         // a model file with the same keys as JSON

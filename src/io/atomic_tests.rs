@@ -233,3 +233,17 @@ fn where_nothing_can_be_made_another_path_is_the_remedy() {
         }
     }
 }
+
+/// Where the system has no locks, the marker of a claim holds none, and another command may write there.
+#[test]
+fn a_claim_without_a_lock_is_shared() {
+    let dir = tempfile::tempdir().unwrap();
+    let whole = claim_file(&dir.path().join("a.csv"), ".csv", []).unwrap();
+    assert!(!whole.is_shared());
+    let unlocked = Claim {
+        outputs: Vec::new(),
+        marker: Some(Temporary::new(dir.path().join("b.claim"), None)),
+        is_left: false,
+    };
+    assert!(unlocked.is_shared());
+}

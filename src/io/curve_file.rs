@@ -1,6 +1,7 @@
 //! Wavelet-variance curves to fit: CSV with columns `tau_samples,wv,edof`, or the JSON that `calibrate` or `wv`
 //! writes (the classical curve of a signal is GMWM's, the robust one RGMWM's).
 
+use super::file_kind::{self, FileKind};
 use super::table::{Dictionary, Quantity, parse as parse_table};
 use super::{Failure, Place, source};
 use crate::report::{CurvesFile, FittedCurve, SignalsFile};
@@ -34,7 +35,8 @@ const LAYOUT: &str = "a curve is a CSV with the columns tau_samples,wv,edof (tau
 /// When it cannot be read, or is no curve file.
 pub(crate) fn read(path: &Path) -> Result<Vec<NamedCurve>, Failure> {
     let text = source::text(path).map_err(|e| Failure::io(path, e))?;
-    parse(&path.display().to_string(), &text).map_err(|e| e.or_hint(LAYOUT))
+    parse(&path.display().to_string(), &text)
+        .map_err(|e| file_kind::unless(&[FileKind::Curve], path, e.or_hint(LAYOUT)))
 }
 
 fn parse(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {

@@ -37,6 +37,41 @@ pub(crate) enum FileKind {
     Recording,
 }
 
+impl FileKind {
+    /// Words for it, with the command that takes it; none for what may be anything.
+    const fn described(&self) -> Option<&'static str> {
+        Some(match self {
+            Self::Model => "a noise model: run, fuse, synthesize and export take it",
+            Self::Study => "a study: batch takes it",
+            Self::CatalogueEntry => "data-sheet figures: datasheet makes a model of them",
+            Self::Contamination => "a contamination: synthesize --contaminate takes it",
+            Self::Curve => "wavelet-variance curves: calibrate --curve takes them",
+            Self::Record => "a record beside a result: no command reads it by itself",
+            Self::Trajectory => "a trajectory: run takes it",
+            Self::Initial => "an initial state: fuse --initial takes it",
+            Self::Gnss => "GNSS fixes: fuse takes them as its second file",
+            Self::Imu => "a recording under way: fuse takes it as its first file",
+            Self::Recording => "a table: wv, calibrate and fuse take one of a recording",
+            Self::Log => "a log: nav-sim inspect lists its channels",
+            Self::Scenario => return None,
+        })
+    }
+}
+
+/// The refusal of a file that was expected to be of other kinds.
+pub(crate) fn unless(expected: &[FileKind], path: &Path, refusal: Failure) -> Failure {
+    // of what is known no better, the reader's own advice says more
+    let is_vague = |kind: &FileKind| *kind == FileKind::Recording && refusal.advice().is_some();
+    let is_other = |kind: &FileKind| !(expected.contains(kind) || is_vague(kind));
+    let other = of(path).ok().filter(is_other);
+    match other.and_then(|kind| kind.described()) {
+        Some(what) => refusal.hint(format!(
+            "it holds {what}; are the arguments in another order?"
+        )),
+        None => refusal,
+    }
+}
+
 /// What a path holds. A pipe is read, and reads the same again.
 ///
 /// # Errors
@@ -109,11 +144,22 @@ fn toml_kind(table: &toml::Table) -> FileKind {
     }
 }
 
-/// The texts of KF-GINS, numbers between blanks without a header: increments are small, latitudes are not.
+/// Numbers without a header: increments are small, latitudes are not, and three accelerations are 1 g or 9.8 m/s².
 fn bare_kind(text: &str) -> Option<FileKind> {
-    match bare_row(text)?[..] {
-        [_, lat, lon, _, _, _, _] if lat.abs().max(lon.abs()) > 0.5 => Some(FileKind::Gnss),
-        [_, _, _, _, _, _, _] | [_, _, _, _, _, _, _, _] => Some(FileKind::Imu),
+    let (row, delimiter) = bare_row(text)?;
+    let is_place = |lat: f64, lon: f64, h: f64| {
+        let norm = lat.hypot(lon).hypot(h);
+        lat.abs().max(lon.abs()) > 5.0
+            && ![1.0, 9.8, 1e3].iter().any(|g| (norm / g - 1.0).abs() < 0.1)
+    };
+    match row[..] {
+        [_, lat, lon, _, _, _, _] if delimiter == b' ' && lat.abs().max(lon.abs()) > 0.5 => {
+            Some(FileKind::Gnss)
+        }
+        [_, lat, lon, h, ..] if delimiter != b' ' && is_place(lat, lon, h) => Some(FileKind::Gnss),
+        [_, _, _, _, _, _, _] | [_, _, _, _, _, _, _, _] if delimiter == b' ' => {
+            Some(FileKind::Imu)
+        }
         [_, _, _, _, _, _, _, _, _, _, _, _, _] => Some(FileKind::Gnss),
         _ => None,
     }
@@ -126,6 +172,13 @@ fn table_kind(text: &str) -> FileKind {
     let is_position = ["lat_deg", "e_m", "qw"].iter().any(|name| has(&path, name));
     let is_stated = |q: &&Quantity| q.name.starts_with("sd_") || q.name == "week";
     let is_fix = (is_position || has(&fix, "x_ecef_m")) && fix.iter().any(is_stated);
+    // of a trajectory more is known than places
+    let is_whole = ["lat_deg", "lon_deg", "h_m"]
+        .iter()
+        .all(|name| has(&path, name))
+        && !["v_n_m_s", "roll_deg", "yaw_deg"]
+            .iter()
+            .any(|name| has(&path, name));
     let is_signal = of(&recordings::DICTIONARY)
         .iter()
         .any(|q| !q.axis.is_empty());
@@ -137,7 +190,7 @@ fn table_kind(text: &str) -> FileKind {
         FileKind::Curve
     } else if is_signal {
         FileKind::Recording
-    } else if is_fix && !has(&path, "yaw_deg") {
+    } else if is_fix && !has(&path, "roll_deg") || is_whole {
         FileKind::Gnss
     } else if is_position {
         FileKind::Trajectory
@@ -197,6 +250,21 @@ mod tests {
             table_kind("1 1e-5 2e-5 -1e-5 0.01 0.02 -0.098\n"),
             FileKind::Imu
         );
+        for text in [
+            "0,46.5,6.5,400,2,2,4\n",
+            "0,46.5,6.5,400\n",
+            "0,0 46,5 6,5 400,0 2,0 2,0 4,0\n",
+            "t_s,lat_deg,lon_deg,h_m,status",
+            "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m,yaw_deg",
+        ] {
+            assert_eq!(table_kind(text), FileKind::Gnss, "{text}");
+        }
+        for text in [
+            "0,9.79,0.1,0.2,1e-3,2e-3,1e-3\n",
+            "0.007,1.011,0.038,-0.160\n0.01,7,1.011,0.038,-0.1,0.1,33\n",
+        ] {
+            assert_eq!(table_kind(text), FileKind::Recording, "{text}");
+        }
         assert_eq!(of_toml("= broken"), FileKind::Scenario);
         assert_eq!(
             table_kind("# origin\nt_s, lat_deg, lon_deg"),

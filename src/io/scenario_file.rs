@@ -1,6 +1,7 @@
 //! Scenario files (TOML): see [`Scenario`].
 
 use super::Failure;
+use super::file_kind::{self, FileKind};
 use super::toml_file::Source;
 use nav_sim_navigation::scenario::Scenario;
 use std::path::Path;
@@ -10,7 +11,8 @@ use std::path::Path;
 /// # Errors
 /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
 pub(crate) fn read(path: &Path) -> Result<Scenario, Failure> {
-    from_source(&Source::read(path)?)
+    let refused = |e| file_kind::unless(&[FileKind::Scenario, FileKind::Study], path, e);
+    from_source(&Source::read(path)?).map_err(refused)
 }
 
 fn from_source(source: &Source) -> Result<Scenario, Failure> {

@@ -289,6 +289,18 @@ const fn motion(sensor: Sensor) -> f64 {
     }
 }
 
+/// Two axes whose samples are the same, of 64 changes and more: one was written twice.
+#[must_use]
+pub fn copied(axes: &[&[f64]]) -> Option<(usize, usize)> {
+    let is_same = |a: &[f64], b: &[f64]| {
+        let pairs = a.iter().zip(b);
+        let changes = a.windows(2).filter(|x| x[0] != x[1]);
+        pairs.into_iter().all(|(a, b)| a.to_bits() == b.to_bits()) && changes.count() >= 64
+    };
+    let mut pairs = (1..axes.len()).flat_map(|later| (0..later).map(move |first| (first, later)));
+    pairs.find(|(first, later)| is_same(axes[*first], axes[*later]))
+}
+
 /// Seconds in which a unit moves, and all of them: its mean changes by more than a unit at rest, by more than its white noise
 /// explains, and by more than the steps of all seconds do (those of noise with stationary increments, walks too, are Gaussian of
 /// one size); or samples change by four times as much as usual. Where noise is not stationary because the level of a second

@@ -429,7 +429,7 @@ fn a_gyroscope_louder_than_any_is_doubted() {
         let output = nav_sim(dir.path()).args(fit).assert().success();
         let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
         assert_eq!(
-            said.contains("columns in degrees are named gyro_x_deg_s"),
+            said.contains("above three times the noisiest units'"),
             is_doubted,
             "{said}"
         );

@@ -141,10 +141,68 @@ fn hints_on_recordings_work() {
     let gap = table("t_s,gyro_x_rad_s", |k, next| {
         format!("{:.2},{:.6}", 0.01 * (k + 100 * (k / 100)) as f64, next())
     });
+    // a third and two thirds lost in a block, a third at random; where it is refused, and as it is by default
+    let gaps: Follow = |hint, _, options| *options = option(hint, "--gaps");
+    in_file("a.csv", &gap, &[]);
+    let random = |share: u32| {
+        let mut state = 1_u32;
+        let mut lost = move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) % 100 < share
+        };
+        let mut lines = Vec::new();
+        for line in gap_free().lines() {
+            if lines.is_empty() || !lost() {
+                lines.push(line.to_owned() + "\n");
+            }
+        }
+        lines.concat()
+    };
+    in_file("a.csv", &random(30), &[]);
+    for text in [&gap, &random(30)] {
+        fs::write(place.path().join("a.csv"), text).unwrap();
+        let ran = nav_sim(place.path(), "wv a.csv -q --gaps refuse");
+        assert_eq!(ran.code, 2);
+        let hint = ran.stderr.split("\nhint: ").nth(1).unwrap();
+        let followed = nav_sim(
+            place.path(),
+            &format!("wv a.csv -q{}", option(hint, "--gaps")),
+        );
+        assert_eq!(followed.code, 0, "{}", followed.stderr);
+    }
+    let long = gap.replace("\n2.", "\n42.");
+    in_file("a.csv", &long, &[gaps]);
+    fs::write(place.path().join("a.csv"), random(60)).unwrap();
+    let ran = nav_sim(place.path(), "wv a.csv -q");
+    assert!(
+        ran.code == 2 && ran.stderr.contains("record again"),
+        "{}",
+        ran.stderr
+    );
+
+    // lines before the header that look like rows
     in_file(
         "a.csv",
-        &gap,
-        &[|hint, _, options| *options += &option(hint, "--gaps")],
+        &format!("Firmware 1,2,3\n2024,5,1\n{}", sound("t_s,gyro_x_rad_s", 1)),
+        &[],
+    );
+    let both = table("t_s,gyro_x_rad_s", |k, next| {
+        format!("{:.2},{:.7}", 0.01 * k as f64, next()).replace('.', ",")
+    });
+    in_file(
+        "a.csv",
+        &both,
+        &[|hint, text, _| {
+            assert!(
+                hint.contains("separate the cells with semicolons"),
+                "{hint}"
+            );
+            let cells = |line: &str| match line.split(',').collect::<Vec<_>>()[..] {
+                [a, b, c, d] => format!("{a},{b};{c},{d}\n"),
+                _ => line.replace(',', ";") + "\n",
+            };
+            *text = text.lines().map(cells).collect();
+        }],
     );
     let coarse = table("t_s,gyro_x_rad_s", |k, next| {
         format!("{:.2},{:.6}", 0.03 * (k / 3) as f64, next())
@@ -220,6 +278,92 @@ fn hints_on_recordings_work() {
             let mut rows: Vec<&str> = rows.lines().collect();
             rows.sort_unstable();
             *text = format!("{head}\n{}\n", rows.join("\n"));
+        }],
+    );
+}
+
+/// A second and more at 100 Hz.
+fn gap_free() -> String {
+    sound("t_s,gyro_x_rad_s", 1)
+}
+
+/// One sentence for one fault, whatever command reads the recording.
+#[test]
+fn commands_say_the_same_of_one_recording() {
+    let place = tempfile::tempdir().unwrap();
+    let rows = table("t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s", |k, next| {
+        let (x, z) = (next(), next());
+        format!("{:.2},{x:.7},{x:.7},{z:.7}", 0.01 * k as f64)
+    });
+    fs::write(place.path().join("a.csv"), rows).unwrap();
+    let said = |command: &str| -> Vec<String> {
+        let ran = nav_sim(place.path(), command);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let warnings = ran
+            .stderr
+            .lines()
+            .filter(|line| line.starts_with("warning: a.csv"));
+        warnings.map(str::to_owned).collect()
+    };
+    let text = "warning: a.csv: gyro.y has the samples of gyro.x: one axis was written twice";
+    for command in [
+        "wv a.csv",
+        "check a.csv",
+        "calibrate a.csv --estimator gmwm --model WN --bootstrap 0 --seed 1 -o m.toml",
+    ] {
+        assert_eq!(said(command), [text], "{command}");
+    }
+}
+
+/// A file in the place of another: what it is, and what takes it.
+#[test]
+fn files_of_another_kind_are_named() {
+    let place = place_with(DRIVE, MODEL);
+    let place = place.path();
+    fs::write(place.join("a.csv"), sound("t_s,gyro_x_rad_s", 1)).unwrap();
+    let fixes =
+        "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m\n0,46,6,400,1,1,2\n1,46,6,400,1,1,2\n";
+    fs::write(place.join("g.csv"), fixes).unwrap();
+    for (command, kind) in [
+        ("wv imu.toml", "a noise model: run, fuse"),
+        ("calibrate imu.toml", "a noise model"),
+        (
+            "export a.csv --target kalibr",
+            "a table: wv, calibrate and fuse",
+        ),
+        ("run drive.toml a.csv", "a table: wv, calibrate and fuse"),
+        (
+            "synthesize drive.toml --samples 99 -o s",
+            "a trajectory: run",
+        ),
+        ("wv g.csv", "GNSS fixes: fuse takes them as its second file"),
+        ("fuse g.csv a.csv imu.toml -o f", "GNSS fixes"),
+        ("batch imu.toml -o b", "a noise model"),
+        (
+            "run drive.toml imu.toml --scenario imu.toml",
+            "a noise model",
+        ),
+        ("calibrate --curve imu.toml", "a noise model"),
+    ] {
+        let ran = nav_sim(place, command);
+        let hint = ran.stderr.split("\nhint: ").nth(1).unwrap_or_default();
+        assert!(
+            ran.code == 2 && hint.contains(kind),
+            "{command}: {}",
+            ran.stderr
+        );
+    }
+    // a decimal comma in TOML
+    let model = fs::read_to_string(place.join("imu.toml")).unwrap();
+    let comma = model.replacen("rate_hz = 100.0", "rate_hz = 100,0", 1);
+    followed(
+        place,
+        "check m.toml",
+        "m.toml",
+        &comma,
+        &[|hint, text, _| {
+            assert!(hint.contains("write decimals with a point"), "{hint}");
+            rename(text, "100,0", "100.0");
         }],
     );
 }
@@ -396,6 +540,40 @@ fn hints_on_drives_work() {
     if ran.code != 0 {
         followed(place, command, "g.csv", &later, &[delay]);
     }
+
+    // times in milliseconds under the name of seconds, and a column misspelt
+    let ms = |line: &str| match line.split_once(',').unwrap() {
+        (t_s, rest) if t_s.parse::<f64>().is_ok() => {
+            format!("{},{rest}\n", 1e3 * t_s.parse::<f64>().unwrap())
+        }
+        _ => format!("{line}\n"),
+    };
+    let unit: Follow = |hint, text, _| {
+        assert!(hint.starts_with("name the column t_ms"), "{hint}");
+        rename(text, "t_s,", "t_ms,");
+    };
+    followed(
+        place,
+        command,
+        "g.csv",
+        &gnss.lines().map(ms).collect::<String>(),
+        &[unit],
+    );
+    let imu = fs::read_to_string(place.join("rec/imu.csv")).unwrap();
+    let command = "fuse i.csv rec/gnss.csv imu.toml -q -o out";
+    followed(
+        place,
+        command,
+        "i.csv",
+        &imu.lines().map(ms).collect::<String>(),
+        &[unit],
+    );
+    let slip: Follow = |hint, text, _| {
+        assert!(hint.contains("did you mean \"accel_z_m_s2\"?"), "{hint}");
+        rename(text, "acel_z_m_s2", "accel_z_m_s2");
+    };
+    let misspelt = imu.replacen("accel_z", "acel_z", 1);
+    followed(place, command, "i.csv", &misspelt, &[slip]);
 
     let initial = fs::read_to_string(place.join("rec/initial.toml")).unwrap();
     let command = "fuse rec/imu.csv rec/gnss.csv imu.toml -q -o out --initial i.toml";

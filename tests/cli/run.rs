@@ -607,11 +607,11 @@ fn check_knows_the_files_of_a_fusion_and_speaks_json() {
     let expected = ["an initial state", "60 GNSS fixes", "a trajectory"];
     assert_eq!(found, expected);
     let slow: String = (0..9)
-        .map(|k| format!("{},46.5,6.5,{k}\n", 1000 * k))
+        .map(|k| format!("{},46.5,6.5,{k},0,0,0\n", 1000 * k))
         .collect();
     fs::write(
         place.path().join("ms.csv"),
-        format!("t_s,lat_deg,lon_deg,h_m\n{slow}"),
+        format!("t_s,lat_deg,lon_deg,h_m,roll_deg,pitch_deg,yaw_deg\n{slow}"),
     )
     .unwrap();
     fs::write(

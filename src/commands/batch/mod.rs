@@ -13,6 +13,7 @@ use crate::app::{
     is_path, is_repeated, refused,
 };
 use crate::commands::run::{PreparedRun, Run, block_of, columns};
+use crate::io::file_kind::{self, FileKind};
 use crate::io::toml_file::Source;
 use crate::io::{atomic, input, source};
 use crate::report::{in_order, some};
@@ -393,7 +394,9 @@ impl Study {
             serde_json::from_str(&text).refuse_within(path.display())?
         } else {
             let source = Source::read(path)?;
-            let study: Self = source.get()?;
+            let kinds = [FileKind::Study, FileKind::Scenario];
+            let refused = |e| file_kind::unless(&kinds, path, e);
+            let study: Self = source.get().map_err(refused)?;
             Self {
                 source: Some(source).filter(|_| set.is_empty()),
                 ..study

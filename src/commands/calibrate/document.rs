@@ -146,13 +146,6 @@ impl Calibration {
         let mut note = |importance, place: &str, text: String| {
             notes.push((importance, format!("{place}: {text}")));
         };
-        if let Some(n) = fits.iter().find_map(|o| too_loud(o, settings.rate_hz)) {
-            let text = format!(
-                "N of {} deg/sqrt(h), where catalogued units have 0.02 to 2: columns in degrees are named gyro_x_deg_s",
-                readable(n)
-            );
-            note(Importance::Warning, "gyro", text);
-        }
         for sensor in Sensor::ALL {
             for text in recording_notes(sensor, fits, &self.diagnoses, settings) {
                 note(Importance::Warning, sensor.name(), text);
@@ -190,15 +183,6 @@ fn policy() -> String {
 
 fn is_abnormal(diagnosis: &Diagnosis) -> bool {
     diagnosis.verdict != Verdict::Normal
-}
-
-/// The white noise (deg/√h) of a gyroscope above any in the catalogue (0.02 to 2), such as one in degrees under the name of
-/// radians.
-fn too_loud(outcome: &Outcome, rate_hz: f64) -> Option<f64> {
-    const MOST_DEG_SQRT_H: f64 = 5.0;
-    let n = outcome.practical(rate_hz)?.parameters.walk.density
-        * Quantity::Density.sheet(Sensor::Gyro).1;
-    (outcome.scope.sensor == Sensor::Gyro && n > MOST_DEG_SQRT_H).then_some(n)
 }
 
 /// A row a parameter.

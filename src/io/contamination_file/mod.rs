@@ -89,6 +89,23 @@ fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, Failure> {
             let listed = replicates.map_or(1, Vec::len);
             let values = named[sensor.name()][number - 1].as_table();
             for (name, value) in values.into_iter().flatten() {
+                // what replaces samples may have no spread
+                let is_size = match name.as_str() {
+                    "amplitude" | "share" | "sigma2" => true,
+                    "sigma" => matches!(table.operation, Described::HeavyTails { .. }),
+                    _ => false,
+                };
+                let is_zero = |value: &toml::Value| {
+                    value.as_integer() == Some(0) || value.as_float() == Some(0.0)
+                };
+                let is_nothing = match value.as_array() {
+                    Some(values) => values.iter().all(is_zero),
+                    None => is_zero(value),
+                };
+                if is_size && is_nothing {
+                    let reason = "does nothing: it must not be 0";
+                    return Err(source.refused(&format!("{key}.{name}"), reason));
+                }
                 let count = value.as_array().map_or(listed, Vec::len);
                 if count != listed || value.is_array() && replicates.is_none() {
                     let reason = match replicates {
@@ -388,6 +405,32 @@ mod tests {
             ),
             "c.toml, line 5: \"gyro[1].length_samples\" = 0 is refused: it must be a finite number ≥ 1 | "
         );
+        assert_eq!(
+            step("amplitude = 0"),
+            "c.toml, line 3: \"accel[1].amplitude\" = 0 does nothing: it must not be 0 | "
+        );
+        for (name, rest) in [
+            ("share", "operation = \"replace\"\nsigma = 1"),
+            ("sigma2", "operation = \"ar1\"\nphi = 0.5"),
+            ("sigma", "operation = \"heavy-tails\"\nfreedom = 3"),
+            ("amplitude", "operation = \"drift\""),
+        ] {
+            let said = refusal(&format!("[[gyro]]\n{rest}\n{name} = 0.0\n"));
+            assert!(said.contains("0.0 does nothing"), "{said}");
+        }
+        // some of the replicates alone; outliers of one value
+        for text in [
+            "operation = \"step\"\nreplicates = [1, 2]\namplitude = [0, 1]",
+            "operation = \"replace\"\nshare = 0.1\nsigma = 0\nmean = 1",
+        ] {
+            assert!(
+                parse(
+                    &Source::new("c.toml", &format!("[[gyro]]\n{text}\n")),
+                    100.0
+                )
+                .is_ok()
+            );
+        }
         assert_eq!(meant("section5-2"), Some("section5-I"));
     }
 }

@@ -1,8 +1,9 @@
 //! What `fuse` reads: recorded IMU data, GNSS fixes, an initial state. Our own tables, the headers that
 //! recordings may have, the text files of KF-GINS, the solutions of RTKLIB, the sentences of NMEA 0183.
 
+use super::file_kind::{self, FileKind};
 use super::logs::LogOptions;
-use super::recordings::timing::{median_step, unit_of_step};
+use super::recordings::timing::{UNITS, median_step, unit_of_step};
 use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
 use super::table::{Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table};
 use super::toml_file::Source;
@@ -49,15 +50,43 @@ fn of_file(note: Note, path: &str) -> Note {
     Note { text, ..note }
 }
 
-/// The first row of a table of numbers between blanks without a header; none of any other text.
-pub(super) fn bare_row(text: &str) -> Option<Vec<f64>> {
+/// The first row of a table of numbers without a header, and what separates them; none of any other text.
+pub(super) fn bare_row(text: &str) -> Option<(Vec<f64>, u8)> {
     let mut lines = text.lines().map(str::trim);
     let first = lines.find(|l| !(l.is_empty() || l.starts_with(['#', '%', '/'])))?;
-    let row: Option<Vec<f64>> = first
-        .split_whitespace()
-        .map(|cell| cell.parse().ok())
-        .collect();
-    row.filter(|row| row.len() > 1)
+    let (cells, delimiter) = table::cells(first, &FIXES);
+    let row = cells
+        .iter()
+        .map(|cell| table::number(cell.as_bytes(), delimiter));
+    let row: Vec<f64> = row.collect::<Option<_>>()?;
+    (row.len() > 1).then_some((row, delimiter))
+}
+
+/// Refuses fixes whose times are seconds by their name and thousandths or less by their steps, over as long as the IMU has.
+fn check_unit(table: &Table, imu_s: Option<(f64, f64)>) -> Result<(), Failure> {
+    /// A step between fixes (s) that is no longer one.
+    const LONG_S: f64 = 20.0;
+    let (Some(time), Some((from_s, to_s))) = (table.get("t_s"), imu_s) else {
+        return Ok(());
+    };
+    let t_s: Vec<f64> = (0..table.rows()).map(|row| time.si(row)).collect();
+    let step = median_step(&t_s);
+    let is_meant = |(unit_s, _): &&(f64, &str)| {
+        let span_s = (t_s[t_s.len() - 1] - t_s[0]) * unit_s;
+        (0.5..2.0).contains(&(span_s / (to_s - from_s)))
+    };
+    match UNITS[1..].iter().find(is_meant).filter(|_| step > LONG_S) {
+        Some((_, unit)) => Err(no_seconds(table, time, step, unit)),
+        None => Ok(()),
+    }
+}
+
+/// The refusal of times in another unit than their name says.
+fn no_seconds(table: &Table, time: &Column, step: f64, unit: &str) -> Failure {
+    let name = &time.name;
+    let text = format!("column \"{name}\" has steps of {step} s: they are {unit}");
+    let ending = unit.replace('µ', "u");
+    (table.refused(text)).or_hint(format!("name the column t_{ending}"))
 }
 
 /// Refuses times (s) that stand still or go back; `line` is that of the k-th.
@@ -323,6 +352,17 @@ pub(crate) fn read_gnss(
     clock_s: Option<(f64, f64)>,
     topic: Option<&str>,
 ) -> Result<(Vec<GnssFix>, Vec<Note>), Error> {
+    use FileKind as K;
+    read_fixes(path, unsaid, clock_s, topic)
+        .map_err(|e| file_kind::unless(&[K::Gnss, K::Trajectory, K::Log], path, e))
+}
+
+fn read_fixes(
+    path: &Path,
+    unsaid: Option<&FixSigma>,
+    clock_s: Option<(f64, f64)>,
+    topic: Option<&str>,
+) -> Result<(Vec<GnssFix>, Vec<Note>), Error> {
     let shown = path.display().to_string();
     let (stated, mut remarks) = match logs::kind_of(path) {
         Some(_) => of_log(path, topic, clock_s)?,
@@ -344,6 +384,7 @@ pub(crate) fn read_gnss(
                 (fixes, remarks)
             } else {
                 let table = table::parse(&shown, &text, &FIXES)?;
+                check_unit(&table, clock_s)?;
                 let velocity = match table.has(GEODETIC[2][0]) {
                     true => ", velocity",
                     false => "",
@@ -578,25 +619,38 @@ fn rtklib(path: &str, text: &str, (at, names): (usize, &str)) -> Result<Table, E
         let advice = "write the solution in GPS time (out-timesys = gpst)";
         return Err(refuse(at, "times that are not GPST, UTC or JST", advice));
     };
+    // commas separate cells, or are decimal marks
+    let is_comma = names.contains(',');
+    let (separator, mark) = if is_comma { (",", ",") } else { (" ", ".") };
     // angles in degrees, minutes and seconds take three columns each
     let is_dms = names.contains("d'\"");
     // the time, which takes two columns, in one
-    let (mut whole, mut count) = (String::new(), 0);
+    let (mut whole, mut count) = (String::new(), usize::MAX);
     for (i, line) in text.lines().enumerate() {
-        let cells = line.split([' ', ',', ';', '\t', '%']);
+        let line = line.replace(',', mark);
+        let cells = line.split([' ', ';', '\t', '%']);
+        let cells = cells.flat_map(|cell| cell.split(separator));
         let cells: Vec<&str> = cells.filter(|cell| !cell.is_empty()).collect();
         let is_row = !(line.starts_with('%') || cells.is_empty());
         match cells[..] {
             [_, ref names @ ..] if i == at => {
-                count = names.len();
-                whole += &format!("t_s {}", names.join(" ")).replace("d'\"", "deg");
+                // of commas one more may be a decimal mark
+                count = if is_comma { usize::MAX } else { names.len() };
+                let names = [&["t_s"], names].concat().join(separator);
+                whole += &names.replace("d'\"", "deg");
             }
             [first, second, ref rest @ ..] if is_row => {
                 let angles = [rest.get(..3), rest.get(3..6)].map(|dms| dms.and_then(degrees));
                 let angles = is_dms.then_some(angles).and_then(|[lat, lon]| lat.zip(lon));
                 let row = gps_time_s(first, second, *ahead_s).map(|t_s| match angles {
-                    Some((lat, lon)) => format!("{t_s} {lat} {lon} {}", rest[6..].join(" ")),
-                    None => format!("{t_s} {}", rest[..count.min(rest.len())].join(" ")),
+                    Some((lat, lon)) => {
+                        let angles = [t_s, lat, lon].map(|x| x.to_string());
+                        [angles.join(separator), rest[6..].join(separator)].join(separator)
+                    }
+                    None => {
+                        let rest = rest[..count.min(rest.len())].join(separator);
+                        [&*t_s.to_string(), &rest].join(separator)
+                    }
                 });
                 whole += &row.ok_or_else(|| {
                     let message = "not a row of time, position, quality, satellites and standard deviations";
@@ -717,6 +771,34 @@ mod rtklib_tests {
         near(velocity.down.unwrap().1, 0.025_f64.sqrt());
     }
 
+    /// Decimal commas, of numbers and seconds; commas between the cells too, which are told from them by the header alone.
+    #[test]
+    fn decimal_commas_state_the_same_fixes() {
+        let row = "2021/03/01 00:00:01.250 46.5 -6.50001 400.8 5 8 2.0 2.1 4.0\n";
+        let expected = fixes(&format!("{HEAD}{row}"), None).unwrap().0;
+        let comma = |text: &str| text.replace('.', ",");
+        let listed = |text: &str| {
+            let (date, rest) = text.split_once(' ').unwrap();
+            format!("{date} {}", rest.replace(' ', ","))
+        };
+        let names = HEAD.split_once("%  ").unwrap().1;
+        let names: Vec<&str> = names.split_whitespace().collect();
+        let names = format!("% program\n%  {}\n", names.join(","));
+        for text in [
+            format!("{HEAD}{}", comma(row)),
+            format!("{HEAD}{}", comma(row).replace(' ', ";")),
+            format!("{names}{}", listed(row)),
+        ] {
+            assert_eq!(fixes(&text, None).unwrap().0, expected, "{text}");
+        }
+        let both = fixes(&format!("{names}{}", listed(&comma(row))), None).unwrap_err();
+        assert!(
+            both.to_string()
+                .contains("line 3: commas separate the cells"),
+            "{both}"
+        );
+    }
+
     /// 2021-03-01 was a Monday, the second day of GPS week 2147.
     #[test]
     fn dates_and_weeks_are_one_clock() {
@@ -797,6 +879,8 @@ mod rtklib_tests {
 
 /// A step this many times the median one is a gap.
 const GAP: f64 = 1.5;
+/// A step from which on it is no IMU's (s).
+const SLOWEST_S: f64 = 2.0;
 /// Mean angular rate above which the unit is doubted (rad/s).
 const FAST: f64 = 2.0;
 
@@ -847,7 +931,10 @@ pub(crate) fn read_imu(
     let names = [
         "t_s", "accel.x", "accel.y", "accel.z", "gyro.x", "gyro.y", "gyro.z",
     ];
-    let [time, signals @ ..] = table.columns(names)?;
+    let [time, signals @ ..] = table.columns(names).map_err(|refusal| {
+        let misspelt = recordings::facts::misspelt(&table, |_| true).into_iter();
+        misspelt.fold(refusal, Failure::hint)
+    })?;
     let unit_s = |values| unit_of_step(median_step(values)).0;
     let unit_s = time.factor.unwrap_or_else(|| unit_s(&time.values));
     let from_gravity = gravity_factor(&table)?;
@@ -868,6 +955,9 @@ pub(crate) fn read_imu(
     }
     increasing(&table.path, |k| table.line(k), t_s.iter().copied())?;
     let step = median_step(&t_s);
+    if step > SLOWEST_S && time.factor == Some(1.0) {
+        return Err(no_seconds(&table, time, step, unit_of_step(step).1));
+    }
     let since_s = |k: usize| if k == 0 { step } else { t_s[k] - t_s[k - 1] };
     let samples = (0..t_s.len()).map(|k| {
         // those after a hole last a step like any other

@@ -53,8 +53,8 @@ pub(crate) fn is_nmea(text: &str) -> bool {
 
 impl Log {
     /// A sentence, whatever a logger wrote before it in its line.
-    fn sentence(&mut self, line: u64, text: &str) -> Result<(), &'static str> {
-        let fields = fields(text)?;
+    fn sentence(&mut self, line: u64, text: &str, is_summed: bool) -> Result<(), &'static str> {
+        let fields = fields(text, is_summed)?;
         let field = |i: usize| fields.get(i).copied().unwrap_or_default();
         let number = |i: usize| field(i).parse::<f64>().ok();
         let kind = field(0).get(2..).unwrap_or_default();
@@ -135,10 +135,11 @@ pub(super) fn fixes(
     let mut log = Log::default();
     let lines = (1..).zip(text.lines().map(str::trim));
     let lines: Vec<(u64, &str)> = lines.filter(|(_, line)| !line.is_empty()).collect();
+    let is_summed = lines.iter().any(|(_, line)| line.contains('*'));
     let ends = [lines.first(), lines.last()].map(|end| end.map(|(i, _)| *i));
     for (i, line) in lines {
         // cut at its ends by whatever logged it
-        if let Err(message) = log.sentence(i, line)
+        if let Err(message) = log.sentence(i, line, is_summed)
             && !ends.contains(&Some(i))
         {
             let found: String = line.chars().take(60).collect();
@@ -170,6 +171,10 @@ pub(super) fn fixes(
     }
     let text = format!("NMEA sentences: {count} fixes, times are {clock}");
     let mut remarks = vec![remark(text)];
+    if !is_summed {
+        let text = "no sentence has a checksum: damaged digits go unseen";
+        remarks.push(doubt(text));
+    }
     if vel_sigma.is_none() && log.epochs.iter().any(|e| e.velocity.is_some()) {
         let text =
             "speed and course are not used without standard deviations: --gnss-sigma 2,2,4:0.1";
@@ -190,8 +195,11 @@ fn body(line: &str) -> Result<&str, &'static str> {
         .ok_or("not a sentence: it has no $")
 }
 
-/// The fields of a sentence whose checksum is right: what is between `$` and `*`, a XOR of its bytes.
-fn fields(line: &str) -> Result<Vec<&str>, &'static str> {
+/// The fields of a sentence whose checksum is right: what is between `$` and `*`, a XOR of its bytes; of logs without any, all.
+fn fields(line: &str, is_summed: bool) -> Result<Vec<&str>, &'static str> {
+    if !is_summed {
+        return Ok(body(line)?.split(',').collect());
+    }
     let whole = body(line)?.rsplit_once('*');
     let summed = whole.and_then(|(body, sum)| Some((body, u8::from_str_radix(sum, 16).ok()?)));
     let (body, sum) = summed.ok_or("a sentence without its checksum")?;

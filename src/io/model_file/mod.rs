@@ -446,19 +446,9 @@ impl ModelFile {
 /// When the file cannot be read, is not TOML, has unknown keys, lacks some, or has values outside their
 /// domains.
 pub fn read(path: &Path) -> Result<ModelFile, Failure> {
-    parse(&Source::read(path)?).map_err(|e| {
-        use FileKind as K;
-        match file_kind::of(path) {
-            Ok(K::Trajectory | K::Recording | K::Imu | K::Gnss | K::Curve | K::Record) => {
-                e.hint(NOT_A_MODEL)
-            }
-            _ => e,
-        }
-    })
+    let refused = |e| file_kind::unless(&[FileKind::Model], path, e);
+    parse(&Source::read(path)?).map_err(refused)
 }
-
-/// For a file of another kind in the place of a model.
-const NOT_A_MODEL: &str = "a model is a TOML file, as calibrate and datasheet write them: are the arguments in another order?";
 
 /// A model file's text, at the path that messages show.
 ///

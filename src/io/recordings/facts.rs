@@ -7,8 +7,8 @@ use crate::io::{Failure, Place, help};
 use crate::report::{readable, six_digits};
 use nav_sim_calibration::percent;
 use nav_sim_signal::facts::{self, Marks, Repeats};
-use nav_sim_signal::imu::{Recording, Sensor};
-use nav_sim_signal::noise::{Kind, Model, Process};
+use nav_sim_signal::imu::{Recording, Sensor, Signal};
+use nav_sim_signal::noise::{Composite, Kind, Model, Process};
 use nav_sim_signal::units::{DEG, STANDARD_GRAVITY};
 use std::fmt::Display;
 use std::ops::Range;
@@ -158,6 +158,7 @@ pub(super) fn repair(
         ..Repair::default()
     };
     report.warnings.extend(drop_copies(table));
+    report.warnings.extend(copied(table));
     let (zero, text) = lost(table);
     let is_lossy = text.is_some();
     if let (Gaps::Refuse, Some(text)) = (options.gaps, &text) {
@@ -327,18 +328,12 @@ impl Repair {
     /// Warns of stretches of one value, now that the rate is known.
     pub(super) fn warn_of_frozen(&self, rate_hz: f64, report: &mut FileReport) {
         for channel in Channel::ALL {
-            let own = || self.frozen.iter().filter(|(c, ..)| *c == channel);
-            let Some((_, value, rows)) = own().next() else {
-                continue;
-            };
-            let [from, to] = [rows.start, rows.end].map(|row| six_digits(row as f64 / rate_hz));
-            let more = match own().count() - 1 {
-                0 => String::new(),
-                n => format!(", and {n} more such stretches"),
-            };
-            report.warn(format!(
-                "{channel} holds {value} from {from} s to {to} s{more}: left out as missing"
-            ));
+            let own = self.frozen.iter().filter(|(c, ..)| *c == channel);
+            let own: Vec<_> = own.map(|(_, value, rows)| (*value, rows.clone())).collect();
+            let text = holds(channel, &own, rate_hz);
+            report
+                .warnings
+                .extend(text.map(|text| format!("{text}: left out as missing")));
         }
     }
 }
@@ -360,15 +355,20 @@ pub(super) fn examine(recording: &Recording, report: &mut FileReport) -> Result<
             "moves in {moving} of its {seconds} seconds, or was knocked"
         ));
     }
-    for signal in &recording.signals {
-        let (channel, [quietest, _]) = (signal.channel, range(signal.channel.sensor));
-        let found = facts::white_noise(&signal.samples, recording.rate_hz);
-        if let Some(n) = found.filter(|n| *n < 0.1 * quietest) {
-            let [n, quietest] = [n, quietest].map(|n| in_hours(channel.sensor, n));
-            report.warn(format!(
-                "{channel}: N {n}, below a tenth of the quietest units' {quietest}: wrong unit, or increments named rates?"
-            ));
-        }
+    let noise = |signal: &Signal| facts::white_noise(&signal.samples, recording.rate_hz);
+    let signals = recording.signals.iter();
+    let found = signals.filter_map(|signal| Some((signal.channel, noise(signal)?)));
+    let found: Vec<(Channel, f64)> = found.collect();
+    report.warnings.extend(exchanged(&found));
+    for (channel, n) in found {
+        let noisiest = range(channel.sensor)[1];
+        let is_loud = n > NOISIER * noisiest;
+        let [shown, noisiest] = [n, noisiest].map(|n| in_hours(channel.sensor, n));
+        let loud = format!(
+            "{channel}: N {shown}, above three times the noisiest units' {noisiest}: wrong unit, or vibration?"
+        );
+        report.warnings.extend(is_loud.then_some(loud));
+        report.warnings.extend(quiet(channel, n));
     }
     Ok(())
 }
@@ -382,6 +382,9 @@ const fn range(sensor: Sensor) -> [f64; 2] {
     }
 }
 
+/// Noise over that of the noisiest unit from which on it is none of a unit.
+const NOISIER: f64 = 3.0;
+
 /// White noise as data sheets have it.
 fn in_hours(sensor: Sensor, n: f64) -> String {
     match sensor {
@@ -390,24 +393,103 @@ fn in_hours(sensor: Sensor, n: f64) -> String {
     }
 }
 
-/// Sensors of a model whose white noise is over three times that of the noisiest unit, or under a third of the quietest's.
+/// A warning of the white noise (units·√s) of a channel that is below that of any unit.
+fn quiet(channel: Channel, n: f64) -> Option<String> {
+    let [quietest, _] = range(channel.sensor);
+    let is_quiet = n < 0.1 * quietest;
+    let [n, quietest] = [n, quietest].map(|n| in_hours(channel.sensor, n));
+    is_quiet.then(|| format!("{channel}: N {n}, below a tenth of the quietest units' {quietest}: wrong unit, or increments named rates?"))
+}
+
+/// A warning of white noises (units·√s) of which none of an accelerometer is above one of a gyroscope: in SI units they are 3.4
+/// (MTi-300) to 143 times (DMU41) as large in the catalogue, and more in units with optical gyroscopes.
+fn exchanged(found: &[(Channel, f64)]) -> Option<String> {
+    let of = |sensor| {
+        let own = found
+            .iter()
+            .filter(move |(c, n)| c.sensor == sensor && *n > 0.0);
+        own.map(|(_, n)| *n)
+    };
+    let (accel, gyro) = (
+        of(Sensor::Accel).reduce(f64::max)?,
+        of(Sensor::Gyro).reduce(f64::min)?,
+    );
+    let [of_accel, of_gyro] =
+        [(Sensor::Accel, accel), (Sensor::Gyro, gyro)].map(|(s, n)| in_hours(s, n));
+    (accel < gyro).then(|| {
+        format!(
+            "accel N {of_accel} beside gyro N {of_gyro}: sensors exchanged, or deg/s named rad/s?"
+        )
+    })
+}
+
+/// Sensors of a model whose noise is none of a unit: white noise over three times that of the noisiest or under a third of the
+/// quietest's over 1 s, a random walk that rules from a third of a second on.
 pub(crate) fn out_of_range(model: &Model) -> Vec<String> {
+    let deviation = |noise: &Composite, t_s: f64| {
+        let samples = (t_s * model.rate_hz).round().max(1.0);
+        noise.allan_variance(samples as u32).sqrt()
+    };
+    let noises = || {
+        Channel::ALL
+            .into_iter()
+            .map(|c| (c, &model.axes[c.index()]))
+    };
+    let found: Vec<(Channel, f64)> = noises()
+        .map(|(c, noise)| (c, deviation(noise, 1.0)))
+        .collect();
     let of = |sensor: Sensor| {
-        let channels = Channel::ALL.into_iter().filter(|c| c.sensor == sensor);
-        let white = |c: Channel| {
-            let all = model.axes[c.index()].processes.iter();
-            let white = all.filter(|process| process.kind() == Kind::White);
-            (white.map(Process::amplitude).sum::<f64>() / model.rate_hz).sqrt()
+        let own = || {
+            noises()
+                .filter(move |(c, _)| c.sensor == sensor)
+                .map(|(_, noise)| noise)
         };
         let [low, high] = range(sensor);
-        let is_out = |n: &f64| *n > 0.0 && !(low / 3.0..=3.0 * high).contains(n);
-        let n = in_hours(sensor, channels.map(white).find(is_out)?);
-        let [low, high] = [low, high].map(|n| in_hours(sensor, n));
-        Some(format!(
-            "{sensor} N {n}, units have {low} to {high}: sigma2 is the variance of a sample at rate_hz"
-        ))
+        let is_out = |n: &f64| *n > 0.0 && !(low / 3.0..=NOISIER * high).contains(n);
+        if let Some(n) = own().map(|noise| deviation(noise, 1.0)).find(is_out) {
+            let [n, low, high] = [n, low, high].map(|n| in_hours(sensor, n));
+            let why = "wrong unit, or a standard deviation for a variance?";
+            return Some(format!(
+                "{sensor} N {n} over 1 s, units have {low} to {high}: {why}"
+            ));
+        }
+        let walks = |noise: &Composite| {
+            let is_walk = |process: &Process| process.kind() == Kind::RandomWalk;
+            let (walk, rest) = noise
+                .processes
+                .iter()
+                .cloned()
+                .partition::<Vec<_>, _>(is_walk);
+            let [walk, rest] = [walk, rest].map(|own| deviation(&Composite::new(own), 0.3));
+            rest > 0.0 && walk > rest
+        };
+        let text = "random walk exceeds the other noise from 0.3 s on: gamma2 is the variance of an increment";
+        own().any(walks).then(|| format!("{sensor} {text}"))
     };
-    Sensor::ALL.into_iter().filter_map(of).collect()
+    let each = Sensor::ALL.into_iter().filter_map(of);
+    exchanged(&found).into_iter().chain(each).collect()
+}
+
+/// A column of one value, in words.
+pub(super) fn dead(column: &Column) -> Option<String> {
+    let [value, others @ ..] = &column.values[..] else {
+        return None;
+    };
+    let is_same = |other: &f64| other.to_bits() == value.to_bits();
+    let (name, channel) = (&column.name, column.quantity.name);
+    (!others.is_empty() && others.iter().all(is_same))
+        .then(|| format!("{channel} (column \"{name}\") is dead: every sample is {value}"))
+}
+
+/// A warning of an axis that is another one once more.
+fn copied(table: &Table) -> Option<String> {
+    let all: Vec<(Channel, &[f64])> = signals(table).collect();
+    let axes: Vec<&[f64]> = all.iter().map(|(_, values)| *values).collect();
+    let (first, later) = facts::copied(&axes)?;
+    let [first, later] = [first, later].map(|k| all[k].0);
+    Some(format!(
+        "{later} has the samples of {first}: one axis was written twice"
+    ))
 }
 
 /// Leaves copies and lost samples out of a recording under way; warnings of it.
@@ -415,13 +497,45 @@ pub(crate) fn repair_drive(table: &mut Table) -> Vec<String> {
     let mut warnings: Vec<String> = drop_copies(table).into_iter().collect();
     let (zero, text) = lost(table);
     leave_out(table, &zero);
+    let is_lossy = text.is_some();
     warnings.extend(text);
     let rate_hz = rate_of_rows(table, &ReadOptions::default()).unwrap_or(f64::NAN);
     for (sensor, repeats) in repeats_of(table) {
         warnings.extend(repeats.map(|repeats| repeated(sensor, &repeats, rate_hz)));
     }
     warnings.extend(signals(table).find_map(|(channel, values)| interpolated(channel, values)));
+    warnings.extend(copied(table));
+    for column in &table.columns {
+        let (Some(channel), values) = (channel_of(column), &column.values) else {
+            continue;
+        };
+        let frozen: Vec<_> = facts::frozen(values);
+        let frozen = frozen.into_iter().map(|rows| (values[rows.start], rows));
+        let factor = column.factor.filter(|_| !column.quantity.per_sample);
+        let noise = || Some(factor? * facts::white_noise(values, rate_hz)?);
+        let all = [
+            dead(column),
+            holds(channel, &frozen.collect::<Vec<_>>(), rate_hz),
+            zeros(channel, values).filter(|_| !is_lossy),
+            clipped(channel, values),
+            noise().and_then(|n| quiet(channel, n)),
+        ];
+        warnings.extend(all.into_iter().flatten());
+    }
     warnings
+}
+
+/// Stretches in which a channel holds a value, in words.
+fn holds(channel: Channel, stretches: &[(f64, Range<usize>)], rate_hz: f64) -> Option<String> {
+    let (value, rows) = stretches.first()?;
+    let [from, to] = [rows.start, rows.end].map(|row| six_digits(row as f64 / rate_hz));
+    let more = match stretches.len() - 1 {
+        0 => String::new(),
+        n => format!(", and {n} more such stretches"),
+    };
+    Some(format!(
+        "{channel} holds {value} from {from} s to {to} s{more}"
+    ))
 }
 
 /// Marks of the samples of each sensor.

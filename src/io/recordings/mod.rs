@@ -4,12 +4,12 @@
 //! what was assumed, is told in the [`Report`]. What cannot be right is refused with file and line
 //! ([`Failure`]).
 
-use super::fusion_files::FIXES;
+use super::file_kind::{self, FileKind};
 use super::input::listed;
 use super::logs::LogOptions;
 use super::table::{
     ACCELERATION, ANGLE, ANGULAR_RATE, Bare, Column, Dictionary, INSTANCE, NO_COLUMN, Quantity,
-    SENSOR_LOGGER, TICKS, TIME, Table, Units, find, is_oxts, unreadable,
+    SENSOR_LOGGER, TICKS, TIME, Table, Units, is_oxts, unreadable,
 };
 use super::{Failure, Place, help, table};
 use crate::report::six_digits;
@@ -171,6 +171,16 @@ pub(crate) fn load(
     options: &ReadOptions,
     dictionary: &Dictionary<'_>,
 ) -> Result<Table, Failure> {
+    use FileKind as K;
+    load_signals(path, options, dictionary)
+        .map_err(|e| file_kind::unless(&[K::Recording, K::Imu, K::Log], path, e))
+}
+
+fn load_signals(
+    path: &Path,
+    options: &ReadOptions,
+    dictionary: &Dictionary<'_>,
+) -> Result<Table, Failure> {
     let wanted = options.channels.as_ref();
     let is_unwanted = |q: &Quantity| {
         let own = Channel::named(q.name);
@@ -227,15 +237,6 @@ pub(crate) fn load(
             .take(20)
             .map(|name| format!("\"{}\"", table::shown(name, 40)))
             .collect();
-        let is_place =
-            |name: &String| find(FIXES.quantities, name).is_some_and(|(q, _)| q.name == "lat_deg");
-        if table.ignored.iter().any(is_place) {
-            let message = "is a table of positions, no recording of an IMU";
-            let refusal = Failure::contents(&table.path, Place::Itself, message);
-            return Err(refusal.passing_over(NO_COLUMN).or_hint(
-                "name a file with accelerometers or gyroscopes; fuse takes positions as its second file",
-            ));
-        }
         let message = format!(
             "no accelerometer or gyroscope column among {}",
             names.join(", ")
@@ -691,18 +692,12 @@ const SMALLEST: f64 = 1e-45;
 fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
     let from_gravity = gravity_factor(raw)?;
     let factor = |column: &Column| {
-        let channel = column.quantity.name;
-        let [value, others @ ..] = &column.values[..] else {
-            return Ok(1.0);
-        };
-        let is_same = |other: &f64| other.to_bits() == value.to_bits();
-        if !others.is_empty() && others.iter().all(is_same) {
-            let name = &column.name;
-            let message = format!("{channel} (column \"{name}\") is dead: every sample is {value}");
+        if let Some(message) = facts::dead(column) {
             return Err(Failure::contents(&raw.path, Place::Within, message)
                 .or_option(help::CHANNELS)
                 .or_hint("record again"));
         }
+        let channel = column.quantity.name;
         let largest = column
             .values
             .iter()

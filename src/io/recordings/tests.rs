@@ -318,7 +318,7 @@ fn headers_that_do_not_help() {
     );
     assert_eq!(
         refusal("time,lat_deg\n0,1\n"),
-        "a.csv is a table of positions, no recording of an IMU"
+        "a.csv, line 1: no accelerometer or gyroscope column among \"time\", \"lat_deg\""
     );
     assert_eq!(
         refusal("time,ticks\n0,1\n"),

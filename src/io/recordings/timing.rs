@@ -92,6 +92,12 @@ const DISAGREEING: f64 = 0.01;
 /// Share of gaps, and of samples lost in them, up to which gaps are those of lost samples: coarse stamps jump more often.
 const MOST_LOST: f64 = 0.1;
 
+/// The same where stamps stray from even ones, which coarse stamps do not.
+const MOST_STRAYED: f64 = 0.4;
+
+/// Samples of a stretch from which on it is a recording.
+const STRETCH: usize = 64;
+
 /// Time of each sample.
 struct Clock {
     name: String,
@@ -108,6 +114,8 @@ struct Clock {
     step: f64,
     /// True if the irregular steps are gaps that lost samples leave; late samples are followed by short steps.
     is_lossy: bool,
+    /// Share of samples lost up to which they are left out.
+    most_lost: f64,
 }
 
 impl Clock {
@@ -118,11 +126,16 @@ impl Clock {
         let steps: Vec<f64> = since.windows(2).map(|w| w[1] - w[0]).collect();
         let median = median_step(&since);
         let long = steps.iter().filter(|s| **s > 1.5 * median).count();
+        let even = since.last().unwrap_or(&0.0) / steps.len().max(1) as f64;
+        let mut strays = (0..).zip(&since).map(|(k, s)| s - f64::from(k) * even);
+        // samples that come in bursts have short steps
+        let is_lost = even < 4.0 * median && strays.any(|s| s.abs() > 4.0 * median);
+        let most_lost = if is_lost { MOST_STRAYED } else { MOST_LOST };
         let is_lossy = long > 0
-            && (long as f64) < MOST_LOST * since.len() as f64
+            && (long as f64) < most_lost * since.len() as f64
             && !steps.iter().any(|s| *s < 0.5 * median);
         let step = match gaps {
-            Gaps::Ignore if !is_lossy => since.last().unwrap_or(&0.0) / steps.len().max(1) as f64,
+            Gaps::Ignore if !is_lossy => even,
             _ => median,
         };
         Self {
@@ -135,6 +148,7 @@ impl Clock {
             median,
             step,
             is_lossy,
+            most_lost,
         }
     }
 
@@ -201,9 +215,18 @@ impl Clock {
             };
             let step = rounded(self.median * self.unit_s);
             let message = format!("{what}, the median step is {step} s{more}");
-            return Err(Failure::contents(&raw.path, line, message)
-                .or_option(help::GAPS)
-                .or_without(help::GAPS_ELSEWHERE));
+            let refusal = Failure::contents(&raw.path, line, message);
+            let ends = [0].into_iter().chain(breaks.iter().copied());
+            let after = breaks.iter().copied().chain([self.since.len()]);
+            let longest = ends.zip(after).map(|(from, to)| to - from).max();
+            let is_lost = self.most_lost == MOST_STRAYED;
+            return Err(match longest.is_some_and(|n| n >= STRETCH) {
+                _ if !is_lost => refusal.or_option(help::GAPS),
+                true => refusal.or_option(help::GAPS_LOST),
+                false if self.is_lossy => refusal.or_option(help::GAPS_KEEP),
+                false => refusal.or_hint("record again: too many samples are lost"),
+            }
+            .or_without(help::GAPS_ELSEWHERE));
         }
         if let Some(means) = self.drift().filter(|_| !stands_still) {
             let [first, last] = means.map(|step| six_digits(self.rate_hz(step)));
@@ -275,7 +298,7 @@ impl Clock {
         let lost = |i: &usize| (*i, ((step(i) / regular).round() as usize).max(2) - 1);
         let holes: Vec<(usize, usize)> = breaks.iter().map(lost).collect();
         let lost: usize = holes.iter().map(|(_, lost)| lost).sum();
-        ((lost as f64) < MOST_LOST * (lost + self.since.len()) as f64).then_some(holes)
+        ((lost as f64) < self.most_lost * (lost + self.since.len()) as f64).then_some(holes)
     }
 
     /// Steps of the first and the last tenth, where they differ by more than 1 % and what single stamps may be off by.
@@ -320,7 +343,7 @@ pub(crate) fn median_step(times: &[f64]) -> f64 {
 const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 0.5..=20_000.0;
 
 /// The units of time and their length (s).
-const UNITS: [(f64, &str); 4] = [(1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")];
+pub(crate) const UNITS: [(f64, &str); 4] = [(1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")];
 
 /// The unit in which a step is that of 10 Hz … 10 kHz: the four ranges do not overlap.
 pub(crate) fn unit_of_step(step: f64) -> (f64, &'static str) {

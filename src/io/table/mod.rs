@@ -421,7 +421,8 @@ impl Table {
                 first.name,
                 first.values.len()
             );
-            return Err(Failure::contents(self.path, Place::Within, message));
+            return Err(Failure::contents(self.path, Place::Within, message)
+                .or_hint("write all columns with the same number of rows"));
         }
         if self.columns.first().is_some_and(|c| c.values.is_empty()) {
             return Err(empty(&self.path));
@@ -697,6 +698,9 @@ impl Head {
         };
         // lines of words, of which one is the header where none names a quantity
         let mut words: Vec<(u64, Vec<String>)> = Vec::new();
+        // lines of numbers that no header fits, and the refusal of the first
+        let mut counts: Vec<usize> = Vec::new();
+        let mut refusal = None;
         while lines.next()? && lines.number <= MOST_BEFORE {
             let line = lines.number;
             if let Some(what) = no_text(&lines.line) {
@@ -720,18 +724,17 @@ impl Head {
                 continue;
             }
             let inside = text.trim_start_matches(['#', '%']).trim();
-            let delimiter = delimiter_of(inside, dictionary);
-            let cells = words_of(inside, delimiter);
+            let (cells, delimiter) = cells(inside, dictionary);
             if cells.is_empty() {
                 continue;
             }
             if let Some(first) = cells.first().filter(|cell| cell.starts_with('$')) {
                 return head.of_sentences(lines.path, line, first, cells.len(), dictionary);
             }
-            let known = |cell: &&String| {
+            let is_known = |cell: &str| {
                 find(dictionary.quantities, cell).is_some_and(|(q, _)| q.rank.is_none())
             };
-            let known = cells.iter().filter(known).count();
+            let known = cells.iter().filter(|cell| is_known(cell)).count();
             let is_number = |cell: &&String| number(cell.as_bytes(), delimiter).is_some();
             let numbers = cells.iter().filter(is_number).count();
             // words between blanks may be those of a sentence
@@ -755,17 +758,30 @@ impl Head {
                     }
                     return Ok(head);
                 }
-                if !words.is_empty() && dictionary.names.is_none() {
-                    break;
-                }
                 head.is_bare = dictionary.names.is_none();
                 let names = dictionary.names.map(<[String]>::to_vec);
-                let names = names.or_else(|| layout(dictionary.bare, cells.len()));
+                let bare = || {
+                    layout(dictionary.bare, cells.len())
+                        .filter(|_| words.is_empty() && counts.is_empty())
+                };
+                if let Some(names) = names.or_else(bare) {
+                    head.names = names;
+                    return Ok(head);
+                }
+                if words
+                    .iter()
+                    .any(|(_, cells)| cells.iter().any(|c| is_known(c)))
+                {
+                    break;
+                }
+                counts.push(cells.len());
                 let no_header = || no_header(lines.path, line, text, cells.len(), dictionary);
-                head.names = names.ok_or_else(no_header)?;
-                return Ok(head);
+                refusal.get_or_insert_with(no_header);
+                head.has_row = false;
+                continue;
             }
-            if is_header && dictionary.names.is_none() {
+            if is_header && !counts.contains(&cells.len()) && dictionary.names.is_none() {
+                head.is_bare = false;
                 head.names = cells;
                 while lines.next()? && lines.line.trim_ascii().is_empty() {}
                 let below = split(&lines.line, delimiter);
@@ -782,6 +798,9 @@ impl Head {
         }
         // what names no quantity is the header all the same: its reader says what it lacks
         let first = words.into_iter().next();
+        if let (None, Some(refusal)) = (&first, refusal) {
+            return Err(refusal);
+        }
         (head.line, head.names) = first.ok_or_else(|| empty(lines.path))?;
         Ok(head)
     }
@@ -862,12 +881,23 @@ impl Head {
             } else if cells.iter().all(is_empty) {
             } else if cells.len() < expected || !cells[expected..].iter().all(is_empty) {
                 let found = cells.len();
+                let is_split =
+                    |cell: &Cow<'_, [u8]>| number(cell, b',').is_some() && !cell.contains(&b'.');
+                let is_mark = self.delimiter == b','
+                    && (expected + 1..=2 * expected).contains(&found)
+                    && cells.iter().all(is_split);
                 while lines.next()? && lines.line.trim_ascii().is_empty() {}
                 // a logger that lost its power within a row
                 if found < expected && row > 0 && lines.line.is_empty() {
                     let text = format!("line {line}, the last, is cut off: left out");
                     table.assumptions.push(text);
                     return Ok(());
+                }
+                if is_mark {
+                    let message = "commas separate the cells and are their decimal marks";
+                    return Err(Failure::contents(path, line, message).or_hint(
+                        "write decimals with a point, or separate the cells with semicolons",
+                    ));
                 }
                 return Err(Failure::row_length(path, line, found, expected));
             } else {
@@ -917,9 +947,17 @@ fn no_header(
         "name its {count} columns: --columns {}",
         names.unwrap_or_else(|| "t_s,accel_x_m_s2,…".to_owned())
     );
-    Failure::contents(path, line, message)
-        .or_hint(dictionary.advice)
-        .or_option(("columns", option))
+    let refusal = Failure::contents(path, line, message).or_hint(dictionary.advice);
+    match dictionary.array {
+        [] => refusal,
+        _ => refusal.or_option(("columns", option)),
+    }
+}
+
+/// The cells of a line as words, and what separates them.
+pub(super) fn cells(line: &str, dictionary: &Dictionary<'_>) -> (Vec<String>, u8) {
+    let delimiter = delimiter_of(line, dictionary);
+    (words_of(line, delimiter), delimiter)
 }
 
 /// The cells of a line as words, without empty ones at its end.
@@ -944,17 +982,21 @@ fn rate_in(comment: &str) -> Option<f64> {
 }
 
 /// The separator of the cells of a line: the most frequent of comma, semicolon and tab, of equals the last; but of n cells
-/// between semicolons or tabs each may have a decimal comma. Blanks do only where nothing else does and they are not inside
-/// one name.
+/// between semicolons, tabs or blanks each may have a decimal comma. Blanks do only where nothing else does and they are not
+/// inside one name.
 fn delimiter_of(line: &str, dictionary: &Dictionary<'_>) -> u8 {
     let count = |d: u8| line.bytes().filter(|b| *b == d).count();
     let [commas, semicolons, tabs] = [b',', b';', b'\t'].map(count);
     let others = semicolons.max(tabs);
     let is_spaced = count(b' ') > 0 && find(dictionary.quantities, line).is_none();
+    let is_number = |cell: &str| {
+        !(cell.starts_with(',') || cell.ends_with(',')) && number(cell.as_bytes(), b' ').is_some()
+    };
+    let are_numbers = || line.split_whitespace().all(is_number);
     match () {
         () if others > 0 && tabs >= semicolons && commas <= others + 1 => b'\t',
         () if others > 0 && commas <= others + 1 => b';',
-        () if commas == 0 && is_spaced => b' ',
+        () if is_spaced && (commas == 0 || are_numbers()) => b' ',
         () => b',',
     }
 }

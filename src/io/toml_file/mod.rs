@@ -111,8 +111,19 @@ impl Source {
             true => "beyond 9223372036854775807, the largest whole number",
             false => e.message(),
         };
+        let text = self.text.lines().nth(line - 1).unwrap_or_default();
+        let mut values = text.split('=').skip(1).map(str::trim_start);
+        let is_decimal = |value: &str| {
+            let (whole, rest) = value.split_once(',')?;
+            let is_digits = whole.trim_start_matches(['+', '-']).parse::<u64>().is_ok();
+            let digit = rest.chars().next().filter(char::is_ascii_digit);
+            digit.filter(|_| is_digits)
+        };
+        let is_comma = values.any(|value| is_decimal(value).is_some());
         let written = shown(written, 40);
-        self.at(line, format!("{message}: \"{written}\""))
+        let refusal = self.at(line, format!("{message}: \"{written}\""));
+        let hint = is_comma.then(|| "write decimals with a point: 0.5, not 0,5".to_owned());
+        refusal.or_hint_if(hint)
     }
 
     /// The line (from 1) a byte stands in.

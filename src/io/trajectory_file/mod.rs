@@ -1,5 +1,6 @@
 //! Trajectory files: CSV, motion profiles (TOML), imports.
 
+use super::file_kind::{self, FileKind};
 use super::fusion_files::{
     SD_D, SD_E, SD_N, SD_VD, SD_VE, SD_VN, WEEK_S, check_jump, doubt_degrees, increasing, is_nmea,
     is_rtklib, read_gnss,
@@ -44,10 +45,12 @@ const KNOWN: &str =
 /// # Errors
 /// Whatever is wrong with the file, with its line.
 pub fn load(path: &Path, origin: Option<[f64; 3]>) -> Result<(Trajectory, Vec<String>), Failure> {
-    match read(path, origin, false)? {
-        None => Ok((profile::load(path)?, Vec::new())),
-        Some(rows) => rows.trajectory(),
-    }
+    let found = match read(path, origin, false) {
+        Ok(None) => profile::load(path).map(|profile| (profile, Vec::new())),
+        Ok(Some(rows)) => rows.trajectory(),
+        Err(e) => Err(e),
+    };
+    found.map_err(unless_other(path))
 }
 
 /// Reads a trajectory that is only compared with. Where its position or attitude jumps as no vehicle does, where
@@ -60,10 +63,17 @@ pub(crate) fn load_reference(
     path: &Path,
     origin: Option<[f64; 3]>,
 ) -> Result<(Reference, Vec<String>), Failure> {
-    match read(path, origin, true)? {
-        None => Ok((profile::load(path)?.into(), Vec::new())),
-        Some(rows) => rows.reference(),
-    }
+    let found = match read(path, origin, true) {
+        Ok(None) => profile::load(path).map(|profile| (profile.into(), Vec::new())),
+        Ok(Some(rows)) => rows.reference(),
+        Err(e) => Err(e),
+    };
+    found.map_err(unless_other(path))
+}
+
+/// The refusal of a file that may be no trajectory.
+fn unless_other(path: &Path) -> impl Fn(Failure) -> Failure {
+    move |e| file_kind::unless(&[FileKind::Trajectory, FileKind::Gnss], path, e)
 }
 
 /// The rows of a file; none of a motion profile.

@@ -1,8 +1,7 @@
 //! Motion profiles in TOML.
 
-use crate::io::file_kind::FileKind;
+use crate::io::Failure;
 use crate::io::toml_file::Source;
-use crate::io::{Failure, file_kind};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::profile::{Bank, Kind, Profile, Segment, Start};
 use nav_sim_signal::units::{Between, Positive};
@@ -48,10 +47,7 @@ pub(crate) fn schema() -> serde_json::Value {
 }
 
 pub(super) fn load(path: &Path) -> Result<Trajectory, Failure> {
-    build(&Source::read(path)?).map_err(|e| match file_kind::of(path) {
-        Ok(FileKind::Model) => e.hint("this is a noise model: are the arguments in another order?"),
-        _ => e,
-    })
+    build(&Source::read(path)?)
 }
 
 pub(super) fn build(source: &Source) -> Result<Trajectory, Failure> {

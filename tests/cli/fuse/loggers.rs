@@ -222,7 +222,7 @@ fn files_of_other_kinds_are_named() {
         "fuse rec/imu.csv rec/gnss.csv rec/gnss.csv -o out",
     );
     assert!(
-        ran.code == 2 && ran.stderr.contains("hint: a model is a TOML file"),
+        ran.code == 2 && ran.stderr.contains("hint: it holds GNSS fixes"),
         "{}",
         ran.stderr
     );

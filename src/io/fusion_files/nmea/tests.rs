@@ -82,9 +82,15 @@ fn sentences_of_the_manuals() {
         (DVec2::splat(0.1), None, DVec3::new(2.0, 2.0, 4.0))
     );
     // Trimble's, and u-blox's
-    assert!(fields("$GPGST,172814.0,0.006,0.023,0.020,273.6,0.023,0.020,0.031*6A").is_ok());
-    assert!(fields("$GPGST,082356.00,1.8,,,,1.7,1.3,2.2*7E").is_ok());
-    assert!(fields("$GPVTG,,T,,M,0.00,N,0.00,K*4E").is_ok());
+    assert!(
+        fields(
+            "$GPGST,172814.0,0.006,0.023,0.020,273.6,0.023,0.020,0.031*6A",
+            true
+        )
+        .is_ok()
+    );
+    assert!(fields("$GPGST,082356.00,1.8,,,,1.7,1.3,2.2*7E", true).is_ok());
+    assert!(fields("$GPVTG,,T,,M,0.00,N,0.00,K*4E", true).is_ok());
 }
 
 #[test]
@@ -210,4 +216,28 @@ fn the_day_is_that_of_most_sentences() {
     // before it has found the time, a receiver states any date
     let (found, _) = said(&(second("095959", "060180") + &log), imu);
     assert_eq!(found[1].t_s, day_s + 36_000.0);
+}
+
+/// The checksum of NMEA 0183 may be left out of all sentences; where some have it, the others are damaged.
+#[test]
+fn logs_without_any_checksum_are_read() {
+    let whole: String = (0..4)
+        .map(|k| second(&format!("12351{k}"), "230394"))
+        .collect();
+    let bare: String = whole
+        .lines()
+        .map(|line| line.split('*').next().unwrap().to_owned() + "\n")
+        .collect();
+    let (fixes, words) = said(&bare, None);
+    assert_eq!(fixes, read(&whole));
+    assert!(
+        words.contains(&"doubt: no sentence has a checksum: damaged digits go unseen".to_owned()),
+        "{words:?}"
+    );
+    let (_, words) = said(&whole, None);
+    assert!(!words.iter().any(|text| text.contains("checksum")));
+    let first = whole.lines().nth(4).unwrap();
+    let some = whole.replacen(first, first.split('*').next().unwrap(), 1);
+    let e = super::fixes("a.nmea", &some, Some(&SIGMA), None).unwrap_err();
+    assert!(e.to_string().contains("without its checksum"), "{e}");
 }

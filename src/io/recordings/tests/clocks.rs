@@ -352,6 +352,20 @@ fn lost_samples_keep_their_places() {
             .0
             .contains("gap in time")
     );
+    // at random, and in blocks: what strays from even stamps is lost, however often
+    let mut state = 1_u32;
+    let mut at_random = vec![false; 2000];
+    for lost in &mut at_random[1..1999] {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        *lost = f64::from(state >> 8) < 0.3 * f64::from(1 << 24);
+    }
+    let in_blocks: Vec<bool> = (0..2000).map(|k| k % 500 >= 320 && k < 1990).collect();
+    for lost in [at_random, in_blocks] {
+        let (_files, path) = Files::with("a.csv", stamps(&|k| lost[k]));
+        let (recordings, _) = read(&[path], &keep).unwrap();
+        let samples = &recordings[0].signals[0].samples;
+        assert!((0..2000).all(|k| samples[k].is_nan() == lost[k]));
+    }
     let twice = format!(
         "{}1,1\n",
         stamped("t_s", 20, |i| format!("{:.2}", 0.05 * (i.min(18)) as f64))

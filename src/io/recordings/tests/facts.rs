@@ -1,7 +1,7 @@
 //! Facts that no noise explains: none in clean recordings, and what becomes of those that have some.
 
 use super::*;
-use nav_sim_signal::noise::{Composite, Model, Process, VirtualImu};
+use nav_sim_signal::noise::{Composite, Kind, Model, Process, VirtualImu};
 use nav_sim_signal::rng::Generator;
 use rand::{RngExt, SeedableRng};
 use std::fmt::Write;
@@ -359,5 +359,96 @@ fn a_knock_a_dead_band_and_a_misspelt_column_are_told() {
     assert!(
         said[0].contains("below a tenth of the quietest units' 0.00100 deg/√h"),
         "{said:?}"
+    );
+}
+
+/// An axis that was written twice, and sensors under the names of each other: white noises of 1 in 3.4 to 1 in 143 in the
+/// catalogue.
+#[test]
+fn copied_axes_and_exchanged_sensors_are_told() {
+    let mut copied = rows(13, 6000);
+    copied.iter_mut().for_each(|row| row[4] = row[3]);
+    let text = "gyro.y has the samples of gyro.x: one axis was written twice";
+    assert_eq!(kept(&at(100.0, &copied), None).1, [text]);
+    let degrees: Vec<[f64; 6]> = rows(14, 6000)
+        .iter()
+        .map(|row| {
+            [
+                row[0],
+                row[1],
+                row[2],
+                57.3 * row[3],
+                57.3 * row[4],
+                57.3 * row[5],
+            ]
+        })
+        .collect();
+    let said = kept(&at(100.0, &degrees), None).1;
+    let is_told = said
+        .iter()
+        .any(|text| text.ends_with("sensors exchanged, or deg/s named rad/s?"));
+    assert!(is_told, "{said:?}");
+}
+
+/// No unit of the catalogue and no shipped model is out of range; mistakes in one are.
+#[test]
+fn models_of_no_unit_are_told() {
+    use crate::io::datasheet::{CATALOGUE, catalogued};
+    use crate::io::model_file;
+    use crate::io::recordings;
+    for (name, _) in CATALOGUE {
+        let model = catalogued(name)
+            .unwrap()
+            .unwrap()
+            .model_file(100.0)
+            .unwrap()
+            .file
+            .model;
+        assert_eq!(recordings::facts::out_of_range(&model), [""; 0], "{name}");
+    }
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let read = |name: &str| {
+        model_file::read(&root.join("calib_data").join(name))
+            .unwrap()
+            .model
+    };
+    let scaled = |model: &Model, of: [f64; 2], kind: Kind, power: f64| {
+        let mut model = model.clone();
+        for (axis, noise) in model.axes.iter_mut().enumerate() {
+            for process in noise.processes.iter_mut().filter(|p| p.kind() == kind) {
+                let amplitude = of[axis / 3] * process.amplitude().powf(power);
+                *process = match kind {
+                    Kind::White => Process::white(amplitude).unwrap(),
+                    _ => Process::random_walk(amplitude).unwrap(),
+                };
+            }
+        }
+        model
+    };
+    for name in ["consumer_mems.toml", "tactical.toml"] {
+        let model = read(name);
+        let said = |model: &Model| recordings::facts::out_of_range(model).join("\n");
+        assert_eq!(said(&model), "", "{name}");
+        let mut exchanged = model.clone();
+        exchanged.axes.rotate_left(3);
+        assert!(said(&exchanged).contains("sensors exchanged"), "{name}");
+        let degrees = scaled(&model, [1.0, 57.3 * 57.3], Kind::White, 1.0);
+        assert!(said(&degrees).contains("deg/s named rad/s"), "{name}");
+        let root = scaled(&model, [1.0; 2], Kind::RandomWalk, 0.5);
+        assert!(!said(&root).is_empty(), "{name}");
+        let louder = scaled(&model, [1e3; 2], Kind::White, 1.0);
+        assert!(said(&louder).contains("accel N"), "{name}");
+    }
+    // a floor is noise over 1 s, too
+    let floor = |bias: f64| {
+        let slow = Process::ar1(0.999, 2e-3 * bias * bias).unwrap();
+        let gyro = Composite::new(vec![Process::white(1e-6).unwrap(), slow]);
+        recordings::facts::out_of_range(&Model::pooled(100.0, &Composite::default(), &gyro))
+    };
+    assert_eq!(floor(0.01 * DEG), [""; 0]);
+    assert!(
+        floor(5.0 * DEG)[0].starts_with("gyro N"),
+        "{:?}",
+        floor(5.0 * DEG)
     );
 }
