@@ -325,18 +325,43 @@ fn aligned(recording: &Recording, settings: &Settings) -> Alignment {
     .unwrap()
 }
 
-/// For twelve seconds the velocities are turned by a right angle: a start there agrees with nothing after it.
-#[test]
-fn a_start_that_the_next_minute_contradicts_is_given_up_for_a_later_one() {
+/// One recording whose velocities are turned by a right angle from 15 s to then: a start there agrees with nothing after it.
+fn turned_until(end_s: f64) -> (Trajectory, Recording) {
     let (trajectory, mut recording) = one(DRIVES[0].1);
     for fix in recording
         .gnss
         .iter_mut()
-        .filter(|f| (15.0..30.0).contains(&f.t_s))
+        .filter(|f| (15.0..end_s).contains(&f.t_s))
     {
         let velocity = fix.velocity.as_mut().unwrap();
         velocity.horizontal = velocity.horizontal.perp();
     }
+    (trajectory, recording)
+}
+
+/// A later start is taken where most of the fixes are behind it, and not where they are before it, however well the last
+/// ones agree: that nothing fits is then said.
+#[test]
+fn a_late_start_leaves_out_less_than_half_of_the_fixes() {
+    let (_, recording) = turned_until(30.0);
+    let end_s = recording.gnss.last().unwrap().t_s;
+    for (share, is_late) in [(0.3, true), (0.6, false)] {
+        let (_, recording) = turned_until(15.0 + share * (end_s - 15.0));
+        let found = aligned(&recording, &settings());
+        let is_contradicted =
+            |(_, finding): &(VerdictKind, Finding)| matches!(finding, Finding::Start { .. });
+        let contradicted = found.doubts.iter().any(is_contradicted);
+        assert_eq!(
+            (found.start.t_s > 30.0, contradicted),
+            (is_late, !is_late),
+            "{found:?}"
+        );
+    }
+}
+
+#[test]
+fn a_start_that_the_next_minute_contradicts_is_given_up_for_a_later_one() {
+    let (trajectory, recording) = turned_until(30.0);
     let found = aligned(&recording, &settings());
     let z = normalised(&found, &trajectory);
     assert!(
