@@ -325,18 +325,46 @@ fn aligned(recording: &Recording, settings: &Settings) -> Alignment {
     .unwrap()
 }
 
-/// For twelve seconds the velocities are turned by a right angle: a start there agrees with nothing after it.
-#[test]
-fn a_start_that_the_next_minute_contradicts_is_given_up_for_a_later_one() {
-    let (trajectory, mut recording) = one(DRIVES[0].1);
+/// One recording whose velocities are turned by a right angle from 15 s to then: a start there agrees with nothing after it.
+fn turned_until(end_s: f64, steps: &[Step]) -> (Trajectory, Recording) {
+    let (trajectory, mut recording) = one(steps);
     for fix in recording
         .gnss
         .iter_mut()
-        .filter(|f| (15.0..30.0).contains(&f.t_s))
+        .filter(|f| (15.0..end_s).contains(&f.t_s))
     {
         let velocity = fix.velocity.as_mut().unwrap();
         velocity.horizontal = velocity.horizontal.perp();
     }
+    (trajectory, recording)
+}
+
+/// A later start is taken where most of the fixes are behind it, and not where they are before it, however well the last
+/// ones agree: that nothing fits is then said.
+#[test]
+fn a_late_start_leaves_out_less_than_half_of_the_fixes() {
+    let mut steps = vec![(10.0, 0.0, 0.0), (5.0, 1.5, 0.0)];
+    for _ in 0..15 {
+        steps.extend([(5.0, 0.5, 0.03), (5.0, -0.5, -0.03)]);
+    }
+    // starts are looked for 15, 30, 60 and 120 s after the first
+    for (end_s, is_late) in [(60.0, true), (125.0, false)] {
+        let (_, recording) = turned_until(end_s, &steps);
+        let found = aligned(&recording, &settings());
+        let is_contradicted =
+            |(_, finding): &(VerdictKind, Finding)| matches!(finding, Finding::Start { .. });
+        let contradicted = found.doubts.iter().any(is_contradicted);
+        assert_eq!(
+            (found.start.t_s > end_s, contradicted),
+            (is_late, !is_late),
+            "{found:?}"
+        );
+    }
+}
+
+#[test]
+fn a_start_that_the_next_minute_contradicts_is_given_up_for_a_later_one() {
+    let (trajectory, recording) = turned_until(30.0, DRIVES[0].1);
     let found = aligned(&recording, &settings());
     let z = normalised(&found, &trajectory);
     assert!(

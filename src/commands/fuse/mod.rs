@@ -623,8 +623,7 @@ impl<'a> Drive<'a> {
             settings: &settings,
             is_given: self.initial.is_some(),
         };
-        let gnss = &weighed.gnss;
-        let cause = is_unexplained.then(|| scene.cause(&Recorded { gnss, ..recorded }));
+        let cause = is_unexplained.then(|| scene.cause(&recorded));
         let cause = cause.flatten().map(|cause| cause.after(delay_s));
         let kind = match cause {
             Some(_) => verdict.max(VerdictKind::Doubtful),

@@ -981,7 +981,16 @@ pub(crate) fn read_imu(
             dv: three(&signals[..3]),
         }
     });
-    let samples: Vec<ImuIncrement> = samples.collect();
+    let mut samples: Vec<ImuIncrement> = samples.collect();
+    let glitches = replace_glitches(&mut samples);
+    if let Some(first) = glitches.first() {
+        remarks.push(doubt(format!(
+            "samples that no motion explains: {}, the first at {} s (line {}); taken as missing",
+            glitches.len(),
+            t_s[*first],
+            table.line(*first)
+        )));
+    }
     remarks.extend(doubt_units(&table.path, &samples, 1.0 / step)?.map(doubt));
     let mut holes = Vec::new();
     for (k, sample) in samples.iter().enumerate() {
@@ -1022,6 +1031,31 @@ pub(crate) fn read_imu(
         rate_hz: 1.0 / step,
         remarks: remarks.collect(),
     })
+}
+
+/// Change of angular rate (rad/s) and specific force (m/s²) from one sample to the next and back that no motion makes.
+const GLITCH: [f64; 2] = [10.0, 500.0];
+
+/// Puts the mean of its neighbours, which agree, in the place of a sample that is far from both; which ones (one sample is bridged
+/// like that anyway).
+fn replace_glitches(samples: &mut [ImuIncrement]) -> Vec<usize> {
+    let rates = |s: &ImuIncrement| [s.dtheta / s.dt_s, s.dv / s.dt_s];
+    let mut found = Vec::new();
+    for k in 1..samples.len().saturating_sub(1) {
+        let [before, at, after] = [k - 1, k, k + 1].map(|k| rates(&samples[k]));
+        let dt_s = samples[k].dt_s;
+        let limits = [GLITCH[0].min(MAX_ROTATION / dt_s), GLITCH[1]];
+        let mean = [0, 1].map(|i| 0.5 * (before[i] + after[i]));
+        let is_glitch = |i: usize| {
+            let agree = before[i].distance(after[i]) < 0.1 * limits[i];
+            agree && at[i].distance(mean[i]) > limits[i]
+        };
+        if is_glitch(0) || is_glitch(1) {
+            (samples[k].dtheta, samples[k].dv) = (mean[0] * dt_s, mean[1] * dt_s);
+            found.push(k);
+        }
+    }
+    found
 }
 
 /// Over a whole recording the specific force is gravity in the mean, and nothing turns all the time.

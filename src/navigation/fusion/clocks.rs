@@ -15,8 +15,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Lags that are tried (s), and the step from one to the next.
-const LONGEST_S: f64 = 60.0;
+/// Lags that are tried (s), the longer ones where none of the others fits, and the step from one to the next.
+const LONGEST_S: [f64; 2] = [60.0, 600.0];
 const STEP_S: f64 = 0.1;
 /// Shortest lag that is told: turns between fixes a second apart, of receivers that filter them, lie off by less (s).
 const SHORTEST_S: f64 = 0.5;
@@ -50,7 +50,8 @@ pub fn clocks_apart(
     recorded: &Recorded<'_>,
     rest: impl FnOnce(&Recorded<'_>) -> Option<[f64; 2]>,
 ) -> Option<ClocksApart> {
-    let [lag_s, best, now] = agreement(recorded)?;
+    let tried = LONGEST_S.into_iter();
+    let [lag_s, best, now] = { tried }.find_map(|longest_s| agreement(recorded, longest_s))?;
     // 1 − r², for r < 0 more than 1: turns that go against each other explain less than nothing.
     let unexplained = |r: f64| 1.0 - r * r.abs();
     let is_other = unexplained(now) > UNEXPLAINED * unexplained(best).max(LEAST);
@@ -59,23 +60,30 @@ pub fn clocks_apart(
     }
     let gnss = earlier(recorded.gnss, -lag_s);
     let rest = rest(&recorded.with_gnss(&gnss));
-    Some(ClocksApart {
-        delay_s: rest.map_or(0.0, |[rest_s, _]| rest_s) - lag_s,
+    let delay_s = rest.map_or(0.0, |[rest_s, _]| rest_s) - lag_s;
+    (delay_s.abs() >= SHORTEST_S).then_some(ClocksApart {
+        delay_s,
         sigma_s: rest.map(|[_, sigma_s]| sigma_s),
         correlation: [now, best],
     })
 }
 
-/// The lag of the gyroscopes at which the turns are the same ones (s), their correlation there and as the clocks are.
-fn agreement(recorded: &Recorded<'_>) -> Option<[f64; 3]> {
-    let turns = turns(recorded);
+/// The lag of the gyroscopes at which the turns are the same ones (s), their correlation there and as the clocks are; by
+/// positions where velocities tell none.
+fn agreement(recorded: &Recorded<'_>, longest_s: f64) -> Option<[f64; 3]> {
     let turned = Turned::new(recorded.imu);
-    let steps = (LONGEST_S / STEP_S) as i32;
-    let lags = (-steps..=steps).map(|k| f64::from(k) * STEP_S);
-    let tried = lags.filter_map(|lag_s| Some((lag_s, correlation(&turns, &turned, lag_s)?)));
-    let (lag_s, best) = tried.max_by(by_value)?;
-    let now = correlation(&turns, &turned, 0.0)?;
-    (best >= SAME).then_some([lag_s, best, now])
+    let steps = (longest_s / STEP_S) as i32;
+    let of_turns = |gnss: &[GnssFix]| {
+        let turns = turns(&recorded.with_gnss(gnss));
+        let tried = (-steps..=steps).into_par_iter().filter_map(|k| {
+            let lag_s = f64::from(k) * STEP_S;
+            Some((lag_s, correlation(&turns, &turned, lag_s)?))
+        });
+        let (lag_s, best) = tried.collect::<Vec<_>>().into_iter().max_by(by_value)?;
+        let now = correlation(&turns, &turned, 0.0)?;
+        (best >= SAME).then_some([lag_s, best, now])
+    };
+    of_turns(recorded.gnss).or_else(|| of_turns(&with_velocities(recorded.gnss)))
 }
 
 /// A stretch between two fixes and the mean rate of the course in it (rad/s, without its sign).
@@ -180,8 +188,7 @@ const CONTRADICTS: f64 = 16.0;
 pub fn rough_origin(recorded: &Recorded<'_>) -> Option<f64> {
     let begins_s = check_clocks(recorded).err()?.delay_s()?;
     let gnss = earlier(recorded.gnss, begins_s);
-    let of_turns = |gnss: &[GnssFix]| agreement(&recorded.with_gnss(gnss));
-    let [lag_s, ..] = of_turns(&gnss).or_else(|| of_turns(&with_velocities(&gnss)))?;
+    let [lag_s, ..] = agreement(&recorded.with_gnss(&gnss), LONGEST_S[0])?;
     Some(begins_s - lag_s)
 }
 

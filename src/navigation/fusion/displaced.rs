@@ -34,7 +34,7 @@ const COSTLY: f64 = 20.0;
 /// Share of the NIS that a cause leaves at most: what receivers state is right to a factor, so its level tells nothing.
 const LEFT: f64 = 0.9;
 /// An antenna farther off (m) and a delay longer (s) are none: what is wrong is something else.
-const FARTHEST: (f64, f64) = (10.0, 1.0);
+const FARTHEST: (f64, f64) = (10.0, 2.0);
 
 /// What makes the fixes agree with the IMU.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -332,8 +332,6 @@ pub struct Weighed {
     pub whiteness: [Option<Whiteness>; 2],
     /// How many times the stated standard deviations of these.
     pub sigma_factors: [f64; 2],
-    /// The fixes with that of position. Velocities as stated tell a delay best.
-    pub gnss: Vec<GnssFix>,
 }
 
 impl Weighed {
@@ -380,14 +378,11 @@ pub fn fuse_correlated(
     };
     let sigma_factors = lag_1.map(|lag_1| lag_1.map_or(1.0, sigma_factor));
     let [position, velocity] = sigma_factors;
-    let widened = |velocity: f64| -> Vec<GnssFix> {
-        let fixes = recorded.gnss.iter();
-        fixes
-            .map(|f| f.with_sigmas_times(position, velocity))
-            .collect()
-    };
     let again = || {
-        let gnss = widened(velocity);
+        let fixes = recorded.gnss.iter();
+        let gnss: Vec<GnssFix> = fixes
+            .map(|f| f.with_sigmas_times(position, velocity))
+            .collect();
         fuse(
             &recorded.with_gnss(&gnss),
             belief,
@@ -406,7 +401,6 @@ pub fn fuse_correlated(
         as_stated,
         whiteness,
         sigma_factors,
-        gnss: widened(1.0),
     })
 }
 

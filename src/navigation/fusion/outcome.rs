@@ -685,7 +685,6 @@ mod assessment_tests {
             as_stated: None,
             whiteness: [crate::fusion::Whiteness::of(&solution.fixes), None],
             sigma_factors: [1.0; 2],
-            gnss: Vec::new(),
         }
     }
 

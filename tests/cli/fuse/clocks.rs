@@ -146,3 +146,34 @@ fn clocks_are_named_only_where_the_innovations_agree() {
         ran.stdout
     );
 }
+
+/// A delay far beyond the minute that two loggers begin apart is found where the turns tell it, to a step of the search, and is
+/// what to paste.
+#[test]
+fn a_delay_of_minutes_is_named() {
+    let turn = |deg: f64| format!("  {{ kind = \"turn\", angle_deg = {deg}, duration_s = 12 }},\n");
+    let straight = |s: u32| format!("  {{ kind = \"straight\", duration_s = {s} }},\n");
+    let angles = [
+        90.0, -60.0, 120.0, -90.0, 50.0, -130.0, 80.0, -100.0, 70.0, -40.0,
+    ];
+    let parts: String = angles
+        .iter()
+        .enumerate()
+        .map(|(k, deg)| turn(*deg) + &straight(7 + (5 * k as u32) % 13))
+        .collect();
+    let start = "{ lat_deg = 46.5, lon_deg = 6.5, h_m = 400, heading_deg = 40, speed_m_s = 12 }";
+    let place = place_with(&format!("start = {start}\nsegment = [\n{parts}]\n"), MODEL);
+    done(
+        place.path(),
+        "trajectory record drive.toml imu.toml --seed 3 -o rec",
+    );
+    let ran = nav_sim(
+        place.path(),
+        "fuse rec/imu.csv rec/gnss.csv imu.toml --gnss-delay 80 -o out",
+    );
+    assert_eq!(ran.code, 3, "{}", ran.stdout);
+    let named = ran.stdout.split("--gnss-delay=").nth(1).expect(&ran.stdout);
+    let delay_s: f64 = named.split(' ').next().unwrap().parse().unwrap();
+    assert!(delay_s.abs() <= 0.1, "{}", ran.stdout);
+    assert!(!ran.stderr.contains("reference"), "{}", ran.stderr);
+}

@@ -125,6 +125,43 @@ fn holes_are_bridged_and_windows_cut_with_a_word() {
     );
 }
 
+/// One impossible sample of a gyroscope or an accelerometer is as good as missing: told with its line, and the solution is that of a
+/// recording without it, to a hundredth of its deviation (one sample in ten thousand is bridged).
+#[test]
+fn a_glitch_is_taken_as_missing() {
+    let place = recorded();
+    let text = fs::read_to_string(place.path().join("rec/imu.csv")).unwrap();
+    let fused = |imu: &str| {
+        let command = format!("fuse {imu} rec/gnss.csv imu.toml --initial rec/initial.toml -o out");
+        let ran = done(place.path(), &command);
+        (
+            ran,
+            table(&place.path().join("out/solution.csv")).pop().unwrap(),
+        )
+    };
+    let (_, sound) = fused("rec/imu.csv");
+    for (column, value) in [(3, "30"), (1, "1e6"), (4, "-2e4")] {
+        let spoiled = |(i, line): (usize, &str)| {
+            let mut cells: Vec<&str> = line.split(',').collect();
+            if i == 3500 {
+                cells[column] = value;
+            }
+            cells.join(",") + "\n"
+        };
+        let spoiled: String = text.lines().enumerate().map(spoiled).collect();
+        fs::write(place.path().join("glitch.csv"), spoiled).unwrap();
+        let (ran, end) = fused("glitch.csv");
+        let told = "samples that no motion explains: 1, the first at 35 s (line 3501)";
+        assert!(ran.stderr.contains(told), "{}", ran.stderr);
+        for i in 4..10 {
+            assert!(
+                (end[i] - sound[i]).abs() < 0.01 * sound[9 + i],
+                "{value} {i}: {end:?}"
+            );
+        }
+    }
+}
+
 /// A window before the filter starts withholds nothing; times are said to a hundredth of a second.
 #[test]
 fn a_window_before_the_start_is_no_outage() {
