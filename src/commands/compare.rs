@@ -23,8 +23,8 @@ use std::path::{Path, PathBuf};
 /// Compare runs: verdicts, and ratios of ASEE and RMSE per outage and state
 ///
 /// ASEE, the averaged standard estimation error, is what a filter believes of its error. A cell holds the mean over the
-/// outage of (ASEE ratio − 1)·100 ± half its 95 % interval: that of Monte Carlo, and of the calibrations if both runs
-/// used --method lincov or both with models of calibrate. Scenario and estimator are those of the directories' names
+/// outage of (ASEE ratio − 1)·100 ± half its 95 % interval (or its ends, where it is wide): of the runs, and of the
+/// calibrations of models with draws beside them, as calibrate writes them. Scenario and estimator are those of the directories' names
 /// (II_sr-awv, or II/sr-awv); --table prints the layout of the paper's Table I. All states are in the JSON file; a page
 /// with NEES, coverage and RMSE is written beside it.
 #[derive(clap::Args, Debug, Clone)]
@@ -138,6 +138,7 @@ pub(crate) fn between<'a>(
         candidates: Vec::new(),
         outages: directory.experiment.outages.clone(),
         doubts: Vec::new(),
+        uncertain: Vec::new(),
         states,
         form: None,
     };
@@ -169,14 +170,22 @@ pub(crate) fn between<'a>(
             );
         }
         let mut outages = metrics::compare(own, other, is_paired).refuse_within(run)?;
-        let calibrated = candidate.asee_mean_ci95.iter();
-        for (outage, ends) in outages
-            .iter_mut()
-            .zip(calibrated.zip(&directory.asee_mean_ci95))
-        {
-            // the reference is itself, whatever its calibration leaves open
-            if let (Some(interval), Some(of_reference), false) = (ends.0, ends.1, is_reference) {
-                outage.widen(interval, of_reference);
+        let models = [candidate, directory].map(|side| side.manifest.hashes("model"));
+        // what the calibration of one model leaves open is alike on both sides
+        if !is_reference && models[0] != models[1] {
+            let both = [candidate, directory].map(|side| &side.asee_mean_ci95);
+            for (k, outage) in outages.iter_mut().enumerate() {
+                let known: Vec<_> = both.iter().filter_map(|side| side[k]).collect();
+                if !known.is_empty() {
+                    outage.widen(&known);
+                }
+            }
+            for (name, side) in [(name, directory), (run, candidate)] {
+                if side.asee_mean_ci95.iter().any(Option::is_none)
+                    && !found.uncertain.iter().any(|other| other == name)
+                {
+                    found.uncertain.push(name.to_owned());
+                }
             }
         }
         let pct = |a: f64, b: f64| 100.0 * (a / b - 1.0);
@@ -320,6 +329,9 @@ pub struct Comparison {
     /// Why runs are not paired with the reference.
     #[serde(skip)]
     doubts: Vec<String>,
+    /// Runs whose model has no draws of its calibration.
+    #[serde(skip)]
+    uncertain: Vec<String>,
     /// The states that are shown.
     #[serde(skip)]
     states: Vec<usize>,
@@ -367,6 +379,22 @@ impl Comparison {
             let (reference, costs, state) = (self.name_of_reference(), some(&costs), SPOKEN[state]);
             format!("against {reference}: {costs} of the uncertainty of {state}")
         })
+    }
+
+    /// The sources of uncertainty that the intervals of the table cover.
+    pub(crate) fn coverage_of_intervals(&self) -> String {
+        let runs: Vec<&str> = self.uncertain.iter().map(String::as_str).collect();
+        let covered = match &short_names(&runs)[..] {
+            [] => "the runs and the calibrations".to_owned(),
+            all if all.len() > self.others().len() => {
+                "the runs alone: no model has draws of its calibration beside it".to_owned()
+            }
+            names => format!(
+                "the runs and the calibrations, but for {}: no draws beside the model",
+                some(names)
+            ),
+        };
+        format!("95 % intervals (±) of {covered}")
     }
 
     /// Departure of the ASEE over time: a curve a run.
@@ -454,14 +482,19 @@ impl Answer for Comparison {
             .map(|row| (row["run"].as_str().unwrap_or_default(), row))
             .collect();
         let (gravest, counts) = verdict_counts(&verdicts);
-        let (lines, tone) = (self.cost().into_iter().chain(counts), tone(gravest));
-        let mut document = Document::new("What the filters believe, compared", tone, lines);
+        let has_table = !self.outages.is_empty() && !self.others().is_empty();
+        let lines = self.cost().into_iter().chain(counts);
+        let mut outages = self.candidates.iter().flat_map(|c| &c.outages);
+        let is_known = outages.any(|outage| outage.states[0].ci95_pct.is_some());
+        let lines = lines.chain(is_known.then(|| self.coverage_of_intervals()));
+        let title = "What the filters believe, compared";
+        let mut document = Document::new(title, tone(gravest), lines);
         self.doubts
             .iter()
             .for_each(|doubt| document.note(Importance::Warning, doubt));
-        if !self.outages.is_empty() && !self.candidates.is_empty() {
+        if has_table {
             document.text(&format!(
-                "Mean over the outage of (ASEE ratio − 1)·100 against {}; {INTERVALS}.",
+                "Mean over the outage of (ASEE ratio − 1)·100 against {}.",
                 self.name_of_reference()
             ));
             document.table(self.table());
@@ -477,9 +510,6 @@ impl Answer for Comparison {
 }
 
 const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's own standard deviation: 0 % is as the reference believes.";
-
-const INTERVALS: &str =
-    "± half the 95 % interval of Monte Carlo, and of the calibrations where they are known";
 
 // The layout of the paper's Table I: scenario by outage, state by estimator.
 
@@ -607,12 +637,32 @@ fn separate(candidates: &mut [CandidateResult]) {
     }
 }
 
-/// A ratio's distance from unity with half its 95 % interval (%): none where runs are too few for one, or ratios equal.
+/// A ratio's distance from unity (%) to three digits, with half its 95 % interval where that would change them; with the ends of
+/// the interval where it is so wide that it is no longer symmetric.
 fn signed(ratio: &StateRatio) -> String {
-    let half = ratio.ci95_pct.map(|[low, high]| (high - low) / 2.0);
-    match half.filter(|half| (0.005..1e3).contains(half)) {
-        Some(half) => format!("{:+.2} ± {half:.2}", ratio.ratio_error_pct),
-        None => format!("{:+.2}", ratio.ratio_error_pct),
+    /// Half an interval of a logarithm above which e^x and 1 + x differ in what is shown.
+    const WIDE: f64 = 0.25;
+    let pct = ratio.ratio_error_pct;
+    let decimals =
+        |x: f64, digits: f64| (digits - x.abs().log10().floor()).clamp(0.0, 2.0) as usize;
+    let shown = decimals(pct, 2.0);
+    let Some([low, high]) = ratio
+        .ci95_pct
+        .filter(|ends| ends.iter().all(|x| x.is_finite()))
+    else {
+        return format!("{pct:+.shown$}");
+    };
+    let half = (high - low) / 2.0;
+    let with_half = shown.min(decimals(half, 1.0));
+    if half > WIDE * (100.0 + pct) {
+        format!("{pct:+.0} ({low:+.0} to {high:+.0})")
+    } else if half < 0.5 * 0.1_f64.powi(with_half as i32) {
+        format!("{pct:+.shown$}")
+    } else {
+        // no sign of a zero
+        let unit = 0.1_f64.powi(with_half as i32);
+        let pct = (pct / unit).round() * unit + 0.0;
+        format!("{pct:+.with_half$} ± {half:.with_half$}")
     }
 }
 

@@ -58,29 +58,47 @@ fn intervals_go_from_recordings_to_navigation() {
         dir,
         "run drive.toml imu.toml --method lincov --outage 30:45 -o known",
     );
-    done(dir, "compare out --reference known -o ratios.json");
-    let rows = json(&dir.join("ratios.json"))["rows"]
-        .as_array()
-        .unwrap()
-        .clone();
-    assert!(
-        rows.iter().all(|row| row["calibration_half_pct"].is_null()),
-        "one of them has no draws"
-    );
-    fs::copy(dir.join("m.toml"), dir.join("n.toml")).unwrap();
+    let east = |run: &str, reference: &str| {
+        let said = done(
+            dir,
+            &format!("compare {run} --reference {reference} -o ratios.json"),
+        );
+        let rows = json(&dir.join("ratios.json"))["rows"].clone();
+        let mut rows = rows.as_array().unwrap().iter();
+        let row = rows.find(|row| row["state"] == "pos_e_m").unwrap();
+        (row.clone(), said.stdout)
+    };
+    let half = |(row, _): &(Value, String)| row["calibration_half_pct"].as_f64().unwrap();
+    let is_near = |found: f64, expected: f64| {
+        assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
+    };
+    // one side alone is known to be uncertain
+    let one = east("out", "known");
+    let ratio = 100.0 + one.0["ratio_error_pct"].as_f64().unwrap();
+    is_near(half(&one), ratio * mean);
+    let words = "of the runs and the calibrations, but for known: no draws beside the model";
+    assert!(one.1.contains(words), "{}", one.1);
+    // another file with the same draws, as if of other recordings
+    let text = fs::read_to_string(dir.join("m.toml")).unwrap();
+    fs::write(dir.join("n.toml"), text + "# another\n").unwrap();
     fs::copy(dir.join("m.draws.json"), dir.join("n.draws.json")).unwrap();
     analysis("n.toml", "-o same");
-    done(dir, "compare out --reference same -o even.json");
-    let rows = json(&dir.join("even.json"))["rows"]
-        .as_array()
-        .unwrap()
-        .clone();
-    let east = rows.iter().find(|row| row["state"] == "pos_e_m").unwrap();
-    let expected = 100.0 * mean.hypot(mean);
+    is_near(half(&east("out", "same")), 100.0 * mean.hypot(mean));
+    // by runs as by covariance analysis; one model on both sides has one calibration
+    let by_runs = "--runs 4 --seed 1 --outage 30:45";
+    for (model, out) in [
+        ("m.toml", "sampled"),
+        ("n.toml", "sampled_n"),
+        ("m.toml --filter full", "full"),
+    ] {
+        done(dir, &format!("run drive.toml {model} {by_runs} -o {out}"));
+    }
+    let sampled = east("sampled", "sampled_n");
     assert!(
-        (east["calibration_half_pct"].as_f64().unwrap() / expected - 1.0).abs() < 1e-6,
-        "{east} {expected}"
+        (half(&sampled) / (100.0 * mean.hypot(mean)) - 1.0).abs() < 1e-3,
+        "{sampled:?}"
     );
+    assert!(east("full", "sampled").0["calibration_half_pct"].is_null());
     let horizontal = &outage["horizontal_error_end_m"];
     holds(&horizontal["p95_ci95"], &horizontal["p95"]);
     analysis("m.toml", "-o again -j 2");
