@@ -1,4 +1,4 @@
-//! `nav-sim compare`: run directories → ratios between runs.
+//! `nav-sim compare`: run directories → ratios between runs; two models → what changed.
 
 use crate::app::{
     Answer, Command, Context, Failure, Inputs, Manifest, Out, OutputFile, Refuse, Result, refused,
@@ -20,13 +20,17 @@ use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// Compare runs: verdicts, and ratios of ASEE and RMSE per outage and state
+mod models;
+
+/// Compare runs: verdicts, and ratios of ASEE and RMSE per outage and state; or two calibrations
 ///
 /// ASEE, the averaged standard estimation error, is what a filter believes of its error. A cell holds the mean over the
 /// outage of (ASEE ratio − 1)·100 ± half its 95 % interval (or its ends, where it is wide): of the runs, and of the
 /// calibrations of models with draws beside them, as calibrate writes them. Scenario and estimator are those of the directories' names
 /// (II_sr-awv, or II/sr-awv); --table prints the layout of the paper's Table I. All states are in the JSON file; a page
 /// with NEES, coverage and RMSE is written beside it.
+///
+/// Of two model files: N, B, K, Q and the parameters of the processes, and which of them changed beyond their 95 % intervals.
 #[derive(clap::Args, Debug, Clone)]
 #[command(before_help = "\
 Examples:
@@ -34,14 +38,15 @@ Examples:
       --filter full --runs 8 --seed 1 -o out/with_all
   nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
       --runs 8 --seed 1 -o out/with_15
-  nav-sim compare out/with_15 --reference out/with_all --state all")]
+  nav-sim compare out/with_15 --reference out/with_all --state all
+  nav-sim compare calib_data/consumer_mems.toml calib_data/tactical.toml -o models.json")]
 pub struct Compare {
-    /// Run directories
+    /// Run directories, or two model files
     #[arg(required = true, value_name = "DIR")]
     runs: Vec<PathBuf>,
     /// Run directory to compare with
     #[arg(long, value_name = "DIR")]
-    reference: PathBuf,
+    reference: Option<PathBuf>,
     /// States in the table (repeatable), or "all"
     #[arg(id = "state", long = "state", value_name = "STATE", default_values = ["pos_e_m", "roll_deg"])]
     pub states: Vec<String>,
@@ -62,7 +67,7 @@ pub enum TableForm {
 }
 
 impl Command for Compare {
-    type Answer = Comparison;
+    type Answer = Compared;
     const NAME: &'static str = "compare";
     const OUT: Out = Out::File {
         name: "comparison.json",
@@ -78,22 +83,54 @@ impl Command for Compare {
     }
 
     fn inputs(&self, _: Inputs) -> Result<Inputs> {
+        let files = |path: &PathBuf| match path.is_file() {
+            true => vec![("model".to_owned(), path.clone())],
+            false => RUN_FILES
+                .map(|name| ("run".to_owned(), path.join(name)))
+                .into(),
+        };
         Ok(self
             .runs
             .iter()
-            .chain([&self.reference])
-            .flat_map(|run| RUN_FILES.map(|name| run.join(name)))
-            .filter(|path| path.exists())
-            .map(|path| ("run".to_owned(), path))
+            .chain(&self.reference)
+            .flat_map(files)
+            .filter(|(_, path)| path.exists())
             .collect())
     }
 
-    fn run(&self, _: &Context<'_>) -> Result<Comparison> {
-        Ok(Comparison {
-            form: self.table,
-            ..compare(&self.runs, &self.reference, states(&self.states)?)?
-        })
+    fn run(&self, context: &Context<'_>) -> Result<Compared> {
+        let all: Vec<&PathBuf> = self.reference.iter().chain(&self.runs).collect();
+        let models: Vec<_> = all.iter().filter(|path| path.is_file()).collect();
+        match (all.len(), models.len(), &self.reference) {
+            (2, 2, _) => Ok(Compared::Models(models::compare(
+                [all[0], all[1]],
+                self.table,
+                context,
+            )?)),
+            (_, 0, Some(reference)) => Ok(Compared::Runs(Comparison {
+                form: self.table,
+                ..compare(&self.runs, reference, states(&self.states)?)?
+            })),
+            (_, 0, None) => refused(
+                "no run to compare with",
+                "name one of them with --reference DIR; two model files need none",
+            ),
+            _ => refused(
+                format!("{} is a file: runs are directories", models[0].display()),
+                "give two model files, or run directories with --reference DIR",
+            ),
+        }
     }
+}
+
+/// A comparison: of runs, or of two models.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub enum Compared {
+    /// Of runs.
+    Runs(Comparison),
+    /// Of models.
+    Models(models::ModelComparison),
 }
 
 /// Compares runs with a reference; `states` are shown.
@@ -448,24 +485,16 @@ impl Comparison {
     }
 }
 
-impl Answer for Comparison {
+impl Answer for Compared {
     fn text(&self) -> Option<String> {
-        Some(match self.form? {
-            TableForm::Markdown => self.table().markdown(),
-            TableForm::Csv => {
-                let is_shown = |row: &&Value| {
-                    self.states
-                        .iter()
-                        .any(|k| row["state"] == REPORTED_NAMES[*k])
-                };
-                csv(&self
-                    .rows
-                    .iter()
-                    .filter(is_shown)
-                    .map(flat)
-                    .collect::<Vec<_>>())
-            }
-            TableForm::Latex => self.table().latex(),
+        let (form, table, rows) = match self {
+            Self::Runs(runs) => (runs.form?, runs.table(), runs.shown_rows()),
+            Self::Models(models) => (models.form?, models.table(), models.rows()),
+        };
+        Some(match form {
+            TableForm::Markdown => table.markdown(),
+            TableForm::Csv => csv(&rows.iter().map(flat).collect::<Vec<_>>()),
+            TableForm::Latex => table.latex(),
         })
     }
 
@@ -477,6 +506,24 @@ impl Answer for Comparison {
     }
 
     fn document(&self) -> Document {
+        match self {
+            Self::Runs(runs) => runs.document(),
+            Self::Models(models) => models.document(),
+        }
+    }
+}
+
+impl Comparison {
+    /// The rows of the states that are shown.
+    fn shown_rows(&self) -> Vec<Value> {
+        let is_shown = |row: &&Value| {
+            let mut states = self.states.iter();
+            states.any(|k| row["state"] == REPORTED_NAMES[*k])
+        };
+        self.rows.iter().filter(is_shown).cloned().collect()
+    }
+
+    pub(crate) fn document(&self) -> Document {
         let verdicts = self.verdicts.iter();
         let verdicts: Vec<_> = verdicts
             .map(|row| (row["run"].as_str().unwrap_or_default(), row))

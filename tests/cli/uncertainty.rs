@@ -264,3 +264,80 @@ fn flicker_noise_is_read_by_all() {
     );
     done(dir, "check imu.toml");
 }
+
+/// Two calibrations of one IMU by other recordings are told apart at 5 % for all figures together; twice the variance of the
+/// gyroscope's white noise, known to some percent from 12 signals, is N and WN of the gyroscope alone.
+#[test]
+fn a_change_between_calibrations_is_told_from_chance() {
+    let place = place_with(DRIVE, MODEL);
+    let dir = place.path();
+    let louder = MODEL.replacen("sigma2 = 2e-6", "sigma2 = 4e-6", 1);
+    assert_ne!(louder, MODEL);
+    fs::write(dir.join("louder.toml"), louder).unwrap();
+    for (seed, of) in [(1, "imu"), (2, "imu"), (3, "louder")] {
+        let recordings = "--replicates 4 --samples 8192";
+        done(
+            dir,
+            &format!("synthesize {of}.toml {recordings} --seed {seed} -o made{seed}"),
+        );
+        done(
+            dir,
+            &format!("calibrate made{seed} --model WN+RW --seed {seed} -o {seed}.toml"),
+        );
+    }
+    let compared = |words: &str| {
+        let said = done(dir, &format!("compare {words} --format json -o found.json")).stdout;
+        serde_json::from_str::<Value>(&said).unwrap()
+    };
+    let changed = |found: &Value| -> Vec<String> {
+        let rows = found["rows"].as_array().unwrap().iter();
+        let mut names: Vec<String> = rows
+            .filter(|row| row["changed"] == true)
+            .map(|row| format!("{} {}", row["signal"], row["figure"]).replace('"', ""))
+            .collect();
+        names.sort();
+        names
+    };
+    let same = compared("1.toml 2.toml");
+    assert!(
+        same["judged"].as_u64().unwrap() >= 6 && changed(&same).is_empty(),
+        "{same}"
+    );
+    let other = compared("1.toml 3.toml");
+    assert_eq!(changed(&other), ["gyro N", "gyro WN sigma2"], "{other}");
+    // the reference may be named; a ratio is over it
+    let turned = compared("1.toml --reference 3.toml");
+    let ratio = |found: &Value| {
+        let mut rows = found["rows"].as_array().unwrap().iter();
+        let row = rows.find(|row| row["signal"] == "gyro" && row["figure"] == "N");
+        row.unwrap()["ratio"].as_f64().unwrap()
+    };
+    assert!(
+        (ratio(&other) / 2.0_f64.sqrt() - 1.0).abs() < 0.1,
+        "{other}"
+    );
+    assert!((ratio(&other) * ratio(&turned) - 1.0).abs() < 1e-12);
+    let unjudged = done(dir, "compare imu.toml louder.toml -o found.json").stdout;
+    assert!(
+        unjudged.starts_with("not judged: no intervals"),
+        "{unjudged}"
+    );
+
+    done(dir, "run drive.toml imu.toml --runs 2 --seed 1 -o out");
+    for (words, problem) in [
+        ("out 1.toml", "1.toml is a file: runs are directories"),
+        (
+            "out --reference 1.toml",
+            "1.toml is a file: runs are directories",
+        ),
+        ("1.toml", "1.toml is a file: runs are directories"),
+        ("out", "no run to compare with"),
+    ] {
+        let ran = nav_sim(dir, &format!("compare {words}"));
+        assert!(
+            ran.code == 2 && ran.stderr.contains(problem),
+            "{words}: {}",
+            ran.stderr
+        );
+    }
+}
