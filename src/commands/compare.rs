@@ -38,8 +38,7 @@ Examples:
       --filter full --runs 8 --seed 1 -o out/with_all
   nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
       --runs 8 --seed 1 -o out/with_15
-  nav-sim compare out/with_15 --reference out/with_all --state all
-  nav-sim compare calib_data/consumer_mems.toml calib_data/tactical.toml -o models.json")]
+  nav-sim compare out/with_15 --reference out/with_all --state all")]
 pub struct Compare {
     /// Run directories, or two model files
     #[arg(required = true, value_name = "DIR")]
@@ -788,7 +787,29 @@ mod tests {
             rows[2],
             ",I,300–390 s,reference,+0.96 ± 0.50,reference,+0.96 ± 0.50,"
         );
-        assert_eq!(rows[5], ",II,700–790 s,-75.00 ± 0.50,,-75.00 ± 0.50,,");
+        assert_eq!(rows[5], ",II,700–790 s,-75.0 ± 0.5,,-75.0 ± 0.5,,");
+    }
+
+    #[test]
+    fn an_interval_has_no_more_digits_than_it_leaves_known() {
+        let cases = [
+            (159.347, Some([159.33, 159.36]), "+159"),
+            (22.16, Some([10.16, 34.16]), "+22 ± 12"),
+            (-0.3, Some([-10.3, 9.7]), "+0 ± 10"),
+            (1.346, Some([1.326, 1.366]), "+1.35 ± 0.02"),
+            (167.5, Some([-3.3, 634.2]), "+168 (-3 to +634)"),
+            (-10.0, None, "-10.00"),
+            (5.0, Some([f64::NAN; 2]), "+5.00"),
+        ];
+        for (ratio_error_pct, ci95_pct, shown) in cases {
+            let state = candidate("a", 0.0, false).outages[0].states[0];
+            let found = signed(&StateRatio {
+                ratio_error_pct,
+                ci95_pct,
+                ..state
+            });
+            assert_eq!(found, shown);
+        }
     }
 
     #[test]
