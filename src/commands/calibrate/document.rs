@@ -188,7 +188,7 @@ fn policy() -> String {
     format!("N, K matched over {from_s}–{to_s} s")
 }
 
-fn is_abnormal(diagnosis: &Diagnosis) -> bool {
+pub(crate) fn is_abnormal(diagnosis: &Diagnosis) -> bool {
     diagnosis.verdict != Verdict::Normal
 }
 
@@ -357,7 +357,7 @@ fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
 }
 
 /// `2 of 6 recordings are abnormal: run4 (accel outliers), run5 (accel noise, gyro noise)`; none of a single recording.
-fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> Option<String> {
+pub(crate) fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> Option<String> {
     let names = in_order(diagnoses.iter().map(|d| d.name.as_str()));
     let count = names.len();
     if count == 0 {

@@ -24,7 +24,7 @@
 mod document;
 mod measure;
 
-pub(crate) use document::CalibrationNote;
+pub(crate) use document::{CalibrationNote, is_abnormal, recordings_line};
 pub use measure::{Calibration, EstimatorChoice};
 pub(crate) use measure::{Measured, measure, visit};
 
