@@ -139,6 +139,8 @@ pub struct PlainAnswer {
     #[serde(skip)]
     files: Vec<(String, String)>,
     #[serde(skip)]
+    text: Option<String>,
+    #[serde(skip)]
     unmet: Option<Failure>,
 }
 
@@ -148,7 +150,19 @@ impl PlainAnswer {
             json,
             document,
             files: Vec::new(),
+            text: None,
             unmet: None,
+        }
+    }
+
+    /// The same as another answer.
+    pub(crate) fn of(answer: &impl Answer) -> Self {
+        let json = serde_json::to_value(answer).unwrap_or_default();
+        let whole = |file: OutputFile<'_>| (file.name.into_owned(), file.parts.collect());
+        let files: Vec<(String, String)> = answer.files().into_iter().map(whole).collect();
+        Self {
+            text: answer.text(),
+            ..Self::new(json, answer.document()).with(files)
         }
     }
 
@@ -173,6 +187,10 @@ impl PlainAnswer {
 impl Answer for PlainAnswer {
     fn document(&self) -> Document {
         self.document.clone()
+    }
+
+    fn text(&self) -> Option<String> {
+        self.text.clone()
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {

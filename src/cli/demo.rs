@@ -1,9 +1,8 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
 use super::{Cli, Common, Failure, Session};
-use crate::app::Front;
+use crate::app::{Answer, Front};
 use crate::commands::batch::{BatchRequest, Outcome};
-use crate::commands::compare::Compared;
 use crate::io::atomic;
 use clap::{Parser, value_parser};
 use std::path::{Component, Path};
@@ -101,7 +100,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             .hint("the same command goes on where it was"));
     };
     if let Some(found) = found.comparisons.first() {
-        session.show(&Compared::Runs(found.clone()), &found.document(), None);
+        session.show(found, &found.document(), None);
     }
     session.say(format!("all results: {}", page.display()));
     Ok(())

@@ -1,7 +1,8 @@
 //! `nav-sim compare`: run directories → ratios between runs; two models → what changed.
 
 use crate::app::{
-    Answer, Command, Context, Failure, Inputs, Manifest, Out, OutputFile, Refuse, Result, refused,
+    Answer, Command, Context, Failure, Inputs, Manifest, Out, OutputFile, PlainAnswer, Refuse,
+    Result, refused,
 };
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
@@ -66,7 +67,7 @@ pub enum TableForm {
 }
 
 impl Command for Compare {
-    type Answer = Compared;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "compare";
     const OUT: Out = Out::File {
         name: "comparison.json",
@@ -97,19 +98,18 @@ impl Command for Compare {
             .collect())
     }
 
-    fn run(&self, context: &Context<'_>) -> Result<Compared> {
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let all: Vec<&PathBuf> = self.reference.iter().chain(&self.runs).collect();
         let models: Vec<_> = all.iter().filter(|path| path.is_file()).collect();
         match (all.len(), models.len(), &self.reference) {
-            (2, 2, _) => Ok(Compared::Models(models::compare(
-                [all[0], all[1]],
-                self.table,
-                context,
-            )?)),
-            (_, 0, Some(reference)) => Ok(Compared::Runs(Comparison {
-                form: self.table,
-                ..compare(&self.runs, reference, states(&self.states)?)?
-            })),
+            (2, 2, _) => models::compare([all[0], all[1]], context),
+            (_, 0, Some(reference)) => {
+                let found = Comparison {
+                    form: self.table,
+                    ..compare(&self.runs, reference, states(&self.states)?)?
+                };
+                Ok(PlainAnswer::of(&found))
+            }
             (_, 0, None) => refused(
                 "no run to compare with",
                 "name one of them with --reference DIR; two model files need none",
@@ -120,16 +120,6 @@ impl Command for Compare {
             ),
         }
     }
-}
-
-/// A comparison: of runs, or of two models.
-#[derive(Debug, Serialize)]
-#[serde(untagged)]
-pub enum Compared {
-    /// Of runs.
-    Runs(Comparison),
-    /// Of models.
-    Models(models::ModelComparison),
 }
 
 /// Compares runs with a reference; `states` are shown.
@@ -484,16 +474,24 @@ impl Comparison {
     }
 }
 
-impl Answer for Compared {
+impl Answer for Comparison {
     fn text(&self) -> Option<String> {
-        let (form, table, rows) = match self {
-            Self::Runs(runs) => (runs.form?, runs.table(), runs.shown_rows()),
-            Self::Models(models) => (models.form?, models.table(), models.rows()),
-        };
-        Some(match form {
-            TableForm::Markdown => table.markdown(),
-            TableForm::Csv => csv(&rows.iter().map(flat).collect::<Vec<_>>()),
-            TableForm::Latex => table.latex(),
+        Some(match self.form? {
+            TableForm::Markdown => self.table().markdown(),
+            TableForm::Csv => {
+                let is_shown = |row: &&Value| {
+                    self.states
+                        .iter()
+                        .any(|k| row["state"] == REPORTED_NAMES[*k])
+                };
+                csv(&self
+                    .rows
+                    .iter()
+                    .filter(is_shown)
+                    .map(flat)
+                    .collect::<Vec<_>>())
+            }
+            TableForm::Latex => self.table().latex(),
         })
     }
 
@@ -505,24 +503,6 @@ impl Answer for Compared {
     }
 
     fn document(&self) -> Document {
-        match self {
-            Self::Runs(runs) => runs.document(),
-            Self::Models(models) => models.document(),
-        }
-    }
-}
-
-impl Comparison {
-    /// The rows of the states that are shown.
-    fn shown_rows(&self) -> Vec<Value> {
-        let is_shown = |row: &&Value| {
-            let mut states = self.states.iter();
-            states.any(|k| row["state"] == REPORTED_NAMES[*k])
-        };
-        self.rows.iter().filter(is_shown).cloned().collect()
-    }
-
-    pub(crate) fn document(&self) -> Document {
         let verdicts = self.verdicts.iter();
         let verdicts: Vec<_> = verdicts
             .map(|row| (row["run"].as_str().unwrap_or_default(), row))

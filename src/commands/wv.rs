@@ -10,10 +10,10 @@ use crate::report::curves::{
 };
 use crate::report::in_order;
 use nav_sim_calibration::{
-    Diagnosis, FEWEST_TO_COMPARE, Pool, Replicate, Settings, calibrate, diagnose, duration,
-    grouped, median, replicates,
+    Diagnosis, Pool, Replicate, Settings, calibrate, diagnose, duration, grouped, median,
+    replicates,
 };
-use nav_sim_document::{Axis, Cell, Chart, Colour, Document, Panel, Series, Table, Tone, readable};
+use nav_sim_document::{Axis, Cell, Chart, Colour, Document, Panel, Series, Table, Tone};
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::wavelet::{WaveletError, haar, interval};
 use rayon::prelude::*;
@@ -143,10 +143,8 @@ impl Answer for SignalsFile {
                 "classical and robust wavelet variances agree".to_owned(),
             ),
         };
-        let abnormal = recordings_line(&[], &self.diagnoses)
-            .filter(|_| self.diagnoses.iter().any(is_abnormal))
-            .or_else(|| differing(self));
-        if abnormal.is_some() {
+        let compared = recordings_line(&[], &self.diagnoses);
+        if self.diagnoses.iter().any(is_abnormal) {
             tone = Tone::Doubtful;
         }
         let count = recordings(self).len();
@@ -156,7 +154,7 @@ impl Answer for SignalsFile {
         let mut document = Document::new(
             "Wavelet variance of static recordings",
             tone,
-            abnormal.into_iter().chain([verdict, head]),
+            compared.into_iter().chain([verdict, head]),
         );
         document.table(digest(self));
         let charts: Vec<Chart> = channels(self).map(|channel| chart(self, channel)).collect();
@@ -181,36 +179,12 @@ pub(super) fn outliers(signals: &[SignalCurves]) -> Option<String> {
 /// Each recording against the others, as `calibrate` compares them with its default model: none where that has no fit.
 fn compared(signals: Vec<(Channel, Replicate)>, settings: &Settings) -> Vec<Diagnosis> {
     let names = in_order(signals.iter().map(|(_, replicate)| replicate.name.as_str()));
-    if names.len() < FEWEST_TO_COMPARE {
+    if names.len() < 2 {
         return Vec::new();
     }
     let groups = grouped(signals, Pool::Sensor);
     calibrate(&groups, settings).map_or(Vec::new(), |outcomes| {
         diagnose(&groups, &outcomes, settings)
-    })
-}
-
-/// The axis and scale at which recordings that are too few to name an abnormal one differ most, beyond chance: with 60 degrees
-/// of freedom their logarithms have a standard deviation of 0.18, their difference one of 0.26.
-fn differing(file: &SignalsFile) -> Option<String> {
-    const BEYOND_CHANCE: f64 = 3.0;
-    let ratio = |(channel, i): (Channel, usize)| {
-        let known = signals_of(file, channel).into_iter().filter(|s| {
-            s.edof.get(i).is_some_and(|edof| *edof >= LEAST) && s.robust.status[i] == "ok"
-        });
-        let all: Vec<f64> = known.map(|s| s.robust.wv[i]).collect();
-        let [low, high] = [f64::min, f64::max].map(|end| all.iter().copied().reduce(end));
-        Some((high? / low?, channel, 2.0 * times(file)[i]))
-    };
-    let places = channels(file).flat_map(|c| (0..times(file).len()).map(move |i| (c, i)));
-    let (ratio, channel, tau_s) = places
-        .filter_map(ratio)
-        .max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (ratio > BEYOND_CHANCE && recordings(file).len() < FEWEST_TO_COMPARE).then(|| {
-        let (ratio, at) = (readable(ratio), duration(tau_s));
-        format!(
-            "recordings differ: the wavelet variance of {channel} by a factor of {ratio} at {at}"
-        )
     })
 }
 

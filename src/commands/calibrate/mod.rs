@@ -24,7 +24,7 @@
 mod document;
 mod measure;
 
-pub(crate) use document::{CalibrationNote, is_abnormal, recordings_line};
+pub(crate) use document::{CalibrationNote, figure_of, is_abnormal, recordings_line};
 pub use measure::{Calibration, EstimatorChoice};
 pub(crate) use measure::{Measured, measure, visit};
 
