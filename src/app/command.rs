@@ -155,14 +155,12 @@ impl PlainAnswer {
         }
     }
 
-    /// The same as another answer.
-    pub(crate) fn of(answer: &impl Answer) -> Self {
-        let json = serde_json::to_value(answer).unwrap_or_default();
-        let whole = |file: OutputFile<'_>| (file.name.into_owned(), file.parts.collect());
-        let files: Vec<(String, String)> = answer.files().into_iter().map(whole).collect();
+    /// The same with its JSON as its file and a page beside it; `text` for stdout, where it is not the document.
+    pub(crate) fn with_page(self, text: Option<String>) -> Self {
+        let files = [("", json(&self)), (".html", self.document.html())];
         Self {
-            text: answer.text(),
-            ..Self::new(json, answer.document()).with(files)
+            text,
+            ..self.with(files)
         }
     }
 

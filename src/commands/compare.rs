@@ -1,14 +1,13 @@
 //! `nav-sim compare`: run directories → ratios between runs; two models → what changed.
 
 use crate::app::{
-    Answer, Command, Context, Failure, Inputs, Manifest, Out, OutputFile, PlainAnswer, Refuse,
-    Result, refused,
+    Answer, Command, Context, Failure, Inputs, Manifest, Out, PlainAnswer, Refuse, Result, refused,
 };
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::report::csv::{csv, flat, merged};
 use crate::report::verdict::{SPOKEN, axis_of, tone, verdict_counts};
-use crate::report::{in_order, json, some};
+use crate::report::{in_order, some};
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
     window,
@@ -108,7 +107,7 @@ impl Command for Compare {
                     form: self.table,
                     ..compare(&self.runs, reference, states(&self.states)?)?
                 };
-                Ok(PlainAnswer::of(&found))
+                Ok(PlainAnswer::new(json!(found), found.document()).with_page(found.text()))
             }
             (_, 0, None) => refused(
                 "no run to compare with",
@@ -493,13 +492,6 @@ impl Answer for Comparison {
             }
             TableForm::Latex => self.table().latex(),
         })
-    }
-
-    fn files(&self) -> Vec<OutputFile<'_>> {
-        vec![
-            OutputFile::whole("", json(self)),
-            OutputFile::whole(".html", self.document().html()),
-        ]
     }
 
     fn document(&self) -> Document {

@@ -5,7 +5,7 @@ use crate::commands::calibrate::figure_of;
 use crate::commands::export::Quantity;
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::{self, ModelFile};
-use crate::report::{json as indented, some};
+use crate::report::some;
 use nav_sim_calibration::figures_with_intervals;
 use nav_sim_document::{Document, Table, Tone, readable};
 use nav_sim_signal::imu::{Axis, Channel};
@@ -155,8 +155,7 @@ pub(super) fn compare(paths: [&Path; 2], context: &Context<'_>) -> Result<PlainA
         ("changed", "changed"),
     ];
     document.table(Table::of(&json, "/rows/*", &columns));
-    let files = [("", indented(&json)), (".html", document.html())];
-    Ok(PlainAnswer::new(json, document).with(files))
+    Ok(PlainAnswer::new(json, document).with_page(None))
 }
 
 /// Distance over the half width of a 95 % interval from which on a figure has changed: 2.9 standard deviations, by chance in 4 % of
