@@ -201,15 +201,10 @@ pub(crate) fn between<'a>(
             let both = [candidate, directory].map(|side| &side.asee_mean_ci95);
             for (k, outage) in outages.iter_mut().enumerate() {
                 let known: Vec<_> = both.iter().filter_map(|side| side[k]).collect();
-                if !known.is_empty() {
+                if known.is_empty() {
+                    found.uncertain.push(run.to_owned());
+                } else {
                     outage.widen(&known);
-                }
-            }
-            for (name, side) in [(name, directory), (run, candidate)] {
-                if side.asee_mean_ci95.iter().any(Option::is_none)
-                    && !found.uncertain.iter().any(|other| other == name)
-                {
-                    found.uncertain.push(name.to_owned());
                 }
             }
         }
@@ -354,7 +349,7 @@ pub struct Comparison {
     /// Why runs are not paired with the reference.
     #[serde(skip)]
     doubts: Vec<String>,
-    /// Runs whose model has no draws of its calibration.
+    /// Runs of which, as of the reference, no calibration has draws.
     #[serde(skip)]
     uncertain: Vec<String>,
     /// The states that are shown.
@@ -408,14 +403,14 @@ impl Comparison {
 
     /// The sources of uncertainty that the intervals of the table cover.
     pub(crate) fn coverage_of_intervals(&self) -> String {
-        let runs: Vec<&str> = self.uncertain.iter().map(String::as_str).collect();
+        let runs = in_order(self.uncertain.iter().map(String::as_str));
         let covered = match &short_names(&runs)[..] {
             [] => "the runs and the calibrations".to_owned(),
-            all if all.len() > self.others().len() => {
+            all if all.len() == self.others().len() => {
                 "the runs alone: no model has draws of its calibration beside it".to_owned()
             }
             names => format!(
-                "the runs and the calibrations, but for {}: no draws beside the model",
+                "the runs and the calibrations, of {} of the runs alone",
                 some(names)
             ),
         };

@@ -76,7 +76,7 @@ fn intervals_go_from_recordings_to_navigation() {
     let one = east("out", "known");
     let ratio = 100.0 + one.0["ratio_error_pct"].as_f64().unwrap();
     is_near(half(&one), ratio * mean);
-    let words = "of the runs and the calibrations, but for known: no draws beside the model";
+    let words = "95 % intervals (±) of the runs and the calibrations\n";
     assert!(one.1.contains(words), "{}", one.1);
     // another file with the same draws, as if of other recordings
     let text = fs::read_to_string(dir.join("m.toml")).unwrap();

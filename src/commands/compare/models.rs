@@ -15,12 +15,9 @@ use std::path::Path;
 /// A figure: name, unit, value, 95 % interval.
 type Estimate = (String, &'static str, f64, Option<[f64; 2]>);
 
-/// N, K and B with averages up to `range_s`, and the parameters of the processes, as figures of data sheets where they are such.
-fn estimates(
-    (file, draws): &(ModelFile, Option<Draws>),
-    channel: Channel,
-    range_s: f64,
-) -> Vec<Estimate> {
+/// N, K and B as far as the recordings tell, and the parameters of the processes, as figures of data sheets where they are such.
+fn estimates((file, draws): &(ModelFile, Option<Draws>), channel: Channel) -> Vec<Estimate> {
+    let range_s = file.observed_s().unwrap_or(1e3);
     let (model, rate_hz) = (file.model.axis(channel), file.model.rate_hz);
     let drawn = draws.iter().flat_map(|draws| &draws.models);
     let drawn: Vec<_> = drawn.map(|model| model.axis(channel)).collect();
@@ -64,9 +61,6 @@ pub(super) fn compare(paths: [&Path; 2], context: &Context<'_>) -> Result<PlainA
         });
         sides.push((file, draws));
     }
-    // minima of both are sought where both have data
-    let ranges = sides.iter().filter_map(|(file, _)| file.observed_s());
-    let range_s = ranges.reduce(f64::min).unwrap_or(1e3);
     let (mut rows, mut changed) = (Vec::new(), Vec::new());
     for channel in sides[0].0.present() {
         let of = |c: Channel| [0, 1].map(|k| sides[k].0.model.axis(c));
@@ -82,8 +76,8 @@ pub(super) fn compare(paths: [&Path; 2], context: &Context<'_>) -> Result<PlainA
         // parameters of a sample mean the same in the same processes at the same rate
         let is_same = of(channel)[0].labels() == of(channel)[1].labels()
             && sides[0].0.model.rate_hz == sides[1].0.model.rate_hz;
-        let second = estimates(&sides[1], channel, range_s);
-        for (figure, unit, value, ends) in estimates(&sides[0], channel, range_s) {
+        let second = estimates(&sides[1], channel);
+        for (figure, unit, value, ends) in estimates(&sides[0], channel) {
             let other = second.iter().find(|other| other.0 == figure);
             if let Some((.., x, x_ends)) = other.filter(|_| is_same || unit != "SI") {
                 // A model without intervals counts as known; of positive values in logarithms, squares add.
