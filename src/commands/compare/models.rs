@@ -103,7 +103,7 @@ pub(super) fn compare(paths: [&Path; 2], context: &Context<'_>) -> Result<PlainA
                     "model_ci95": x_ends,
                     "ratio": ratio,
                     "distance": distance,
-                    "changed": distance > Some(1.0),
+                    "changed": distance.map(|distance| distance > 1.0),
                 }));
             }
         }
