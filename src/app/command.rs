@@ -139,6 +139,8 @@ pub struct PlainAnswer {
     #[serde(skip)]
     files: Vec<(String, String)>,
     #[serde(skip)]
+    text: Option<String>,
+    #[serde(skip)]
     unmet: Option<Failure>,
 }
 
@@ -148,7 +150,17 @@ impl PlainAnswer {
             json,
             document,
             files: Vec::new(),
+            text: None,
             unmet: None,
+        }
+    }
+
+    /// The same with its JSON as its file and a page beside it; `text` for stdout, where it is not the document.
+    pub(crate) fn with_page(self, text: Option<String>) -> Self {
+        let files = [("", json(&self)), (".html", self.document.html())];
+        Self {
+            text,
+            ..self.with(files)
         }
     }
 
@@ -173,6 +185,10 @@ impl PlainAnswer {
 impl Answer for PlainAnswer {
     fn document(&self) -> Document {
         self.document.clone()
+    }
+
+    fn text(&self) -> Option<String> {
+        self.text.clone()
     }
 
     fn files(&self) -> Vec<OutputFile<'_>> {

@@ -3,6 +3,7 @@
 use super::Input;
 use nav_sim_document::{Importance, Note};
 use std::fmt::Display;
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -39,6 +40,7 @@ pub struct Context<'a> {
     runs_s: Mutex<f64>,
     used_seed: Mutex<Option<u64>>,
     inputs: Vec<Input>,
+    out: Option<PathBuf>,
 }
 
 /// Seed where none is given: the same command gives the same result.
@@ -55,6 +57,7 @@ impl<'a> Context<'a> {
             runs_s: Mutex::default(),
             used_seed: Mutex::default(),
             inputs: Vec::new(),
+            out: None,
         }
     }
 
@@ -68,6 +71,18 @@ impl<'a> Context<'a> {
     #[must_use]
     pub fn reading(self, inputs: Vec<Input>) -> Self {
         Self { inputs, ..self }
+    }
+
+    /// The same, with `--out`.
+    pub(crate) fn writing(self, out: Option<PathBuf>) -> Self {
+        Self { out, ..self }
+    }
+
+    /// Whether `--out` has this ending, packed or not.
+    pub(crate) fn writes(&self, ending: &str) -> bool {
+        let name = |out: &PathBuf| out.to_string_lossy().to_lowercase();
+        let mut names = self.out.iter().map(name);
+        names.any(|name| name.trim_end_matches(".gz").ends_with(ending))
     }
 
     /// The files that the command reads.

@@ -68,4 +68,4 @@ pub use outcome::{
 };
 pub use pipeline::{calibrate, calibrate_telling, fit_curve, infer, infer_telling};
 pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};
-pub use uncertainty::{ALIKE_LEVEL, Scattering, WIDEST, derived_interval};
+pub use uncertainty::{ALIKE_LEVEL, Scattering, WIDEST, derived_interval, figures_with_intervals};

@@ -406,6 +406,7 @@ fn drive<C: crate::app::Command>(asked: &Asked<C>, session: &Session) -> Result<
     manifest.command.clone_from(&session.given);
     let claims = asked.claim(&manifest, session.common.force)?;
     let context = session.context().reading(manifest.inputs.clone());
+    let context = context.writing(asked.out.clone());
     context.warn_each(claims.warning());
     let answer = asked.request.run(&context)?;
     let document = answer.document();

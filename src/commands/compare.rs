@@ -1,13 +1,13 @@
-//! `nav-sim compare`: run directories → ratios between runs.
+//! `nav-sim compare`: run directories → ratios between runs; two models → what changed.
 
 use crate::app::{
-    Answer, Command, Context, Failure, Inputs, Manifest, Out, OutputFile, Refuse, Result, refused,
+    Answer, Command, Context, Failure, Inputs, Manifest, Out, PlainAnswer, Refuse, Result, refused,
 };
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::report::csv::{csv, flat, merged};
 use crate::report::verdict::{SPOKEN, axis_of, tone, verdict_counts};
-use crate::report::{in_order, json, some};
+use crate::report::{in_order, some};
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
     window,
@@ -20,13 +20,17 @@ use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// Compare runs: verdicts, and ratios of ASEE and RMSE per outage and state
+mod models;
+
+/// Compare runs: verdicts, and ratios of ASEE and RMSE per outage and state; or two calibrations
 ///
 /// ASEE, the averaged standard estimation error, is what a filter believes of its error. A cell holds the mean over the
-/// outage of (ASEE ratio − 1)·100 ± half its 95 % interval: that of Monte Carlo, and of the calibrations if both runs
-/// used --method lincov or both with models of calibrate. Scenario and estimator are those of the directories' names
+/// outage of (ASEE ratio − 1)·100 ± half its 95 % interval (or its ends, where it is wide): of the runs, and of the
+/// calibrations of models with draws beside them, as calibrate writes them. Scenario and estimator are those of the directories' names
 /// (II_sr-awv, or II/sr-awv); --table prints the layout of the paper's Table I. All states are in the JSON file; a page
 /// with NEES, coverage and RMSE is written beside it.
+///
+/// Of two model files: N, B, K, Q and the parameters of the processes, and which of them changed beyond their 95 % intervals.
 #[derive(clap::Args, Debug, Clone)]
 #[command(before_help = "\
 Examples:
@@ -36,12 +40,12 @@ Examples:
       --runs 8 --seed 1 -o out/with_15
   nav-sim compare out/with_15 --reference out/with_all --state all")]
 pub struct Compare {
-    /// Run directories
+    /// Run directories, or two model files
     #[arg(required = true, value_name = "DIR")]
     runs: Vec<PathBuf>,
     /// Run directory to compare with
     #[arg(long, value_name = "DIR")]
-    reference: PathBuf,
+    reference: Option<PathBuf>,
     /// States in the table (repeatable), or "all"
     #[arg(id = "state", long = "state", value_name = "STATE", default_values = ["pos_e_m", "roll_deg"])]
     pub states: Vec<String>,
@@ -62,7 +66,7 @@ pub enum TableForm {
 }
 
 impl Command for Compare {
-    type Answer = Comparison;
+    type Answer = PlainAnswer;
     const NAME: &'static str = "compare";
     const OUT: Out = Out::File {
         name: "comparison.json",
@@ -78,21 +82,42 @@ impl Command for Compare {
     }
 
     fn inputs(&self, _: Inputs) -> Result<Inputs> {
+        let files = |path: &PathBuf| match path.is_file() {
+            true => vec![("model".to_owned(), path.clone())],
+            false => RUN_FILES
+                .map(|name| ("run".to_owned(), path.join(name)))
+                .into(),
+        };
         Ok(self
             .runs
             .iter()
-            .chain([&self.reference])
-            .flat_map(|run| RUN_FILES.map(|name| run.join(name)))
-            .filter(|path| path.exists())
-            .map(|path| ("run".to_owned(), path))
+            .chain(&self.reference)
+            .flat_map(files)
+            .filter(|(_, path)| path.exists())
             .collect())
     }
 
-    fn run(&self, _: &Context<'_>) -> Result<Comparison> {
-        Ok(Comparison {
-            form: self.table,
-            ..compare(&self.runs, &self.reference, states(&self.states)?)?
-        })
+    fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
+        let all: Vec<&PathBuf> = self.reference.iter().chain(&self.runs).collect();
+        let models: Vec<_> = all.iter().filter(|path| path.is_file()).collect();
+        match (all.len(), models.len(), &self.reference) {
+            (2, 2, _) => models::compare([all[0], all[1]], context),
+            (_, 0, Some(reference)) => {
+                let found = Comparison {
+                    form: self.table,
+                    ..compare(&self.runs, reference, states(&self.states)?)?
+                };
+                Ok(PlainAnswer::new(json!(found), found.document()).with_page(found.text()))
+            }
+            (_, 0, None) => refused(
+                "no run to compare with",
+                "name one of them with --reference DIR; two model files need none",
+            ),
+            _ => refused(
+                format!("{} is a file: runs are directories", models[0].display()),
+                "give two model files, or run directories with --reference DIR",
+            ),
+        }
     }
 }
 
@@ -138,6 +163,7 @@ pub(crate) fn between<'a>(
         candidates: Vec::new(),
         outages: directory.experiment.outages.clone(),
         doubts: Vec::new(),
+        uncertain: Vec::new(),
         states,
         form: None,
     };
@@ -169,14 +195,17 @@ pub(crate) fn between<'a>(
             );
         }
         let mut outages = metrics::compare(own, other, is_paired).refuse_within(run)?;
-        let calibrated = candidate.asee_mean_ci95.iter();
-        for (outage, ends) in outages
-            .iter_mut()
-            .zip(calibrated.zip(&directory.asee_mean_ci95))
-        {
-            // the reference is itself, whatever its calibration leaves open
-            if let (Some(interval), Some(of_reference), false) = (ends.0, ends.1, is_reference) {
-                outage.widen(interval, of_reference);
+        let models = [candidate, directory].map(|side| side.manifest.hashes("model"));
+        // what the calibration of one model leaves open is alike on both sides
+        if !is_reference && models[0] != models[1] {
+            let both = [candidate, directory].map(|side| &side.asee_mean_ci95);
+            for (k, outage) in outages.iter_mut().enumerate() {
+                let known: Vec<_> = both.iter().filter_map(|side| side[k]).collect();
+                if known.is_empty() {
+                    found.uncertain.push(run.to_owned());
+                } else {
+                    outage.widen(&known);
+                }
             }
         }
         let pct = |a: f64, b: f64| 100.0 * (a / b - 1.0);
@@ -320,6 +349,9 @@ pub struct Comparison {
     /// Why runs are not paired with the reference.
     #[serde(skip)]
     doubts: Vec<String>,
+    /// Runs of which, as of the reference, no calibration has draws.
+    #[serde(skip)]
+    uncertain: Vec<String>,
     /// The states that are shown.
     #[serde(skip)]
     states: Vec<usize>,
@@ -367,6 +399,22 @@ impl Comparison {
             let (reference, costs, state) = (self.name_of_reference(), some(&costs), SPOKEN[state]);
             format!("against {reference}: {costs} of the uncertainty of {state}")
         })
+    }
+
+    /// The sources of uncertainty that the intervals of the table cover.
+    pub(crate) fn coverage_of_intervals(&self) -> String {
+        let runs = in_order(self.uncertain.iter().map(String::as_str));
+        let covered = match &short_names(&runs)[..] {
+            [] => "the runs and the calibrations".to_owned(),
+            all if all.len() == self.others().len() => {
+                "the runs alone: no model has draws of its calibration beside it".to_owned()
+            }
+            names => format!(
+                "the runs and the calibrations, of {} of the runs alone",
+                some(names)
+            ),
+        };
+        format!("95 % intervals (±) of {covered}")
     }
 
     /// Departure of the ASEE over time: a curve a run.
@@ -441,27 +489,25 @@ impl Answer for Comparison {
         })
     }
 
-    fn files(&self) -> Vec<OutputFile<'_>> {
-        vec![
-            OutputFile::whole("", json(self)),
-            OutputFile::whole(".html", self.document().html()),
-        ]
-    }
-
     fn document(&self) -> Document {
         let verdicts = self.verdicts.iter();
         let verdicts: Vec<_> = verdicts
             .map(|row| (row["run"].as_str().unwrap_or_default(), row))
             .collect();
         let (gravest, counts) = verdict_counts(&verdicts);
-        let (lines, tone) = (self.cost().into_iter().chain(counts), tone(gravest));
-        let mut document = Document::new("What the filters believe, compared", tone, lines);
+        let has_table = !self.outages.is_empty() && !self.others().is_empty();
+        let lines = self.cost().into_iter().chain(counts);
+        let mut outages = self.candidates.iter().flat_map(|c| &c.outages);
+        let is_known = outages.any(|outage| outage.states[0].ci95_pct.is_some());
+        let lines = lines.chain(is_known.then(|| self.coverage_of_intervals()));
+        let title = "What the filters believe, compared";
+        let mut document = Document::new(title, tone(gravest), lines);
         self.doubts
             .iter()
             .for_each(|doubt| document.note(Importance::Warning, doubt));
-        if !self.outages.is_empty() && !self.candidates.is_empty() {
+        if has_table {
             document.text(&format!(
-                "Mean over the outage of (ASEE ratio − 1)·100 against {}; {INTERVALS}.",
+                "Mean over the outage of (ASEE ratio − 1)·100 against {}.",
                 self.name_of_reference()
             ));
             document.table(self.table());
@@ -477,9 +523,6 @@ impl Answer for Comparison {
 }
 
 const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's own standard deviation: 0 % is as the reference believes.";
-
-const INTERVALS: &str =
-    "± half the 95 % interval of Monte Carlo, and of the calibrations where they are known";
 
 // The layout of the paper's Table I: scenario by outage, state by estimator.
 
@@ -607,12 +650,32 @@ fn separate(candidates: &mut [CandidateResult]) {
     }
 }
 
-/// A ratio's distance from unity with half its 95 % interval (%): none where runs are too few for one, or ratios equal.
+/// A ratio's distance from unity (%) to three digits, with half its 95 % interval where that would change them; with the ends of
+/// the interval where it is so wide that it is no longer symmetric.
 fn signed(ratio: &StateRatio) -> String {
-    let half = ratio.ci95_pct.map(|[low, high]| (high - low) / 2.0);
-    match half.filter(|half| (0.005..1e3).contains(half)) {
-        Some(half) => format!("{:+.2} ± {half:.2}", ratio.ratio_error_pct),
-        None => format!("{:+.2}", ratio.ratio_error_pct),
+    /// Half an interval of a logarithm above which e^x and 1 + x differ in what is shown.
+    const WIDE: f64 = 0.25;
+    let pct = ratio.ratio_error_pct;
+    let decimals =
+        |x: f64, digits: f64| (digits - x.abs().log10().floor()).clamp(0.0, 2.0) as usize;
+    let shown = decimals(pct, 2.0);
+    let Some([low, high]) = ratio
+        .ci95_pct
+        .filter(|ends| ends.iter().all(|x| x.is_finite()))
+    else {
+        return format!("{pct:+.shown$}");
+    };
+    let half = (high - low) / 2.0;
+    let with_half = shown.min(decimals(half, 1.0));
+    if half > WIDE * (100.0 + pct) {
+        format!("{pct:+.0} ({low:+.0} to {high:+.0})")
+    } else if half < 0.5 * 0.1_f64.powi(with_half as i32) {
+        format!("{pct:+.shown$}")
+    } else {
+        // no sign of a zero
+        let unit = 0.1_f64.powi(with_half as i32);
+        let pct = (pct / unit).round() * unit + 0.0;
+        format!("{pct:+.with_half$} ± {half:.with_half$}")
     }
 }
 
@@ -691,7 +754,29 @@ mod tests {
             rows[2],
             ",I,300–390 s,reference,+0.96 ± 0.50,reference,+0.96 ± 0.50,"
         );
-        assert_eq!(rows[5], ",II,700–790 s,-75.00 ± 0.50,,-75.00 ± 0.50,,");
+        assert_eq!(rows[5], ",II,700–790 s,-75.0 ± 0.5,,-75.0 ± 0.5,,");
+    }
+
+    #[test]
+    fn an_interval_has_no_more_digits_than_it_leaves_known() {
+        let cases = [
+            (159.347, Some([159.33, 159.36]), "+159"),
+            (22.16, Some([10.16, 34.16]), "+22 ± 12"),
+            (-0.3, Some([-10.3, 9.7]), "+0 ± 10"),
+            (1.346, Some([1.326, 1.366]), "+1.35 ± 0.02"),
+            (167.5, Some([-3.3, 634.2]), "+168 (-3 to +634)"),
+            (-10.0, None, "-10.0"),
+            (5.0, Some([f64::NAN; 2]), "+5.00"),
+        ];
+        for (ratio_error_pct, ci95_pct, shown) in cases {
+            let state = candidate("a", 0.0, false).outages[0].states[0];
+            let found = signed(&StateRatio {
+                ratio_error_pct,
+                ci95_pct,
+                ..state
+            });
+            assert_eq!(found, shown);
+        }
     }
 
     #[test]

@@ -619,9 +619,15 @@ impl Requirements {
     /// When the model has no filter.
     fn judged(&self, scenario: &Scenario, model: &Model) -> Result<Judgement, RequireError> {
         let (curves, outage, worst) = self.bridged(scenario, model)?;
+        // of one set of starts: with fewer starts for longer outages the worst of them would fall
+        let lasts = |length_s: &u32| !after(&curves, f64::from(*length_s)).is_empty();
+        let longest_s = f64::from(CURVE_S.into_iter().rev().find(lasts).unwrap_or(0));
+        let is_long =
+            |curve: &&Vec<Drift>| curve.last().is_some_and(|d| d.after_s > longest_s - 0.5);
+        let common: Vec<_> = curves.iter().filter(is_long).cloned().collect();
         let of_limit = |Limit { quantity, .. }: &Limit| {
             let point = |outage_s: u32| {
-                let largest = Drift::largest(&after(&curves, f64::from(outage_s)), *quantity);
+                let largest = Drift::largest(&after(&common, f64::from(outage_s)), *quantity);
                 json!({ "outage_s": outage_s, "value": largest.map(|(_, x)| x) })
             };
             json!({ "quantity": quantity, "points": CURVE_S.map(point) })
@@ -757,7 +763,7 @@ impl Requirements {
         let unmet = met.is_empty().then(|| Failure::bound(NONE));
         let quantity = quantity_in_words(self.limits[0].quantity);
         let columns = format!(
-            "1 s … 300 s: {quantity} after such an outage; bridges: longest outage within the limits"
+            "1 s … 300 s: {quantity} after such an outage, of starts that allow all; bridges: longest outage within the limits"
         );
         document.note(Importance::Remark, columns);
         let question = self.question(&outages);
@@ -928,7 +934,7 @@ type Bridged = (Vec<Vec<Drift>>, Longest, Option<Worst>);
 #[derive(Debug, Serialize)]
 struct Judgement {
     outage: Longest,
-    /// The quantity of each limit, at its worst place, after outages of growing length.
+    /// The quantity of each limit, at its worst place, after outages of growing length: of the places that allow them all.
     curves: Vec<Value>,
     /// The outage of the answer, where it is beyond linear theory.
     beyond_linear: Option<Outage>,

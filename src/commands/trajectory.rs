@@ -43,15 +43,16 @@ Examples:
   nav-sim trajectory generate trajectories/figure_eight.toml --rate-hz 1")]
     Generate(Asked<Convert>),
     Check(Asked<CheckTrajectory>),
-    /// Convert a trajectory file of any kind to a nav-sim table
+    /// Convert a trajectory file of any kind to a nav-sim table, or to TUM
     ///
     /// The rows are those of the input, or evenly spaced ones with --rate-hz. Local coordinates become latitude,
-    /// longitude and height. A path without attitude gets the heading and pitch along it.
+    /// longitude and height. A path without attitude gets the heading and pitch along it. With -o FILE.tum the rows are those of
+    /// TUM, as evo reads them: t x y z qx qy qz qw, east, north, up of --origin (default: the first row), body forward, left, up.
     #[command(before_help = "\
 Examples:
   nav-sim trajectory convert trajectories/figure_eight.toml -o eight.csv
   nav-sim trajectory convert trajectories/fixed_wing.toml --rate-hz 20 -o denser.csv.gz
-  nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 1 -o thinned.csv")]
+  nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 10 -o drive.tum")]
     Convert(Asked<Convert>),
     Record(Asked<Record>),
 }
@@ -97,7 +98,7 @@ impl Command for Convert {
     const NAME: &'static str = "trajectory convert";
     const OUT: Out = Out::File {
         name: "trajectory.csv",
-        help: "Table to write (.csv or .csv.gz); without it, standard output",
+        help: "Table to write (.csv, .csv.gz or .tum); without it, standard output",
     };
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
@@ -112,7 +113,10 @@ impl Command for Convert {
             "rows": count,
         });
         let document = Document::new("Trajectory", Tone::Good, [format!("{count} rows")]);
-        let text = trajectory_file::csv(&trajectory, self.rate_hz);
+        let text = match context.writes(".tum") {
+            true => trajectory_file::tum(&trajectory, self.rate_hz, self.source.origin),
+            false => trajectory_file::csv(&trajectory, self.rate_hz),
+        };
         Ok(PlainAnswer::new(json, document).with([("", text)]))
     }
 }

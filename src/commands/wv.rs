@@ -2,14 +2,17 @@
 
 use crate::app::reading::{RecordingRequest, VarianceRequest};
 use crate::app::{Answer, Command, Context, Out, OutputFile, Result};
-use crate::commands::calibrate::visit;
+use crate::commands::calibrate::{is_abnormal, recordings_line, visit};
 use crate::io::recordings::ReadOptions;
 use crate::parse;
 use crate::report::curves::{
     CONFIDENCE, SignalCurves, SignalsFile, band, curve, recording_names, sensor_name,
 };
 use crate::report::in_order;
-use nav_sim_calibration::{Replicate, duration, median, replicates};
+use nav_sim_calibration::{
+    Diagnosis, Pool, Replicate, Settings, calibrate, diagnose, duration, grouped, median,
+    replicates,
+};
 use nav_sim_document::{Axis, Cell, Chart, Colour, Document, Panel, Series, Table, Tone};
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::wavelet::{WaveletError, haar, interval};
@@ -54,7 +57,7 @@ impl Command for Wv {
             min_samples: scales.map_or(4, |j| 1 << j),
             ..self.recordings.options()
         };
-        let look = |recording: Recording| -> Result<Vec<SignalCurves>> {
+        let look = |recording: Recording| -> Result<(Vec<SignalCurves>, Vec<_>)> {
             let measured = replicates(&recording, scales, &tuning)?;
             let curves = |(channel, replicate): &(Channel, Replicate)| {
                 let edof = self.degrees_of_freedom(&recording, *channel, replicate)?;
@@ -63,16 +66,22 @@ impl Command for Wv {
                     *channel, replicate, rate_hz, edof, efficiency,
                 ))
             };
-            Ok(measured
-                .par_iter()
-                .map(curves)
-                .collect::<Result<_, WaveletError>>()?)
+            let curves: Result<_, WaveletError> = measured.par_iter().map(curves).collect();
+            Ok((curves?, measured))
         };
         let (looks, report) = visit(&self.files, &reading, &look, context)?;
-        let signals: Vec<Vec<SignalCurves>> = looks.into_iter().collect::<Result<_>>()?;
+        let looks: Vec<_> = looks.into_iter().collect::<Result<_>>()?;
+        let (signals, measured): (Vec<_>, Vec<_>) = looks.into_iter().unzip();
+        let rate_hz = report.files[0].rate_hz;
+        let settings = Settings {
+            tuning,
+            rate_hz,
+            ..Settings::default()
+        };
         Ok(SignalsFile {
             schema_version: 1,
-            rate_hz: report.files[0].rate_hz,
+            rate_hz,
+            diagnoses: compared(measured.concat(), &settings),
             efficiency: tuning.efficiency(),
             edof_method: self.intervals.name().to_owned(),
             confidence: CONFIDENCE,
@@ -127,13 +136,17 @@ impl Answer for SignalsFile {
     }
 
     fn document(&self) -> Document {
-        let (tone, verdict) = match outliers(&self.signals) {
+        let (mut tone, verdict) = match outliers(&self.signals) {
             Some(verdict) => (Tone::Doubtful, verdict),
             None => (
                 Tone::Good,
                 "classical and robust wavelet variances agree".to_owned(),
             ),
         };
+        let compared = recordings_line(&[], &self.diagnoses);
+        if self.diagnoses.iter().any(is_abnormal) {
+            tone = Tone::Doubtful;
+        }
         let count = recordings(self).len();
         let head = format!(
             "Allan deviation over averages, median of recordings ({count}); ratio: least robust/classical"
@@ -141,7 +154,7 @@ impl Answer for SignalsFile {
         let mut document = Document::new(
             "Wavelet variance of static recordings",
             tone,
-            [verdict, head],
+            compared.into_iter().chain([verdict, head]),
         );
         document.table(digest(self));
         let charts: Vec<Chart> = channels(self).map(|channel| chart(self, channel)).collect();
@@ -160,6 +173,18 @@ pub(super) fn outliers(signals: &[SignalCurves]) -> Option<String> {
         format!(
             "outliers? {name} {channel}: classical wavelet variance {ratio:.2} times the robust one at {at}"
         )
+    })
+}
+
+/// Each recording against the others, as `calibrate` compares them with its default model: none where that has no fit.
+fn compared(signals: Vec<(Channel, Replicate)>, settings: &Settings) -> Vec<Diagnosis> {
+    let names = in_order(signals.iter().map(|(_, replicate)| replicate.name.as_str()));
+    if names.len() < 2 {
+        return Vec::new();
+    }
+    let groups = grouped(signals, Pool::Sensor);
+    calibrate(&groups, settings).map_or(Vec::new(), |outcomes| {
+        diagnose(&groups, &outcomes, settings)
     })
 }
 
@@ -313,6 +338,7 @@ mod tests {
             edof_method: "eta3".to_owned(),
             confidence: CONFIDENCE,
             signals: (0..count).map(signal).collect(),
+            diagnoses: Vec::new(),
         }
     }
 

@@ -123,9 +123,10 @@ impl Frame {
         let _ = writeln!(
             svg,
             "<svg class=\"plot\" x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" \
-             viewBox=\"{left:.1} {top:.1} {width:.1} {height:.1}\" preserveAspectRatio=\"none\" data-x=\"{}\" data-y=\"{}\">",
+             viewBox=\"{left:.1} {top:.1} {width:.1} {height:.1}\" preserveAspectRatio=\"none\" data-x=\"{}\" data-y=\"{}\" data-name=\"{}\">",
             x.data(),
-            y.data()
+            y.data(),
+            escape(&panel.y.label)
         );
         let stripes = chart.stripes.1.iter().filter(|_| !chart.is_map);
         for (from, to) in stripes.map(|(from, to)| (x.within(*from), x.within(*to))) {

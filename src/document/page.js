@@ -77,14 +77,26 @@
       if (!(pixel >= vx && pixel <= vx + vw)) continue;
       const at = left + ((pixel - vx) / vw) * width;
       make(svg, "path", { class: "cross", d: `M${at} ${top}V${top + height}` });
-      for (const series of plot.querySelectorAll(".series:not(.off)")) {
+      // the last drawn first; curves of one name, such as recordings, in one line
+      const found = new Map();
+      for (const series of [...plot.querySelectorAll(".series:not(.off)")].reverse()) {
         const path = series.querySelector(".line:not(.level), .dot");
         if (!path || !series.dataset.name || !points(path).length) continue;
         const p = nearest(points(path), pixel);
-        if (Math.abs(p[0] - pixel) < 0.02 * width) lines.push([series, readable(y.value(p[1]))]);
+        if (Math.abs(p[0] - pixel) >= 0.02 * width) continue;
+        const own = found.get(series.dataset.name) ?? { series, path, values: [] };
+        own.values.push(y.value(p[1]));
+        found.set(series.dataset.name, own);
+      }
+      const isFirst = plot === svg.querySelector("svg.plot");
+      for (const [name, { series, path, values }] of found) {
+        const ends = new Set([Math.min(...values), Math.max(...values)].map(readable));
+        const rank = series.classList.contains("soft") ? 2 : path.classList.contains("dashed") ? 1 : 0;
+        lines.push([series, `${name}${isFirst ? "" : ` (${plot.dataset.name})`}: ${[...ends].join(" … ")}`, rank]);
       }
     }
     if (!isUnderMouse || !lines.length) return;
+    lines.sort((a, b) => a[2] - b[2]);
     const figure = svg.closest("figure");
     const note = figure.appendChild(document.createElement("div"));
     note.className = "reading";
@@ -94,7 +106,7 @@
       const name = line.appendChild(document.createElement("b"));
       name.className = [...series.classList].find((c) => c !== "series");
       name.textContent = "— ";
-      line.append(`${series.dataset.name}: ${text}`);
+      line.append(text);
     }
     const frame = figure.getBoundingClientRect();
     const left = event.clientX - frame.left;

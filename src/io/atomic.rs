@@ -521,7 +521,8 @@ fn is_empty(directory: &Path) -> bool {
 
 /// Texts without blanks that tell files of nav-sim, by the ending of their kind: models, exports, pages, pictures, studies,
 /// comparisons, curves.
-const MARKS: [(&str, &str); 9] = [
+const MARKS: [(&str, &str); 10] = [
+    ("trajectory.csv", "(nav-simtrajectoryconvert)"),
     (".toml", "program=\"nav-sim"),
     (".txt", "(nav-simexport)"),
     (".html", "<metaname=\"generator\"content=\"nav-sim\">"),

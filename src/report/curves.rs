@@ -1,6 +1,8 @@
 //! Wavelet-variance curves as JSON: of signals (`wv`), and of fits (`<model>.wv.json`).
 
-use nav_sim_calibration::{Estimator, Group, Outcome, Replicate, Settings, implied, tau_s};
+use nav_sim_calibration::{
+    Diagnosis, Estimator, Group, Outcome, Replicate, Settings, implied, tau_s,
+};
 use nav_sim_document::{Mark, short_names};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::wavelet::interval;
@@ -118,6 +120,13 @@ pub struct SignalsFile {
     pub confidence: f64,
     /// One entry a signal.
     pub signals: Vec<SignalCurves>,
+    /// Each recording against the others; none of too few.
+    #[serde(
+        rename = "replicates",
+        skip_deserializing,
+        skip_serializing_if = "Vec::is_empty"
+    )]
+    pub diagnoses: Vec<Diagnosis>,
 }
 
 impl From<SignalsFile> for CurvesFile {

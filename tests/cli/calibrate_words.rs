@@ -435,3 +435,42 @@ fn a_gyroscope_louder_than_any_is_doubted() {
         );
     }
 }
+
+/// `wv` names what `calibrate` would: a recording of a hundred times the variance among six. Alike
+/// recordings (an alarm in 2.5 % of sets) raise none.
+#[test]
+fn wv_names_the_abnormal_recording() {
+    use crate::common::drive::{DRIVE, MODEL, done, place_with};
+    let place = place_with(DRIVE, MODEL);
+    let dir = place.path();
+    let louder = MODEL.replacen("sigma2 = 2e-6", "sigma2 = 2e-4", 1);
+    assert_ne!(louder, MODEL);
+    std::fs::write(dir.join("louder.toml"), louder).unwrap();
+    done(
+        dir,
+        "synthesize imu.toml --replicates 6 --samples 8192 --seed 1 -o made",
+    );
+    done(
+        dir,
+        "synthesize louder.toml --replicates 1 --samples 8192 --seed 2 -o loud",
+    );
+    let first = |words: &str| {
+        let said = done(dir, &format!("wv {words}")).stdout;
+        said.lines().next().unwrap().to_owned()
+    };
+    assert_eq!(first("made"), "6 recordings, none abnormal");
+    std::fs::rename(
+        dir.join("loud/replicate_1.csv"),
+        dir.join("made/replicate_3.csv"),
+    )
+    .unwrap();
+    assert_eq!(
+        first("made"),
+        "1 of 6 recordings are abnormal: replicate_3 (gyro noise)"
+    );
+    let two = first("made/replicate_1.csv made/replicate_3.csv");
+    assert_eq!(
+        two,
+        "2 recordings: too few to name an abnormal one (4 are needed)"
+    );
+}

@@ -80,6 +80,7 @@ fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest, &mut 
     let inputs = vec![
         input("trajectory", "t.csv", b"t"),
         input("truth", "m.toml", b"m"),
+        input("model", "f.toml", &factor.to_le_bytes()),
     ];
     let mut manifest = Manifest::new("run", Default::default(), inputs.clone());
     manifest.seed = Some(7);
@@ -135,7 +136,16 @@ fn ratios_are_those_that_were_made() {
         &["I_awv", "II_awv", "II_sr-awv", "--reference", "I_awv"],
     );
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    for cell in ["+75.00", "-10.00", "SR-AWV (%)", "reference", "4–8 s"] {
+    let covered =
+        "95 % intervals (±) of the runs alone: no model has draws of its calibration beside it";
+    for cell in [
+        "+75.0",
+        "-10.00",
+        "SR-AWV (%)",
+        "reference",
+        "4–8 s",
+        covered,
+    ] {
         assert!(ran.stdout.contains(cell), "{cell} in\n{}", ran.stdout);
     }
     // errors are 1; the filters believe 1, 1.75 and 0.9 times (1 to 1.38): the second is underconfident for 20 runs
@@ -200,7 +210,7 @@ fn ratios_are_those_that_were_made() {
     }
     let latex = table("latex");
     assert!(
-        latex.starts_with("\\begin{tabular}{lrrr}") && latex.contains("II & 4--8 s & +75.00"),
+        latex.starts_with("\\begin{tabular}{lrrr}") && latex.contains("II & 4--8 s & +75.0 "),
         "{latex}"
     );
     assert!(

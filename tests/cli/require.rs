@@ -405,3 +405,20 @@ fn a_car_has_a_table_of_what_its_aiding_is_worth() {
     assert!((value(1) / car["value"].as_f64().unwrap() - 1.0).abs() < 1e-9);
     assert!(value(0) > value(1) && value(1) > value(2), "{car}");
 }
+
+/// Nothing shows the heading on a straight road, where gyroscope noise adds to it: it grows with each outage from the same starts.
+/// Of all starts that leave room, the worst of short outages is the last one, which long ones do not have.
+#[test]
+fn a_drift_curve_is_of_the_same_starts_at_all_lengths() {
+    use crate::common::drive::{DRIVE, MODEL, done, place_with};
+    let drive = DRIVE.replace("duration_s = 35", "duration_s = 160");
+    let place = place_with(&drive, MODEL);
+    let asked = "require drive.toml imu.toml --outage 3 --require yaw_deg<=50 --format json";
+    let found: Value = serde_json::from_str(&done(place.path(), asked).stdout).unwrap();
+    let points = found["curves"][0]["points"].as_array().unwrap().iter();
+    let yaw: Vec<f64> = points.filter_map(|p| p["value"].as_f64()).collect();
+    assert!(
+        yaw.len() == 5 && yaw.windows(2).all(|pair| pair[1] > 1.005 * pair[0]),
+        "{yaw:?}"
+    );
+}

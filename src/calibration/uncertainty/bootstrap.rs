@@ -262,6 +262,7 @@ pub(crate) fn inference(
         indistinct.adopt(outcome, &mut own.intervals);
         own.indistinct = Some(indistinct);
     }
+    advance(bootstrap.draws as u64);
     own
 }
 
@@ -310,6 +311,7 @@ pub(crate) fn by_bootstrap(
         }
         _ => Vec::new(),
     };
+    advance(bootstrap.draws as u64);
     Inference {
         draws: bootstrap.draws,
         fitted: fits.len(),

@@ -337,6 +337,26 @@ pub(crate) fn practical_intervals(
     let Some(range_s) = observed_s(outcome, rate_hz) else {
         return PracticalIntervals::default();
     };
+    let drawn: Vec<&Composite> = fits.iter().map(|fit| &fit.composite).collect();
+    let own = &outcome.fit.composite;
+    let [density, walk, instability] =
+        figures_with_intervals(own, &drawn, stretch, rate_hz, range_s).map(|(_, ends)| ends);
+    PracticalIntervals {
+        density,
+        walk,
+        instability,
+    }
+}
+
+/// N, K and B of a model, matched over the default horizon and up to `range_s`, and their 95 % intervals from the models of
+/// draws; none where the model or the draws do not determine them.
+pub fn figures_with_intervals(
+    model: &Composite,
+    drawn: &[&Composite],
+    stretch: f64,
+    rate_hz: f64,
+    range_s: f64,
+) -> [(Option<f64>, Option<[f64; 2]>); 3] {
     let read = |model: &Composite| -> Option<[Option<f64>; 3]> {
         let curve = Curve::largest(&[model], rate_hz, Horizon::default()).ok()?;
         let pair = curve.pair(Policy::Matched, Bias::Walk);
@@ -344,18 +364,14 @@ pub(crate) fn practical_intervals(
         let instability = minimum.map(|m| m.deviation);
         Some([Some(pair.density), Some(pair.walk), instability])
     };
-    let own = read(&outcome.fit.composite);
-    let drawn: Vec<_> = fits.iter().filter_map(|f| read(&f.composite)).collect();
-    let interval = |k: usize| {
-        let there = drawn.iter().filter_map(|r| r[k]).filter(|x| *x > 0.0);
-        scale_interval(own?[k]?, there.collect(), fits.len(), stretch)
-    };
-    let [density, walk, instability] = [0, 1, 2].map(interval);
-    PracticalIntervals {
-        density,
-        walk,
-        instability,
-    }
+    let own = read(model).unwrap_or_default();
+    let figures: Vec<_> = drawn.iter().filter_map(|model| read(model)).collect();
+    [0, 1, 2].map(|k| {
+        let there = figures.iter().filter_map(|r| r[k]).filter(|x| *x > 0.0);
+        let ends =
+            own[k].and_then(|own| scale_interval(own, there.collect(), drawn.len(), stretch));
+        (own[k], ends)
+    })
 }
 
 #[cfg(test)]

@@ -6,5 +6,5 @@ pub(crate) mod spread;
 mod varying;
 
 pub use bootstrap::Scattering;
-pub use intervals::{WIDEST, derived_interval};
+pub use intervals::{WIDEST, derived_interval, figures_with_intervals};
 pub use spread::LEVEL as ALIKE_LEVEL;

@@ -292,7 +292,10 @@ impl Answer for StudyAnswer {
         );
         for comparison in &self.comparisons {
             document.section(&format!("ASEE relative to {}", comparison.reference));
-            document.text("Mean over the outage of (ratio − 1)·100, with its 95 % interval.");
+            document.text(&format!(
+                "Mean over the outage of (ratio − 1)·100; {}.",
+                comparison.coverage_of_intervals()
+            ));
             document.table(comparison.table());
         }
         document.section("Cells");

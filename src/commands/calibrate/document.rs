@@ -18,7 +18,7 @@ use nav_sim_document::{
 };
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::practical::Horizon;
-use nav_sim_signal::noise::{Kind, Law, Parameter, ParameterRef, Spread, Variation};
+use nav_sim_signal::noise::{Kind, Law, Parameter, ParameterRef, Process, Spread, Variation};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -181,7 +181,7 @@ fn policy() -> String {
     format!("N, K matched over {from_s}–{to_s} s")
 }
 
-fn is_abnormal(diagnosis: &Diagnosis) -> bool {
+pub(crate) fn is_abnormal(diagnosis: &Diagnosis) -> bool {
     diagnosis.verdict != Verdict::Normal
 }
 
@@ -341,7 +341,7 @@ fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
 }
 
 /// `2 of 6 recordings are abnormal: run4 (accel outliers), run5 (accel noise, gyro noise)`; none of a single recording.
-fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> Option<String> {
+pub(crate) fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> Option<String> {
     let names = in_order(diagnoses.iter().map(|d| d.name.as_str()));
     let count = names.len();
     if count == 0 {
@@ -862,32 +862,13 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
         );
     }
     let model = &outcome.fit.composite;
-    let [increment, ramp] = match sensor {
-        Sensor::Accel => ["m/s", "m/s² per s"],
-        Sensor::Gyro => ["rad", "rad/s per s"],
-    };
     for (index, (process, label)) in model.processes.iter().zip(model.labels()).enumerate() {
-        let time = || (format!("T_{label}"), "correlation time T", "s");
-        let ((key, name, unit), parameter, convert): (_, _, fn(f64, f64) -> f64) =
-            match process.kind() {
-                _ if outcome.fit.zero.contains(&index) => continue,
-                Kind::Ar1 if process.shape() > 0.0 => (time(), Parameter::Phi, |phi, rate_hz| {
-                    -1.0 / (phi.ln() * rate_hz)
-                }),
-                Kind::GaussMarkov => (time(), Parameter::Beta, |beta, _| 1.0 / beta),
-                // Of the increments over a sample, as IEEE 952 has it.
-                Kind::Quantization => (
-                    ("Q".to_owned(), "quantization Q", increment),
-                    Parameter::Q2,
-                    |q2, rate_hz| q2.sqrt() / rate_hz,
-                ),
-                Kind::Drift => (
-                    ("R".to_owned(), "ramp", ramp),
-                    Parameter::Slope,
-                    |slope, rate_hz| slope * rate_hz,
-                ),
-                _ => continue,
-            };
+        let figure = figure_of(process, &label, sensor);
+        let Some(((key, name, unit), parameter, convert)) =
+            figure.filter(|_| !outcome.fit.zero.contains(&index))
+        else {
+            continue;
+        };
         let of = ParameterRef {
             process: index,
             parameter,
@@ -909,6 +890,40 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
         );
     }
     figures
+}
+
+/// Key, name, unit, and what it is computed from, with the rate.
+type FigureOf = (
+    (String, &'static str, &'static str),
+    Parameter,
+    fn(f64, f64) -> f64,
+);
+
+/// The figure of data sheets that a parameter of a process is, if there is one.
+pub(crate) fn figure_of(process: &Process, label: &str, sensor: Sensor) -> Option<FigureOf> {
+    let [increment, ramp] = match sensor {
+        Sensor::Accel => ["m/s", "m/s² per s"],
+        Sensor::Gyro => ["rad", "rad/s per s"],
+    };
+    let time = || (format!("T_{label}"), "correlation time T", "s");
+    Some(match process.kind() {
+        Kind::Ar1 if process.shape() > 0.0 => (time(), Parameter::Phi, |phi, rate_hz| {
+            -1.0 / (phi.ln() * rate_hz)
+        }),
+        Kind::GaussMarkov => (time(), Parameter::Beta, |beta, _| 1.0 / beta),
+        // Of the increments over a sample, as IEEE 952 has it.
+        Kind::Quantization => (
+            ("Q".to_owned(), "quantization Q", increment),
+            Parameter::Q2,
+            |q2, rate_hz| q2.sqrt() / rate_hz,
+        ),
+        Kind::Drift => (
+            ("R".to_owned(), "ramp", ramp),
+            Parameter::Slope,
+            |slope, rate_hz| slope * rate_hz,
+        ),
+        _ => return None,
+    })
 }
 
 // The model file of a calibration.

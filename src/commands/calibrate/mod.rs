@@ -24,7 +24,7 @@
 mod document;
 mod measure;
 
-pub(crate) use document::CalibrationNote;
+pub(crate) use document::{CalibrationNote, figure_of, is_abnormal, recordings_line};
 pub use measure::{Calibration, EstimatorChoice};
 pub(crate) use measure::{Measured, measure, visit};
 
@@ -196,7 +196,8 @@ impl Command for Calibrate {
                 }
                 let groups = grouped(replicates, self.pool.unwrap_or(settings.pool()));
                 let bootstrap = self.draws(context);
-                let steps = settings.model.steps() + u64::from(self.bootstrap);
+                // draws, what recordings differ by, and whether a simpler model does: each takes about as long
+                let steps = settings.model.steps() + 3 * u64::from(self.bootstrap);
                 let fits = (groups.len() * settings.estimators.len()) as u64;
                 context.begin("steps of the fits", fits * steps);
                 let advance = |steps| context.advance(steps);

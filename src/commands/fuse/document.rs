@@ -34,9 +34,9 @@ impl FuseAnswer {
             .iter()
             .map(|o| (o.outage.start_s, o.outage.end_s))
             .collect();
-        self.figures(&mut document);
         document.section("Track");
         document.chart(&map(solution, &outages), "North and east of the start.");
+        self.figures(&mut document);
         document.section("Position");
         document.chart(&position(solution, &outages), POSITION);
         if solution.rows.iter().any(|row| row.error.is_some()) {

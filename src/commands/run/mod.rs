@@ -248,14 +248,11 @@ impl Run {
                 context,
             );
         }
-        let analysed = scenario.run.method == Method::Lincov;
         let draws = |path: &Path, file: &ModelFile| -> Option<Draws> {
-            analysed
-                .then(|| draws_file::usable(path, file, imu_hz))?
-                .unwrap_or_else(|doubt| {
-                    context.warn(format!("{doubt}: no intervals from the calibration"));
-                    None
-                })
+            draws_file::usable(path, file, imu_hz).unwrap_or_else(|doubt| {
+                context.warn(format!("{doubt}: no intervals from the calibration"));
+                None
+            })
         };
         let model_draws = draws(&self.model, &file);
         let made_by = truth.as_ref().map_or(&file, |(_, file)| file).clone();
@@ -624,9 +621,7 @@ fn with_runs(
         ..analysis
     }
     .add_budgets(&mut navigation.summary.outages);
-    if method == Method::Lincov {
-        analysis.add_intervals(&mut navigation.summary.outages, inputs, &full);
-    }
+    analysis.add_intervals(&mut navigation.summary.outages, inputs, &full);
     Ok(navigation)
 }
 
@@ -818,7 +813,7 @@ pub(crate) fn reduction_of(
     Some(quality)
 }
 
-// What the calibration of a model leaves open in the figures of a covariance analysis.
+// What the calibration of a model leaves open in the figures of a run: by covariance analysis, whatever made the figures.
 //
 // Every draw of the calibration ([`draws_file`](crate::io::draws_file)) goes through the analysis as the model
 // itself did, and a figure has the interval that its draws give, as a parameter has ([`derived_interval`]).
@@ -852,9 +847,10 @@ impl Analysis<'_> {
                 .try_into()
                 .ok()
                 .map(PerState);
-            let ends = |value, (low, high)| (Some(value * low), Some(value * high));
             if let [.., p50, p95] = interval[..] {
-                (h.p50_ci95, h.p95_ci95) = (ends(h.p50, p50), ends(h.p95, p95));
+                let has_runs = h.p999.is_none();
+                h.p50_ci95 = together(h.p50, h.p50_ci95, p50, has_runs);
+                h.p95_ci95 = together(h.p95, h.p95_ci95, p95, has_runs);
             }
         }
     }
@@ -891,6 +887,28 @@ impl Analysis<'_> {
             outage.asee_mean_ci95 = mean.filter(|_| has_mean);
         }
     }
+}
+
+/// The interval of a quantile by its runs, if it has some, and by the calibration of what makes the errors: the two are
+/// independent, and the squares of their distances add in logarithms. Too few runs for an end leave it open.
+fn together(
+    value: f64,
+    of_runs: (Option<f64>, Option<f64>),
+    calibration: (f64, f64),
+    has_runs: bool,
+) -> (Option<f64>, Option<f64>) {
+    let end = |of_runs: Option<f64>, calibration: f64, sign: f64| {
+        let of_runs = if has_runs {
+            (of_runs? / value).ln()
+        } else {
+            0.0
+        };
+        Some(value * (sign * of_runs.hypot(calibration.ln())).exp())
+    };
+    (
+        end(of_runs.0, calibration.0, -1.0),
+        end(of_runs.1, calibration.1, 1.0),
+    )
 }
 
 /// Intervals of values, by their ends over the values.

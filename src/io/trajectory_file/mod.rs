@@ -479,6 +479,9 @@ impl Rows {
     }
 }
 
+/// East-north-up to north-east-down and back: a half turn.
+const ENU_NED: DQuat = DQuat::from_xyzw(FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0, 0.0);
+
 /// The rows of a table. Cells out of range are refused, or their rows left out where not every row is needed.
 fn rows(
     path: &str,
@@ -527,16 +530,15 @@ fn rows(
         let [lat, lon, h] = triad(place, row);
         let mut r_n = DVec3::new(lat, lon, h);
         if let Some(quaternion) = quaternion {
-            // East-north-up to north-east-down, front-right-down to front-left-up: half turns.
-            let q_enu_ned = DQuat::from_xyzw(FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0, 0.0);
+            // front-right-down to front-left-up: a half turn
             let q_flu_enu = DQuat::from_array(quaternion.map(|column| column.si(row)));
             if (q_flu_enu.length() - 1.0).abs() > 0.01 {
                 let reason = "does not make a unit quaternion with the others";
                 let (line, w) = (table.line(row), q_flu_enu.w);
                 return Err(Error::cell(path, line, "qw", w, reason));
             }
-            q_b_n = q_enu_ned * q_flu_enu * DQuat::from_rotation_x(PI);
-            r_n = q_enu_ned * r_n;
+            q_b_n = ENU_NED * q_flu_enu * DQuat::from_rotation_x(PI);
+            r_n = ENU_NED * r_n;
         }
         Ok(match origin {
             None => TrajectorySample {
@@ -1169,6 +1171,34 @@ pub(crate) fn csv(trajectory: &Trajectory, rate_hz: Option<f64>) -> String {
             text,
             "{t_s},{lat},{lon},{h},{v_n},{v_e},{v_d},{roll},{pitch},{yaw}"
         );
+    }
+    text
+}
+
+/// The rows as TUM has them, in the axes of ROS ([REP 103](https://www.ros.org/reps/rep-0103.html)) at an origin, or at the first
+/// row: what the reader of TUM files turns back.
+pub(crate) fn tum(
+    trajectory: &Trajectory,
+    rate_hz: Option<f64>,
+    origin: Option<[f64; 3]>,
+) -> String {
+    let all = instants(trajectory, rate_hz);
+    let first = trajectory.state(trajectory.start_s());
+    let [lat0, lon0, h0] = origin.unwrap_or([first.lat, first.lon, first.h]);
+    let (q_e_n0, r_e0) = (q_e_n(lat0, lon0), geodetic_to_ecef(lat0, lon0, h0));
+    let (lat_deg, lon_deg) = (lat0 / DEG, lon0 / DEG);
+    let mut text = format!(
+        "# t_s x y z (m; east, north, up) qx qy qz qw (forward, left, up) (nav-sim trajectory convert)\n\
+         # origin: {lat_deg}, {lon_deg}, {h0}\n"
+    );
+    for t_s in all {
+        let state = trajectory.state(t_s);
+        let r_e = geodetic_to_ecef(state.lat, state.lon, state.h) - r_e0;
+        let q_b_n0 = q_e_n0 * q_e_n(state.lat, state.lon).inverse() * state.q_b_n;
+        let q = ENU_NED * q_b_n0 * DQuat::from_rotation_x(PI);
+        let [x, y, z] = (ENU_NED * (q_e_n0 * r_e)).to_array().map(|x| tidy(x, 6));
+        let [qx, qy, qz, qw] = q.to_array().map(|x| tidy(x, 12));
+        let _ = writeln!(text, "{} {x} {y} {z} {qx} {qy} {qz} {qw}", tidy(t_s, 9));
     }
     text
 }

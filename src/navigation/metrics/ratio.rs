@@ -44,7 +44,7 @@ pub struct StateRatio {
     /// Its 95 % interval: of Monte Carlo, and of what the calibrations leave open where that is known
     /// ([`OutageComparison::widen`]). NaN where runs are too few; none where nothing was drawn and nothing else is known.
     pub ci95_pct: Option<[f64; 2]>,
-    /// Half the 95 % interval of the ASEE ratio that the calibrations alone leave (points), where that is known.
+    /// Half the 95 % interval of the ASEE ratio that the calibrations alone leave (points, linearised), where that is known.
     pub calibration_half_pct: Option<f64>,
     /// Mean over the outage's epochs of |ASEE ratio − 1|·100.
     pub abs_ratio_error_pct: f64,
@@ -167,25 +167,22 @@ fn outage(
 
 impl OutageComparison {
     /// Adds to the intervals of the ASEE ratios what the calibrations leave open: the 95 % intervals of the mean ASEE over
-    /// the outage, of candidate and reference. The two are taken as independent: of models of the same recordings,
-    /// whose errors hang together, the interval is too wide rather than too narrow.
-    pub fn widen(&mut self, candidate: &PerState<(f64, f64)>, reference: &PerState<(f64, f64)>) {
-        let half_of_log = |(low, high): (f64, f64)| 0.5 * (high / low).ln();
-        for (state, (c, r)) in self
-            .states
-            .iter_mut()
-            .zip(candidate.0.iter().zip(&reference.0))
-        {
-            let (pct, ci95_pct) = (state.ratio_error_pct, state.ci95_pct);
-            // In logarithms, where the intervals of scale parameters are nearly symmetric; independent, so
-            // squares add.
-            let calibration = (100.0 + pct) * half_of_log(*c).hypot(half_of_log(*r));
+    /// the outage of candidate and reference, each where it is known. The two are taken as independent: of models of the
+    /// same recordings, whose errors hang together, the interval is too wide rather than too narrow.
+    pub fn widen(&mut self, calibrations: &[PerState<(f64, f64)>]) {
+        for (i, state) in self.states.iter_mut().enumerate() {
+            // In logarithms, where the intervals of scale parameters are nearly symmetric and no ratio is below zero;
+            // independent, so squares add.
+            let half_of_log = |of: &PerState<(f64, f64)>| 0.5 * (of.0[i].1 / of.0[i].0).ln();
+            let calibration = calibrations.iter().map(half_of_log).fold(0.0, f64::hypot);
+            let ratio = 100.0 + state.ratio_error_pct;
             // Where nothing was drawn, what the calibrations leave open is all.
-            let half = ci95_pct
-                .map_or(0.0, |[low, high]| 0.5 * (high - low))
-                .hypot(calibration);
-            state.ci95_pct = Some([pct - half, pct + half]);
-            state.calibration_half_pct = Some(calibration);
+            let sampled = state
+                .ci95_pct
+                .map_or(0.0, |[low, high]| 0.5 * (high - low) / ratio);
+            let half = sampled.hypot(calibration);
+            state.ci95_pct = Some([-half, half].map(|half| ratio * half.exp() - 100.0));
+            state.calibration_half_pct = Some(ratio * calibration);
         }
     }
 }

@@ -258,7 +258,7 @@ fn other_outages_or_epochs_are_refused_in_words() {
 }
 
 /// By hand: calibrations leave (e^−0.3, e^0.3) and (e^−0.4, e^0.4) of an ASEE, together e^±0.5, of a ratio of 1.05 and
-/// nothing by Monte Carlo 52.5 points.
+/// nothing by Monte Carlo 52.5 points to first order: from 105 e^−0.5 to 105 e^0.5.
 #[test]
 fn what_calibrations_leave_open_widens_the_interval() {
     let runs = || vec![run(0, 1.0, 1.0), run(1, 1.0, 1.0)];
@@ -270,7 +270,7 @@ fn what_calibrations_leave_open_widens_the_interval() {
     let [low, high] = outage.states[3].ci95_pct.unwrap();
     let half = 0.5 * (high - low);
     let open = |half: f64| PerState([((-half).exp(), half.exp()); REPORTED]);
-    outage.widen(&open(0.3), &open(0.4));
+    outage.widen(&[open(0.3), open(0.4)]);
     let state = outage.states[3];
     assert!(
         half < 1e-9 && (state.calibration_half_pct.unwrap() - 52.5).abs() < 1e-9,
@@ -278,7 +278,7 @@ fn what_calibrations_leave_open_widens_the_interval() {
     );
     let [low, high] = state.ci95_pct.unwrap();
     assert!(
-        (low + 47.5).abs() < 1e-9 && (high - 57.5).abs() < 1e-9,
+        (low + 36.314).abs() < 1e-3 && (high - 73.116).abs() < 1e-3,
         "{state:?}"
     );
     // of two covariance analyses, which draw nothing, they are the only interval there is
@@ -294,10 +294,10 @@ fn what_calibrations_leave_open_widens_the_interval() {
             .iter()
             .all(|s| s.ci95_pct.is_none() && s.rmse_end_ci95_pct.is_none())
     );
-    outage.widen(&open(0.3), &open(0.4));
+    outage.widen(&[open(0.3), open(0.4)]);
     let [low, high] = outage.states[3].ci95_pct.unwrap();
     assert!(
-        (low + 47.5).abs() < 1e-9 && (high - 57.5).abs() < 1e-9,
+        (low + 36.314).abs() < 1e-3 && (high - 73.116).abs() < 1e-3,
         "{outage:?}"
     );
     assert!(outage.states[3].rmse_end_ci95_pct.is_none());

@@ -101,11 +101,11 @@ pub struct OutageSummary {
     /// Its Monte-Carlo standard error.
     pub rmse_end_std_error: PerState<f64>,
     /// 95 % interval of the ASEE that the calibration of the model leaves: what a filter would state whose model were
-    /// known for certain; of a covariance analysis whose model has its draws beside it.
+    /// known for certain, by covariance analysis; of a model that has its draws beside it.
     pub asee_end_ci95: Option<PerState<(f64, f64)>>,
     /// The same of the mean over the outage's epochs of the ASEE.
     pub asee_mean_ci95: Option<PerState<(f64, f64)>>,
-    /// 95 % interval of the RMSE of this filter that the calibration of what makes the errors leaves; as above.
+    /// 95 % interval of the RMSE of this filter due to the calibration of what makes the errors; as above.
     pub rmse_end_ci95: Option<PerState<(f64, f64)>>,
     /// Mean NEES at the same instant.
     pub nees_end: f64,
@@ -127,8 +127,8 @@ pub struct OutageSummary {
     pub budget: Option<Budget>,
 }
 
-/// Quantiles of a distribution over runs, with distribution-free 95 % intervals (null: too few runs); of a covariance
-/// analysis with the intervals that the calibration of what makes the errors leaves (null: its draws are not there).
+/// Quantiles of a distribution over runs, with distribution-free 95 % intervals (null: too few runs), widened by what the
+/// calibration of what makes the errors leaves open where its draws are there; of a covariance analysis that alone.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Spread {
     /// Median.
