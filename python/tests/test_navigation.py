@@ -10,7 +10,7 @@ import nav_sim
 import numpy as np
 import pytest
 from conftest import CONSUMER, DRIVE, TACTICAL, Command, table, without_times
-from nav_sim import Model, NavSimError, Trajectory, fuse, lincov, run
+from nav_sim import Model, NavSimError, Trajectory, fuse, judge, lincov, run
 
 FILES = ["epochs.csv", "runs.csv"]
 
@@ -105,6 +105,18 @@ def test_a_fusion_is_that_of_the_command(drive: Path, command: Command, tmp_path
     for name in ("solution.csv", "innovations.csv", "errors.csv", "smoothed.csv", "solution.kml"):
         assert own.text(name) == (tmp_path / "fused" / name).read_text(encoding="utf-8"), name
     assert set(own.innovations["used"]) == {0.0, 1.0} and own.solution["t_s"].dtype == np.float64
+
+
+def test_a_judgement_is_that_of_the_command(drive: Path, command: Command, tmp_path: Path) -> None:
+    solution, reference = tmp_path / "fused" / "solution.csv", drive / "reference.csv"
+    command("fuse", drive / "imu.csv", drive / "gnss.csv", TACTICAL, "-q", "-o", tmp_path / "fused")
+    words = ("--reference", reference, "--outage", "100:130", "-q", "--format", "json")
+    said = command("judge", solution, *words, "-o", tmp_path / "judged").stdout
+    own = judge(solution, reference, outages=[(100, 130)])
+    assert json.loads(own._native.json()) == json.loads(said)
+    assert own.text("errors.csv") == (tmp_path / "judged" / "errors.csv").read_text(encoding="utf-8")
+    columns = judge(table(solution), reference, outages=[(100, 130)])
+    assert columns.verdict == own.verdict and len(columns.errors["t_s"]) == len(own.errors["t_s"])
 
 
 def test_a_start_that_is_given(drive: Path, command: Command, tmp_path: Path) -> None:
