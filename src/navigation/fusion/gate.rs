@@ -16,7 +16,7 @@ const RUN: (usize, f64) = (10, 10.0);
 /// The gate during a run of the filter.
 #[derive(Debug)]
 pub(super) struct Gate {
-    level: f64,
+    level: Option<f64>,
     apart_s: f64,
     last_s: f64,
     is_open: bool,
@@ -39,7 +39,7 @@ impl Gate {
     /// A gate of this level; none lets everything pass.
     pub(super) fn new(level: Option<f64>, gnss: &[GnssFix]) -> Self {
         Self {
-            level: level.unwrap_or(1.0),
+            level,
             apart_s: APART.0.max(APART.1 * interval_s(gnss).unwrap_or(0.0)),
             last_s: f64::NEG_INFINITY,
             is_open: true,
@@ -49,17 +49,14 @@ impl Gate {
     }
 
     /// The NIS of so many components above which a fix is no more as stated.
-    pub(super) fn bound(level: f64, components: usize) -> f64 {
-        let chi_square = ChiSquared::new(components as f64).ok();
-        chi_square.map_or(f64::INFINITY, |chi_square| chi_square.inverse_cdf(level))
+    pub(super) fn bound(level: Option<f64>, components: usize) -> f64 {
+        let chi_square = level.zip(ChiSquared::new(components as f64).ok());
+        chi_square.map_or(f64::INFINITY, |(level, of)| of.inverse_cdf(level))
     }
 
     /// Decides on the next fix.
     pub(super) fn pass(&mut self, t_s: f64, nis: f64, components: usize) -> Passage {
-        let bound = match self.level < 1.0 {
-            true => Self::bound(self.level, components),
-            false => f64::INFINITY,
-        };
+        let bound = Self::bound(self.level, components);
         self.is_open |= t_s - self.last_s > self.apart_s;
         self.last_s = t_s;
         if nis <= bound {
