@@ -392,7 +392,12 @@ pub fn fuse_correlated(
     let (solution, as_stated) = match lag_1 {
         [None, None] if !gates(&stated, settings.gate) => (stated, None),
         [None, None] => (again()?, None),
-        _ => (again()?, Some(stated)),
+        _ => {
+            let (solution, mut stated) = (again()?, stated);
+            let both = stated.fixes.iter_mut().zip(&solution.fixes);
+            both.for_each(|(stated, fix)| stated.rejected_above = fix.rejected_above);
+            (solution, Some(stated))
+        }
     };
     Ok(Weighed {
         solution,

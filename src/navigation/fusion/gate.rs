@@ -10,8 +10,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Level of the gate: a right filter rejects one fix in 10 000.
 pub const GATE_LEVEL: f64 = 0.9999;
-/// Rejections in a row, and how long they last (s), that are no chance and no single reflection.
-const RUN: (usize, f64) = (10, 10.0);
+/// Rejections in a row, and how long they last (s), that are no chance and no reflections beside a building: the filter's own
+/// uncertainty has grown meanwhile.
+const RUN: (usize, f64) = (10, 30.0);
 
 /// The gate during a run of the filter.
 #[derive(Debug)]
@@ -112,13 +113,13 @@ mod tests {
 
     #[test]
     fn a_run_of_rejections_opens_the_gate_until_a_fix_is_as_stated() {
-        let far = (1..=20).map(|k| (f64::from(k), if k == 1 { 1.0 } else { 50.0 }));
-        let of = fates(far.chain([(21.0, 3.0), (22.0, 50.0)]));
+        let far = (1..=40).map(|k| (f64::from(k), if k == 1 { 1.0 } else { 50.0 }));
+        let of = fates(far.chain([(41.0, 3.0), (42.0, 50.0)]));
         let reopened = of.iter().position(|fate| *fate == Passage::Reopened);
-        assert_eq!(reopened, Some(11));
-        assert!(of[12..21].iter().all(|fate| *fate == Passage::Used));
-        assert!(matches!(of[21], Passage::Rejected(_)));
-        // ten fixes a second: one second is too short
+        assert_eq!(reopened, Some(31));
+        assert!(of[32..41].iter().all(|fate| *fate == Passage::Used));
+        assert!(matches!(of[41], Passage::Rejected(_)));
+        // ten fixes a second: three seconds, of which there are more than ten fixes, are too short
         let fast = (1..=90).map(|k| (0.1 * f64::from(k), if k == 1 { 1.0 } else { 50.0 }));
         assert!(
             fates(fast)[1..]
