@@ -108,14 +108,12 @@ impl FuseAnswer {
 
     /// ` with position sigmas × 11.9`, where those of the fixes are not as stated.
     fn widened(&self) -> String {
-        let factors = ["pos_sigma_factor", "vel_sigma_factor"].map(|key| {
-            let correlation = self.summary.gnss_correlation.as_ref();
-            let factor = correlation.and_then(|found| found[key].as_f64());
-            factor.filter(|factor| *factor > 1.0)
-        });
-        let of_part = ["position", "velocity"].into_iter().zip(factors);
-        let parts: Vec<String> = of_part
-            .filter_map(|(part, factor)| Some(format!("{part} sigmas × {:.1}", factor?)))
+        let factors = ["position", "velocity"]
+            .into_iter()
+            .zip(self.summary.sigma_factors);
+        let parts: Vec<String> = factors
+            .filter(|(_, factor)| *factor > 1.0)
+            .map(|(part, factor)| format!("{part} sigmas × {factor:.1}"))
             .collect();
         // of what is overconfident the solution may make them
         match parts.is_empty() || self.summary.verdict.kind == VerdictKind::Overconfident {

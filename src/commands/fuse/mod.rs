@@ -311,12 +311,12 @@ fn correlation(text: &str) -> Result<Correlation, &'static str> {
 struct GateLevel(Option<f64>);
 
 fn gate(text: &str) -> Result<GateLevel, &'static str> {
-    let level = text.parse().ok().filter(|level| (0.5..1.0).contains(level));
-    match text {
-        "none" => Ok(GateLevel(None)),
-        _ => Ok(GateLevel(Some(level.ok_or(
-            "expected none, or a probability from 0.5 to below 1, such as 0.9999",
-        )?))),
+    let level = text.parse().ok().filter(|x| (0.5..1.0).contains(x));
+    match level {
+        None if text != "none" => {
+            Err("expected none, or a probability from 0.5 to below 1, such as 0.9999")
+        }
+        level => Ok(GateLevel(level)),
     }
 }
 
@@ -660,6 +660,7 @@ impl<'a> Drive<'a> {
             initial: Initial::new(&start, self.request.initial_file()),
             mounting: mounting.as_ref().map(Into::into),
             horizontal_sigma_rms_m: (squares.sum::<f64>() / rows.len() as f64).sqrt(),
+            sigma_factors: weighed.sigma_factors,
             gnss_correlation: fix_correlation(&weighed),
             vehicle: vehicle(&weighed.solution, &aiding),
             imu_noise: noise,
@@ -960,6 +961,9 @@ pub struct FuseSummary {
     mounting: Option<MountingRow>,
     /// Root mean square of the horizontal standard deviation of the filter (m).
     pub horizontal_sigma_rms_m: f64,
+    /// How many times the stated standard deviations of position and velocity are believed.
+    #[serde(skip)]
+    pub sigma_factors: [f64; 2],
     /// Correlation of the innovations, and what the filter makes of it; none where fixes are few.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gnss_correlation: Option<Value>,
@@ -1149,19 +1153,15 @@ fn vehicle(solution: &Solution, settings: &AidingSettings) -> Option<Value> {
 fn fix_correlation(weighed: &Weighed) -> Option<Value> {
     let [white, of_velocity] = weighed.whiteness;
     let (white, [pos_sigma_factor, vel_sigma_factor]) = (white?, weighed.sigma_factors);
-    let mut found = json!({
+    Some(json!({
         "lag_1": white.lag_1,
         "limit": white.limit,
+        "vel_lag_1": of_velocity.map(|white| white.lag_1),
         "is_correlated": weighed.correlation().is_some(),
         "pos_sigma_factor": pos_sigma_factor,
+        "vel_sigma_factor": vel_sigma_factor,
         "nis_as_stated": outcome(weighed.judged(), &[]).nis_per_component,
-    });
-    if let Some(white) = of_velocity {
-        found["vel_lag_1"] = json!(white.lag_1);
-        found["vel_limit"] = json!(white.limit);
-        found["vel_sigma_factor"] = json!(vel_sigma_factor);
-    }
-    Some(found)
+    }))
 }
 
 // Files of a fusion directory: tables, track for maps, summary, page.

@@ -1047,10 +1047,10 @@ fn replace_glitches(samples: &mut [ImuIncrement]) -> Vec<usize> {
         let limits = [GLITCH[0].min(MAX_ROTATION / dt_s), GLITCH[1]];
         let mean = [0, 1].map(|i| 0.5 * (before[i] + after[i]));
         let is_glitch = |i: usize| {
-            let agree = before[i].distance(after[i]) < 0.1 * limits[i];
-            agree && at[i].distance(mean[i]) > limits[i]
+            let apart = before[i].distance(after[i]);
+            apart < 0.1 * limits[i] && at[i].distance(mean[i]) > limits[i]
         };
-        if is_glitch(0) || is_glitch(1) {
+        if (0..2).any(is_glitch) {
             (samples[k].dtheta, samples[k].dv) = (mean[0] * dt_s, mean[1] * dt_s);
             found.push(k);
         }

@@ -50,8 +50,8 @@ pub fn clocks_apart(
     recorded: &Recorded<'_>,
     rest: impl FnOnce(&Recorded<'_>) -> Option<[f64; 2]>,
 ) -> Option<ClocksApart> {
-    let tried = LONGEST_S.into_iter();
-    let [lag_s, best, now] = { tried }.find_map(|longest_s| agreement(recorded, longest_s))?;
+    let within = |longest_s: &f64| agreement(recorded, *longest_s);
+    let [lag_s, best, now] = LONGEST_S.iter().find_map(within)?;
     // 1 − r², for r < 0 more than 1: turns that go against each other explain less than nothing.
     let unexplained = |r: f64| 1.0 - r * r.abs();
     let is_other = unexplained(now) > UNEXPLAINED * unexplained(best).max(LEAST);

@@ -239,9 +239,8 @@ const FAR: f64 = 6.0;
 /// Fixes this many times the median interval apart are no neighbours.
 const APART: f64 = 1.5;
 
-/// Components of the position and of the velocity.
-const POSITION: Range<usize> = 0..3;
-const VELOCITY: Range<usize> = 3..6;
+/// The first component of the position and of the velocity.
+const PARTS: [usize; 2] = [0, 3];
 
 /// How long the errors of a receiver's fixes last.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
@@ -268,18 +267,17 @@ pub struct Whiteness {
 impl Whiteness {
     /// Of the positions of the fixes used; none where they are few.
     pub fn of<'a>(fixes: impl IntoIterator<Item = &'a FixRecord>) -> Option<Self> {
-        Self::of_part(fixes, POSITION)
+        Self::of_part(fixes, PARTS[0])
     }
 
-    /// The same of some of their components.
-    fn of_part<'a>(
-        fixes: impl IntoIterator<Item = &'a FixRecord>,
-        part: Range<usize>,
-    ) -> Option<Self> {
-        let normalised = |f: &FixRecord| {
-            let part = part.start..part.end.min(f.innovation.len());
-            part.map(|i| f.innovation[i] / f.sigma[i])
-                .collect::<Vec<_>>()
+    /// The same of three of their components.
+    fn of_part<'a>(fixes: impl IntoIterator<Item = &'a FixRecord>, first: usize) -> Option<Self> {
+        let normalised = |f: &FixRecord| -> Vec<f64> {
+            let both = f.innovation.iter().zip(&f.sigma);
+            both.skip(first)
+                .take(3)
+                .map(|(z, sigma)| z / sigma)
+                .collect()
         };
         let used = fixes.into_iter().filter(|f| f.used);
         let mut all: Vec<(f64, Vec<f64>)> = used
@@ -364,7 +362,7 @@ pub fn fuse_correlated(
         ..settings.clone()
     };
     let stated = fuse(recorded, belief, start, &ungated, reference)?;
-    let whiteness = [POSITION, VELOCITY].map(|part| Whiteness::of_part(&stated.fixes, part));
+    let whiteness = PARTS.map(|first| Whiteness::of_part(&stated.fixes, first));
     let lag_1 = match correlation {
         Correlation::Auto => {
             whiteness.map(|w| w.filter(Whiteness::is_correlated).map(|white| white.lag_1))
@@ -394,7 +392,12 @@ pub fn fuse_correlated(
     let (solution, as_stated) = match lag_1 {
         [None, None] if !gates(&stated, settings.gate) => (stated, None),
         [None, None] => (again()?, None),
-        _ => (again()?, Some(stated)),
+        _ => {
+            let (solution, mut stated) = (again()?, stated);
+            let both = stated.fixes.iter_mut().zip(&solution.fixes);
+            both.for_each(|(stated, fix)| stated.rejected_above = fix.rejected_above);
+            (solution, Some(stated))
+        }
     };
     Ok(Weighed {
         solution,
@@ -406,9 +409,8 @@ pub fn fuse_correlated(
 
 /// Whether a gate would reject any fix.
 fn gates(solution: &Solution, level: Option<f64>) -> bool {
-    let is_far =
-        |f: &FixRecord, level: f64| f.used && f.nis > Gate::bound(level, f.innovation.len());
-    level.is_some_and(|level| solution.fixes.iter().any(|f| is_far(f, level)))
+    let is_far = |f: &FixRecord| f.used && f.nis > Gate::bound(level, f.innovation.len());
+    solution.fixes.iter().any(is_far)
 }
 
 /// Standard deviation of white noise that counts as much as one of 1 whose autocorrelation is ρᵏ.

@@ -10,13 +10,14 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Level of the gate: a right filter rejects one fix in 10 000.
 pub const GATE_LEVEL: f64 = 0.9999;
-/// Rejections in a row, and how long they last (s), that are no chance and no single reflection.
-const RUN: (usize, f64) = (10, 10.0);
+/// Rejections in a row, and how long they last (s), that are no chance and no reflections beside a building: the filter's own
+/// uncertainty has grown meanwhile.
+const RUN: (usize, f64) = (10, 30.0);
 
 /// The gate during a run of the filter.
 #[derive(Debug)]
 pub(super) struct Gate {
-    level: f64,
+    level: Option<f64>,
     apart_s: f64,
     last_s: f64,
     is_open: bool,
@@ -39,7 +40,7 @@ impl Gate {
     /// A gate of this level; none lets everything pass.
     pub(super) fn new(level: Option<f64>, gnss: &[GnssFix]) -> Self {
         Self {
-            level: level.unwrap_or(1.0),
+            level,
             apart_s: APART.0.max(APART.1 * interval_s(gnss).unwrap_or(0.0)),
             last_s: f64::NEG_INFINITY,
             is_open: true,
@@ -49,17 +50,14 @@ impl Gate {
     }
 
     /// The NIS of so many components above which a fix is no more as stated.
-    pub(super) fn bound(level: f64, components: usize) -> f64 {
-        let chi_square = ChiSquared::new(components as f64).ok();
-        chi_square.map_or(f64::INFINITY, |chi_square| chi_square.inverse_cdf(level))
+    pub(super) fn bound(level: Option<f64>, components: usize) -> f64 {
+        let chi_square = level.zip(ChiSquared::new(components as f64).ok());
+        chi_square.map_or(f64::INFINITY, |(level, of)| of.inverse_cdf(level))
     }
 
     /// Decides on the next fix.
     pub(super) fn pass(&mut self, t_s: f64, nis: f64, components: usize) -> Passage {
-        let bound = match self.level < 1.0 {
-            true => Self::bound(self.level, components),
-            false => f64::INFINITY,
-        };
+        let bound = Self::bound(self.level, components);
         self.is_open |= t_s - self.last_s > self.apart_s;
         self.last_s = t_s;
         if nis <= bound {
@@ -115,13 +113,13 @@ mod tests {
 
     #[test]
     fn a_run_of_rejections_opens_the_gate_until_a_fix_is_as_stated() {
-        let far = (1..=20).map(|k| (f64::from(k), if k == 1 { 1.0 } else { 50.0 }));
-        let of = fates(far.chain([(21.0, 3.0), (22.0, 50.0)]));
+        let far = (1..=40).map(|k| (f64::from(k), if k == 1 { 1.0 } else { 50.0 }));
+        let of = fates(far.chain([(41.0, 3.0), (42.0, 50.0)]));
         let reopened = of.iter().position(|fate| *fate == Passage::Reopened);
-        assert_eq!(reopened, Some(11));
-        assert!(of[12..21].iter().all(|fate| *fate == Passage::Used));
-        assert!(matches!(of[21], Passage::Rejected(_)));
-        // ten fixes a second: one second is too short
+        assert_eq!(reopened, Some(31));
+        assert!(of[32..41].iter().all(|fate| *fate == Passage::Used));
+        assert!(matches!(of[41], Passage::Rejected(_)));
+        // ten fixes a second: three seconds, of which there are more than ten fixes, are too short
         let fast = (1..=90).map(|k| (0.1 * f64::from(k), if k == 1 { 1.0 } else { 50.0 }));
         assert!(
             fates(fast)[1..]

@@ -11,7 +11,6 @@ use crate::ekf::Belief;
 use crate::imu::{Channel, ImuIncrement, Sensor};
 use crate::linalg::{mean, median};
 use crate::noise::{Composite, Kind, Model, Process};
-use rayon::prelude::*;
 use serde::Serialize;
 use std::f64::consts::FRAC_PI_2;
 
@@ -48,16 +47,14 @@ pub fn own_noise(imu: &[ImuIncrement], rate_hz: f64, model: &Model) -> Vec<OwnNo
         let sigma2 = mean(channels().map(|channel| recorded(imu, channel))) / band;
         let stated = mean(channels().map(|channel| stated(model.axis(channel), band)));
         let times_model = (sigma2 / stated).sqrt();
-        (times_model > LARGER && times_model.is_finite()).then_some(OwnNoise {
+        let is_larger = times_model > LARGER && times_model.is_finite();
+        (is_larger && imu.len() >= FEWEST).then_some(OwnNoise {
             sensor,
             times_model,
             sigma2,
         })
     };
-    match imu.len() >= FEWEST {
-        true => Sensor::ALL.into_iter().filter_map(of_sensor).collect(),
-        false => Vec::new(),
-    }
+    Sensor::ALL.into_iter().filter_map(of_sensor).collect()
 }
 
 /// Variance of white noise with the fourth differences of the recording (units²).
@@ -114,11 +111,8 @@ pub fn predicts_as_well(
         let solution = fuse(&recorded, belief, start, &settings, None).ok()?;
         Some(cost(&solution)).filter(|cost| cost.is_finite())
     };
-    let costs: Vec<_> = beliefs.into_par_iter().map(cost).collect();
-    match (costs[0], costs[1]) {
-        (Some(first), Some(second)) => first < second + DECIDES,
-        (first, _) => first.is_some(),
-    }
+    let [first, second] = beliefs.map(cost);
+    first.is_some_and(|first| second.is_none_or(|second| first < second + DECIDES))
 }
 
 /// −2 ln(likelihood) of the innovations, but for a constant, at the factor of all variances that makes it least.
