@@ -6,7 +6,9 @@ use crate::io::trajectory_file::{load_reference, load_solution, parse_origin};
 use crate::parse::numbers;
 use crate::report::json;
 use crate::report::verdict::{drive_line, tone};
-use nav_sim_document::{Axis, Cell, Chart, Colour, Document, Mark, Panel, Series, Table, readable};
+use nav_sim_document::{
+    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, readable,
+};
 use nav_sim_navigation::fusion::judge::{
     Doubt, Judgement, ReferenceOffset, StatedErrors, judge, rough_delay_s,
 };
@@ -147,6 +149,7 @@ fn summary(judgement: &Judgement, outages: &[(f64, f64)]) -> serde_json::Value {
         "method": "judge",
         "verdict": verdict,
         "doubts": judgement.doubts,
+        "offset": judgement.offset,
         "without_offset": judgement.without_offset,
         "rows": judgement.rows,
         "nees": stated.map(|s| json!({ "dof": s.nees_dof, "mean": s.verdict.nees })),
@@ -173,9 +176,10 @@ fn doubt(doubt: &Doubt) -> String {
             readable(*metres)
         ),
         Doubt::Axes {
+            axes,
             angles_deg: [roll, pitch, yaw],
         } => format!(
-            "the axes of the solution are turned by roll {roll:.0}°, pitch {pitch:.0}°, yaw {yaw:.0}° in those of the reference: write both as front, right, down to north, east, down"
+            "the axes of {axes} are turned by roll {roll:.0}°, pitch {pitch:.0}°, yaw {yaw:.0}° in those of the reference: write both as front, right, down in north, east, down"
         ),
         Doubt::AngleUnit { times } if *times > 1.0 => format!(
             "attitudes are {} times as far off as stated: are their standard deviations radians under a name of degrees?",
@@ -238,6 +242,16 @@ fn page(judgement: &Judgement, outages: &[(f64, f64)]) -> Document {
             "{} rows, {:.2}–{:.2} s",
             judgement.rows, first.t_s, last.t_s
         ));
+    }
+    if let Some(found) = judgement
+        .offset
+        .filter(|_| judgement.without_offset.is_none())
+    {
+        let text = format!(
+            "{}: less than the solution states",
+            doubt(&Doubt::Offset(found))
+        );
+        document.note(Importance::Remark, text);
     }
     document.section("States");
     let mut table = Table::new([

@@ -9,7 +9,7 @@ use crate::metrics::{DriveVerdict, NormalisedErrors, PerState, Verdict, VerdictK
 use crate::simulation::{REPORTED, TOLERANCE, reported_error};
 use crate::trajectory::reference::Reference;
 use crate::units::DEG;
-use glam::{DQuat, DVec3, DVec4};
+use glam::{DMat3, DQuat, DVec3, DVec4};
 use nalgebra::{DMatrix, DVector, Matrix4, SMatrix, Vector4};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -92,8 +92,10 @@ pub enum Doubt {
         /// Solution above reference (m).
         metres: f64,
     },
-    /// The axes of the body are turned.
+    /// Axes are others.
     Axes {
+        /// Of the body, or of navigation (north, east, down).
+        axes: &'static str,
         /// Roll, pitch and yaw of the solution's axes in the reference's (degrees).
         angles_deg: [f64; 3],
     },
@@ -117,6 +119,8 @@ pub struct Judgement {
     pub without_offset: Option<DriveVerdict>,
     /// What else explains the errors.
     pub doubts: Vec<Doubt>,
+    /// Another clock or point of the reference that was found, also where it explains little.
+    pub offset: Option<FoundOffset>,
     /// Root mean square errors; NaN where not known.
     pub rmse: PerState<f64>,
     /// Of the horizontal distance (m).
@@ -183,6 +187,7 @@ pub fn judge(
         kind,
         without_offset,
         doubts,
+        offset: found,
         rmse: PerState(rmse),
         horizontal_rmse_m: rmse[0].hypot(rmse[1]),
         horizontal_max_m,
@@ -259,8 +264,8 @@ const APART_M: f64 = 1000.0;
 /// Heights that differ by more (m) and so many times their scatter are counted from another level: geoids are up to 100 m
 /// from the ellipsoid, and constant over a drive.
 const HEIGHT: (f64, f64) = (5.0, 10.0);
-/// Axes that are turned by more (degrees) and so many times what the attitudes scatter about it.
-const AXES: (f64, f64) = (10.0, 4.0);
+/// Attitudes this near to other axes are in those (degrees).
+const AXES_DEG: f64 = 10.0;
 /// Radians under a name of degrees, or degrees under one of radians, within this factor in each of the three angles while
 /// position is not off by as much.
 const UNIT: f64 = 4.0;
@@ -303,34 +308,44 @@ fn doubts(
     found
 }
 
-/// The rotation between the bodies' axes, where it is large and hardly changes.
+/// Axes of the body, or of navigation, that are others than the reference's: turned by quarters of a circle about them, all the
+/// time. Any other angle is an error.
 fn turned_axes(rows: &[StatedRow], reference: &Reference, given: ReferenceOffset) -> Option<Doubt> {
-    let relative = |row: &StatedRow| {
-        let truth = reference.state(row.t_s + given.delay_s)?;
-        Some(truth.q_b_n.inverse() * row.state.q_b_n)
-    };
-    let all: Vec<DQuat> = rows
+    let pairs: Vec<(DQuat, DQuat)> = rows
         .iter()
         .filter(|row| row.has[1])
-        .filter_map(relative)
+        .filter_map(|row| {
+            let truth = reference.state(row.t_s + given.delay_s)?;
+            Some((truth.q_b_n, row.state.q_b_n))
+        })
         .collect();
-    // q and −q are one rotation: all on the side of the first
-    let first = DVec4::from(*all.first()?);
-    let sum: DVec4 = all
-        .iter()
-        .map(|q| DVec4::from(*q))
-        .map(|q| q * q.dot(first).signum())
-        .sum();
-    let middle = DQuat::from_vec4(sum.try_normalize()?);
-    let angle = 2.0 * middle.xyz().length().min(1.0).asin() / DEG;
-    let apart = all.iter().map(|q| middle.angle_between(*q) / DEG);
-    let scatter = median(apart)?;
-    (angle > AXES.0.max(AXES.1 * scatter)).then(|| {
-        let rpy = RollPitchYaw::from_quat(middle);
+    let of_body = pairs.iter().map(|(truth, own)| truth.inverse() * *own);
+    let of_navigation = pairs.iter().map(|(truth, own)| *own * truth.inverse());
+    let turned = quarter_turns(of_body.collect()).map(|q| (q, "body"));
+    let turned = turned.or_else(|| Some((quarter_turns(of_navigation.collect())?, "navigation")));
+    turned.map(|(q, axes)| {
+        let rpy = RollPitchYaw::from_quat(q);
         Doubt::Axes {
+            axes,
             angles_deg: [rpy.roll, rpy.pitch, rpy.yaw].map(|a| a / DEG),
         }
     })
+}
+
+/// The rotation by quarters that all of these are near.
+fn quarter_turns(all: Vec<DQuat>) -> Option<DQuat> {
+    // q and −q are one rotation: all on the side of the first
+    let first = DVec4::from(*all.first()?);
+    let side = |q: &DQuat| DVec4::from(*q) * DVec4::from(*q).dot(first).signum();
+    let sum: DVec4 = all.iter().map(side).sum();
+    let middle = DQuat::from_vec4(sum.try_normalize()?);
+    let scatter = median(all.iter().map(|q| middle.angle_between(*q)))?;
+    let quarters =
+        DMat3::from_cols_array(&DMat3::from_quat(middle).to_cols_array().map(f64::round));
+    let is_rotation = (quarters.determinant() - 1.0).abs() < 1e-9;
+    let nearest = DQuat::from_mat3(&quarters);
+    let is_near = is_rotation && nearest.angle_between(middle).max(scatter) < AXES_DEG * DEG;
+    (is_near && nearest.angle_between(DQuat::IDENTITY) > 1.0).then_some(nearest)
 }
 
 // Clock and point of the reference, from the errors. To first order a clock that is late by δ makes the error of position
