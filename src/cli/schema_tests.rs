@@ -206,7 +206,7 @@ const SAMPLES: [Sample; 6] = [
     Sample {
         kind: Kind::Contamination,
         text: CONTAMINATION,
-        loose: &[],
+        loose: &["0.share", "3.share", ".sigma2", ".sigma"],
     },
 ];
 
