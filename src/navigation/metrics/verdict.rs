@@ -20,7 +20,7 @@ const LEVEL: f64 = 0.01;
 /// Samples decide where errors so much larger than the filter's standard deviations would alarm: of all states together, of
 /// one state.
 const DECISIVE: [f64; 2] = [1.25, 1.5];
-/// Fewer samples of a drive than these do not tell errors that are smaller than stated.
+/// Fewer samples of a drive than these count as one where errors are smaller than stated.
 const FEW: f64 = 10.0;
 /// Level of the coverage of a recorded drive.
 const COVERAGE: f64 = 0.95;
@@ -293,10 +293,11 @@ impl Verdict {
             _ => independent,
         };
         let mut judge = Judge::new(&[&record], outages.len(), None, known.len(), samples);
-        // Slow errors that are small by chance leave fast ones, which look like many samples.
+        // Slow errors that are small by chance leave fast ones, which look like many samples: one is sure.
+        let tail = judge.tail;
         let few = judge.statistics.iter_mut();
         let few = few.filter(|s| s.freedom.1.min(independent) < FEW);
-        few.for_each(|s| s.limits.0 = 0.0);
+        few.for_each(|s| s.limits.0 = ratio_limits((s.freedom.0, 1.0), tail).0);
         // the scatter of the root of a chi-square mean
         for s in &mut judge.statistics {
             let degrees = s.freedom.0 as f64 * s.freedom.1;
