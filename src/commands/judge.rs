@@ -1,13 +1,13 @@
 //! `nav-sim judge`: the solution of any filter against a reference.
 
-use super::fuse::{Columns, TIME, table};
-use crate::app::{Command, Context, Failure, Out, PlainAnswer, Result};
+use super::fuse::{Columns, TIME, number, table};
+use crate::app::{Command, Context, Failure, Out, PlainAnswer, Result, refused};
 use crate::io::trajectory_file::{load_reference, load_solution, parse_origin};
 use crate::parse::numbers;
 use crate::report::json;
 use crate::report::verdict::{drive_line, tone};
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, readable,
+    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, readable, window,
 };
 use nav_sim_navigation::fusion::judge::{
     Doubt, Judgement, ReferenceOffset, StatedErrors, judge, rough_delay_s,
@@ -51,6 +51,7 @@ pub struct Judge {
     #[arg(
         long = "reference-delay",
         value_name = "S",
+        value_parser = number,
         default_value = "0",
         hide_default_value = true,
         allow_hyphen_values = true
@@ -109,6 +110,28 @@ impl Command for Judge {
             };
             Failure::input(message).hint(hint)
         })?;
+        let (first, last) = (rows.first(), rows.last());
+        let span = first.zip(last).map_or((0.0, 0.0), |(a, b)| (a.t_s, b.t_s));
+        for outage in &self.outages {
+            if outage.end_s < span.0 || outage.start_s > span.1 {
+                let asked = window(outage.start_s, outage.end_s);
+                let message = format!("--outage: {asked} is not within the solution");
+                let hint = format!("it goes from {:.2} to {:.2} s", span.0, span.1);
+                return refused(message, hint);
+            }
+        }
+        if let Some(stated) = &judgement.stated {
+            let unstated = REPORTED_NAMES.iter().zip(judgement.rmse.0);
+            let unstated = unstated.zip(stated.error_over_sigma.0);
+            let unstated = unstated.filter(|((_, rmse), ratio)| rmse.is_finite() && ratio.is_nan());
+            let names: Vec<&str> = unstated.map(|((name, _), _)| *name).collect();
+            if !names.is_empty() {
+                context.warn(format!(
+                    "no standard deviations of {}: not in the verdict",
+                    names.join(", ")
+                ));
+            }
+        }
         let is_overconfident = judgement.kind == VerdictKind::Overconfident;
         let unmet = is_overconfident.then(|| {
             Failure::bound("the solution is overconfident").hint(
@@ -132,10 +155,8 @@ fn summary(judgement: &Judgement, outages: &[(f64, f64)]) -> serde_json::Value {
     let mut verdict = stated.map_or(json!({}), |s| json!(s.verdict));
     verdict["kind"] = json!(judgement.kind);
     let outage = |(k, (start_s, end_s)): (usize, &(f64, f64))| {
-        let within = judgement.errors.iter();
-        let last = within
-            .filter(|e| e.t_s > *start_s && e.t_s <= end_s + 1e-6)
-            .last();
+        let mut within = judgement.errors.iter();
+        let last = within.rfind(|e| e.t_s > *start_s && e.t_s <= end_s + 1e-6);
         json!({
             "start_s": start_s,
             "end_s": end_s,

@@ -169,7 +169,12 @@ fn departure(verdict: &Verdict, outages: &[(f64, f64)]) -> String {
 
 fn with_error(value: f64, error: f64) -> String {
     if error > 0.0 {
-        format!("{} ± {error:.2}", readable(value))
+        let error = if error < 10.0 {
+            format!("{error:.2}")
+        } else {
+            readable(error)
+        };
+        format!("{} ± {error}", readable(value))
     } else {
         readable(value)
     }

@@ -280,7 +280,7 @@ impl FromStr for MountingChoice {
 /// Standard deviations of fixes where the file states none, and factors of what it states, of position and of velocity.
 pub type GnssSigma = (Option<FixSigma>, [f64; 2]);
 
-fn number(text: &str) -> Result<f64, &'static str> {
+pub(super) fn number(text: &str) -> Result<f64, &'static str> {
     text.parse()
         .ok()
         .filter(|x: &f64| x.is_finite())

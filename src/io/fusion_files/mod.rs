@@ -153,9 +153,10 @@ static FIX_QUANTITIES: [Quantity; 33] = [
 pub(super) const SD_N: &str = "sd_n std_n sigma_n pos_std_n sd_north sd_lat sdn north_std sdnorth";
 pub(super) const SD_E: &str = "sd_e std_e sigma_e pos_std_e sd_east sd_lon sde east_std sdeast";
 pub(super) const SD_D: &str = "sd_d std_d sigma_d pos_std_d sd_u std_u sd_h sdu up_std sdheight";
-pub(super) const SD_VN: &str = "sd_vn sd_v_n vel_std_n sdvn northvel_std sd_vnorth";
-pub(super) const SD_VE: &str = "sd_ve sd_v_e vel_std_e sdve eastvel_std sd_veast";
-pub(super) const SD_VD: &str = "sd_vd sd_v_d vel_std_d sdvu sd_vu sd_v_u upvel_std sd_vup sd_vh";
+pub(super) const SD_VN: &str = "sd_vn sd_v_n std_vn std_v_n vel_std_n sdvn northvel_std sd_vnorth";
+pub(super) const SD_VE: &str = "sd_ve sd_v_e std_ve std_v_e vel_std_e sdve eastvel_std sd_veast";
+pub(super) const SD_VD: &str =
+    "sd_vd sd_v_d std_vd std_v_d vel_std_d sdvu sd_vu sd_v_u upvel_std sd_vup sd_vh";
 const V_D: Quantity = Quantity::speed("v_d_m_s", "v_d vd");
 /// Columns of position, its deviations, velocity and those.
 const GEODETIC: [[&str; 3]; 4] = [

@@ -144,11 +144,11 @@ impl Quantity {
         }
     }
 
-    /// The same where it is above 0, as a standard deviation is.
+    /// The same where it is above 0, as a standard deviation is; the squares of smaller ones are no numbers to divide by.
     pub(crate) const fn positive(self) -> Self {
         const REASON: &str = "is not a standard deviation: it must be above 0";
         Self {
-            range: Some((f64::MIN_POSITIVE, f64::MAX, REASON)),
+            range: Some((1e-9, f64::MAX, REASON)),
             ..self
         }
     }

@@ -175,9 +175,12 @@ pub fn judge(
     let own = stated
         .as_ref()
         .map_or(VerdictKind::Undecided, |s| s.verdict.kind);
-    let kind = match doubts.is_empty() {
-        true => own,
-        false => VerdictKind::Doubtful,
+    // a fault that an offset does not explain stays one
+    let left = without_offset.as_ref().map(|w| w.verdict.kind);
+    let kind = match (doubts.as_slice(), left) {
+        ([], _) => own,
+        ([Doubt::Offset(_)], Some(left)) if left > VerdictKind::Undecided => left,
+        _ => VerdictKind::Doubtful,
     };
     let horizontal_max_m = errors
         .iter()
@@ -360,6 +363,8 @@ const COSTLY: f64 = 30.0;
 const STEPS: usize = 5;
 const OFF: f64 = 0.01;
 const FITTED: usize = 5000;
+/// A point (m) and a clock (s) that are nearer are the same.
+const LEAST: (f64, f64) = (1e-3, 1e-4);
 /// A point farther off is another frame (m).
 const FARTHEST_M: f64 = 30.0;
 /// Rows that are looked at for a rough clock, and how far it is looked for (s), in steps (s).
@@ -399,8 +404,9 @@ fn found_offset(
     let variance = normal.inverse.diagonal();
     let sigma = ReferenceOffset::of(&variance.map(|v| v.max(0.0).sqrt()));
     let is_delay = parts[0] && off[3].powi(2) > COSTLY * variance[3];
-    let is_far = off.fixed_rows::<3>(0).norm() > FARTHEST_M;
-    (!is_far && (parts[1] || is_delay)).then(|| FoundOffset {
+    let arm_m = off.fixed_rows::<3>(0).norm();
+    let is_none = arm_m < LEAST.0 && off[3].abs() < LEAST.1;
+    (!is_none && arm_m < FARTHEST_M && (parts[1] || is_delay)).then(|| FoundOffset {
         offset: ReferenceOffset::of(&x),
         sigma,
         parts,

@@ -442,8 +442,12 @@ pub fn assess(
     // errors tell what innovations do not; one kind of them is enough where it finds no fault
     let is_told = |finding: &Finding| matches!(finding, Finding::Correlated { .. });
     if !errors.is_empty() {
-        findings
-            .retain(|(verdict, finding)| *verdict != VerdictKind::Undecided && !is_told(finding));
+        // windows show what the IMU does, and not that the fixes are better than stated
+        let is_open = correlated.is_none() && outcome.reference.is_none();
+        let is_low = |finding: &Finding| matches!(finding, Finding::Nis { per_component } if *per_component < NIS_LOW);
+        findings.retain(|(verdict, finding)| {
+            *verdict != VerdictKind::Undecided && !is_told(finding) || is_open && is_low(finding)
+        });
     }
     let decides = errors
         .iter()

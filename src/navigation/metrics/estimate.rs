@@ -118,6 +118,11 @@ impl SampleSize {
             square += last * last;
         }
         let independent = energy * energy / (square * states);
+        let independent = if independent.is_finite() {
+            independent
+        } else {
+            1.0
+        };
         Self {
             values,
             independent: independent.clamp(1.0, (values as f64).max(1.0)),

@@ -264,10 +264,10 @@ impl Verdict {
         };
         let limit = chi_square_interval(known.len().max(1), 1.0, 1.0 - COVERAGE).upper;
         let end = |&(start_s, end_s): &(f64, f64)| {
-            let within = errors
+            let mut within = errors
                 .iter()
                 .filter(|e| e.t_s > start_s && e.t_s <= end_s + 1e-6);
-            let last = within.last();
+            let last = within.next_back();
             OutageRecord {
                 error_end: last.map_or([f64::NAN; REPORTED], |e| e.over_sigma),
                 see_end: [1.0; REPORTED],
@@ -527,7 +527,7 @@ impl Judge {
     /// The fewest times the samples that decide, by bisection: the limits close on 1 as samples are added.
     fn times_to_decide(&self) -> f64 {
         let (mut few, mut enough) = (1.0, 2.0);
-        while !self.is_decisive(None, enough) {
+        while !self.is_decisive(None, enough) && enough < 1e9 {
             (few, enough) = (enough, 2.0 * enough);
         }
         while enough - few > 1e-9 * enough {
@@ -600,7 +600,7 @@ impl Judge {
         let alarms = |s: &Statistic| Self::fault(s) == Some(kind);
         let alarmed = |alone: bool| {
             let mut own = all.clone().filter(|s| s.state.is_some() == alone);
-            own.any(|s| alarms(s))
+            own.any(alarms)
         };
         let together = alarmed(false) && !alarmed(true);
         let states = all.filter(|s| s.state.is_none() == together);

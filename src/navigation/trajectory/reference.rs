@@ -224,14 +224,14 @@ pub fn usable(samples: &[TrajectorySample], breaks: &[Break]) -> Vec<Range<usize
         if (jump(before) || jump(after)) && last.t_s - first.t_s < SHORTEST_S {
             continue;
         }
-        let range = edge[0] + part.partition_point(|s| s.t_s < from - 1e-6)
-            ..edge[0] + part.partition_point(|s| s.t_s <= to + 1e-6);
         // a clock that was set back: what is behind is not gone through twice
-        let later = found
+        let gone_s = found
             .last()
-            .is_none_or(|r| samples[r.end - 1].t_s < samples[range.start.min(edge[1] - 1)].t_s);
+            .map_or(f64::NEG_INFINITY, |r| samples[r.end - 1].t_s);
+        let start = part.partition_point(|s| s.t_s < from - 1e-6 || s.t_s <= gone_s);
+        let range = edge[0] + start..edge[0] + part.partition_point(|s| s.t_s <= to + 1e-6);
         // Four samples are what a spline needs.
-        if range.len() >= 4 && later {
+        if range.len() >= 4 {
             found.push(range);
         }
     }
@@ -269,7 +269,7 @@ impl<'a> Steps<'a> {
         let seconds = self.seconds(index);
         // Time first: everything below divides by the seconds.
         if seconds <= 0.0 {
-            return Some(Fault::Back(-seconds));
+            return Some(Fault::Back(seconds.abs()));
         }
         if seconds > GAP.1.max(GAP.0 * self.median_s) {
             return Some(Fault::Gap(seconds));
