@@ -128,7 +128,7 @@ impl FuseAnswer {
         if outcome.reference.is_some() && outcome.nis_per_component < 1.0 {
             "axes and clock of the reference may be others than those of the solution"
         } else {
-            "check axes (--mounting), units, start (--initial), clocks (--gnss-delay) and antenna (--lever-arm)"
+            "check axes (--mounting), units, start (--initial), clocks (--gnss-delay), antenna (--lever-arm) and the standard deviations of the fixes (--gnss-sigma)"
         }
     }
 

@@ -112,14 +112,13 @@ pub(crate) fn load_solution(
         let rows = fixes.iter().map(of_fix).collect();
         return Ok((rows, notes.into_iter().map(|note| note.text).collect()));
     }
-    let Some(rows) = read(path, origin, false)? else {
+    let Some(mut rows) = read(path, origin, false)? else {
         let message = "a motion profile is no solution";
-        return Err(Error::contents(
-            path.display().to_string(),
-            Place::Within,
-            message,
-        ));
+        let refused = Error::contents(path.display().to_string(), Place::Within, message);
+        return Err(unless_other(path)(refused));
     };
+    rows.check_heights()?;
+    rows.check_steps()?;
     increasing(
         &rows.path,
         |k| rows.lines[k],
@@ -140,10 +139,10 @@ pub(crate) fn load_solution(
         has_correlations: false,
     };
     let mut stated: Vec<StatedRow> = rows.samples.iter().enumerate().map(row).collect();
-    if let Some(path) = covariance {
-        add_covariances(path, &mut stated)?;
-    }
     let mut doubts = rows.doubts;
+    if let Some(path) = covariance {
+        doubts.extend(add_covariances(path, &mut stated)?);
+    }
     // a solution has columns of other states
     doubts.retain(|text| {
         !(text.contains("no attitude columns") || text.contains("columns not used"))
@@ -188,8 +187,9 @@ fn of_fix(fix: &GnssFix) -> StatedRow {
 /// header, the one that KF-GINS writes, or rows of a time and a matrix, row by row: position north, east, down (3 × 3, m²);
 /// the pose of ROS, x, y, z and rotations about them (6 × 6, m², rad²); position, velocity, rotations about north, east, down
 /// (9 × 9).
-fn add_covariances(path: &Path, rows: &mut [StatedRow]) -> Result<(), Failure> {
+fn add_covariances(path: &Path, rows: &mut [StatedRow]) -> Result<Option<String>, Failure> {
     const COUNTS: [usize; 3] = [1 + 9, 1 + 36, 1 + 81];
+    const KF_GINS_COLUMNS: usize = 22;
     let name = path.display().to_string();
     let text = source::table_text(path)?;
     let numbers = |line: &str| -> Option<Vec<f64>> {
@@ -202,13 +202,14 @@ fn add_covariances(path: &Path, rows: &mut [StatedRow]) -> Result<(), Failure> {
         lines().filter(|(_, l)| !(l.trim().is_empty() || l.trim_start().starts_with(['#', '%'])))
     };
     let first = content().next().and_then(|(_, line)| numbers(line));
-    let is_matrix = first.is_some_and(|row| COUNTS.contains(&row.len()));
+    let is_matrix = first.is_some_and(|row| row.len() != KF_GINS_COLUMNS);
     let mut found: Vec<(f64, u64, Covariance)> = Vec::new();
     if is_matrix {
         for (line, text) in content() {
-            let row = numbers(text).filter(|row| COUNTS.contains(&row.len()));
+            let row = numbers(text)
+                .filter(|row| COUNTS.contains(&row.len()) && row.iter().all(|x| x.is_finite()));
             let row = row.ok_or_else(|| {
-                let message = "a time and 9, 36 or 81 numbers are expected";
+                let message = "a time and 9, 36 or 81 finite numbers are expected";
                 Error::contents(&name, line, message)
             })?;
             found.push((row[0], line, of_matrix(&row[1..])));
@@ -248,6 +249,8 @@ fn add_covariances(path: &Path, rows: &mut [StatedRow]) -> Result<(), Failure> {
             row.covariance = *own;
             row.has_correlations = is_matrix;
             matched += 1;
+        } else {
+            row.covariance = Covariance::from_diagonal_element(f64::NAN);
         }
     }
     let span = found.first().zip(found.last());
@@ -263,7 +266,8 @@ fn add_covariances(path: &Path, rows: &mut [StatedRow]) -> Result<(), Failure> {
         return Err(Error::contents(&name, Place::Within, message)
             .or_hint("write both with the same time stamps"));
     }
-    Ok(())
+    let without = rows.len() - matched;
+    Ok((without > 0).then(|| format!("{name}: nothing for {without} of {} rows", rows.len())))
 }
 
 /// A covariance from its numbers, row by row; angles in degrees, NaN where a state is not in it.
@@ -760,15 +764,22 @@ impl Rows {
         }
         let times = self.samples.iter().map(|s| s.t_s);
         let given: Vec<_> = times.zip(self.velocities.iter().copied()).collect();
-        let misfit = VelocityMisfit::new(trajectory, &given).filter(VelocityMisfit::contradicts);
-        if let Some(VelocityMisfit { rms, worst_s, .. }) = misfit {
+        if let Some((worst_s, text)) = contradiction(trajectory, &given) {
             let worst = given.iter().position(|(t_s, _)| *t_s == worst_s);
-            let text = format!(
-                "velocity columns differ from the positions, which are used, by {rms:.3} m/s rms"
-            );
             self.doubt(worst.map(|i| self.lines[i]), text);
         }
     }
+}
+
+/// Velocities (s, m/s) that positions contradict: where most, and in words.
+fn contradiction(trajectory: &Trajectory, given: &[(f64, DVec3)]) -> Option<(f64, String)> {
+    let misfit = VelocityMisfit::new(trajectory, given).filter(VelocityMisfit::contradicts);
+    misfit.map(|VelocityMisfit { rms, worst_s, .. }| {
+        let text = format!(
+            "velocity columns differ from the positions, which are used, by {rms:.3} m/s rms"
+        );
+        (worst_s, text)
+    })
 }
 
 /// A heading far from the course that another convention or unit brings near it: four times as near, where it is
@@ -817,15 +828,29 @@ impl Rows {
     fn reference(mut self) -> Result<(Reference, Vec<String>), Error> {
         let found = breaks(&self.samples);
         let mut refused = None;
+        if self.samples.is_empty() {
+            let left_out = self.doubts.first().cloned();
+            let message = left_out.unwrap_or_else(|| format!("{}: no rows in it", self.path));
+            return Err(Error::input(message)
+                .hint("check units: angles are in degrees, or their names end in _rad"));
+        }
         let (mut stretches, mut seconds) = (Vec::new(), 0.0);
+        let mut contradicted = None;
         for range in usable(&self.samples, &found) {
             match self.stretch(range.clone()) {
                 Ok(stretch) => {
+                    let velocities = self.velocities.get(range.clone()).into_iter().flatten();
+                    let times = self.samples[range.clone()].iter().map(|s| s.t_s);
+                    let given: Vec<_> = times.zip(velocities.copied()).collect();
+                    contradicted = contradicted.or_else(|| contradiction(&stretch, &given));
                     seconds += stretch.end_s() - stretch.start_s();
                     stretches.push(stretch);
                 }
                 Err(source) => refused = refused.or(Some(source)),
             }
+        }
+        if let Some((_, text)) = contradicted {
+            self.doubt(None, text);
         }
         let parts = stretches.len();
         let Some(reference) = Reference::of_stretches(stretches) else {

@@ -799,12 +799,12 @@ mod assessment_tests {
         assert_eq!(found.verdict, VerdictKind::Undecided);
     }
 
-    /// Errors of 1.0, 1.4 and 0.7 times the stated at the ends of twelve windows decide, also where the fixes do not tell; of
-    /// two windows with six components, χ² of 12 degrees, 1.4 is chance.
+    /// Errors of 1.0, 1.4 and 0.7 times the stated at the ends of twelve windows decide; of two windows with six components, χ²
+    /// of 12 degrees, 1.4 is chance. Fixes that are better than stated stay open.
     #[test]
     fn withheld_windows_decide() {
-        let all = solution(|_| 0.3, 600);
-        let judged = |ratio: f64, windows: usize| {
+        let judged_at = |nis: f64, ratio: f64, windows: usize| {
+            let all = solution(|_| nis, 600);
             let squares = (0..windows).map(|_| (6.0 * ratio * ratio, 6));
             let withheld = Withheld {
                 windows,
@@ -813,6 +813,7 @@ mod assessment_tests {
             };
             assess(&weighed(&all), &outcome(&all, &[]), &[], Some(withheld)).verdict
         };
+        let judged = |ratio, windows| judged_at(1.0, ratio, windows);
         assert_eq!(
             [1.0, 1.4, 0.7].map(|ratio| judged(ratio, 12)),
             [
@@ -822,6 +823,7 @@ mod assessment_tests {
             ]
         );
         assert_eq!(judged(1.4, 2), VerdictKind::Undecided);
+        assert_eq!(judged_at(0.3, 1.0, 12), VerdictKind::Undecided);
     }
 
     /// What is as believed is doubted once in 500 at most, however few its fixes.

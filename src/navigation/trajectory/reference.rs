@@ -224,14 +224,16 @@ pub fn usable(samples: &[TrajectorySample], breaks: &[Break]) -> Vec<Range<usize
         if (jump(before) || jump(after)) && last.t_s - first.t_s < SHORTEST_S {
             continue;
         }
-        // a clock that was set back: what is behind is not gone through twice
+        // a clock that was set back: what is behind is not gone through twice; a stamp that is repeated is passed over
         let gone_s = found
             .last()
             .map_or(f64::NEG_INFINITY, |r| samples[r.end - 1].t_s);
-        let start = part.partition_point(|s| s.t_s < from - 1e-6 || s.t_s <= gone_s);
+        let start = part.partition_point(|s| s.t_s < from - 1e-6);
+        let is_later = part.get(start).is_some_and(|s| s.t_s >= gone_s);
+        let start = start + part[start..].partition_point(|s| s.t_s <= gone_s);
         let range = edge[0] + start..edge[0] + part.partition_point(|s| s.t_s <= to + 1e-6);
         // Four samples are what a spline needs.
-        if range.len() >= 4 {
+        if range.len() >= 4 && is_later {
             found.push(range);
         }
     }
@@ -451,6 +453,9 @@ mod tests {
         assert_eq!(spans(&far), [(0.0, 30.0), (30.1, 60.0)]);
         let back = drive(|t, s| s.t_s -= if t > 40.02 { 10.0 } else { 0.0 });
         assert_eq!(spans(&back), [(0.0, 40.0)]);
+        let mut twice = drive(|_, _| {});
+        twice.insert(801, twice[800]);
+        assert_eq!(spans(&twice), [(0.0, 40.0), (40.05, 60.0)]);
     }
 
     #[test]
