@@ -389,6 +389,8 @@ def judge(
         How late the stamps of the reference are (s), and its point from that of the solution: front, right, down (m).
     origin
         Latitude, longitude (°) and height (m) of local coordinates.
+    threads
+        Threads that compute; by default one a core.
 
     Returns
     -------

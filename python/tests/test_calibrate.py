@@ -43,11 +43,11 @@ def test_arrays_tables_and_files_are_the_same(recordings: Path) -> None:
 
 
 def test_a_single_signal() -> None:
-    # white noise of variance 4: 65536 samples know it to sqrt(2/65536) = 0.55 %; five deviations
-    x = 2.0 * np.random.default_rng(1).standard_normal(65536)
+    # white noise of variance 4e-6: 65536 samples know it to sqrt(2/65536) = 0.55 %; five deviations
+    x = 2e-3 * np.random.default_rng(1).standard_normal(65536)
     fit = calibrate(x, rate_hz=200.0, axes="gyro.z", estimator="gmwm", model="WN", bootstrap=0)
     assert fit.model.channels == ["gyro.z"]
-    assert fit.parameters["value"][0] == pytest.approx(4.0, rel=0.028)
+    assert fit.parameters["value"][0] == pytest.approx(4e-6, rel=0.028)
     assert fit.parameters["unit"][0] == "(rad/s)²"
     assert fit.model.rate_hz == 200.0
 
@@ -68,7 +68,8 @@ def test_parameters_curves_and_model(recordings: Path) -> None:
 
 def test_texts_show_the_argument_and_not_where_it_was_put() -> None:
     rng = np.random.default_rng(2)
-    fit = calibrate([rng.standard_normal((512, 6)) for _ in range(2)], rate_hz=100.0, model="WN", bootstrap=0)
+    sigma = [1e-2] * 3 + [1e-3] * 3
+    fit = calibrate([sigma * rng.standard_normal((512, 6)) for _ in range(2)], rate_hz=100.0, model="WN", bootstrap=0)
     texts = [fit._native.json(), fit.summary(), fit._native.html(), *map(fit.text, fit.files)]
     assert not any("nav-sim-" in text.replace("nav-sim-python", "") and "/tmp/" in text for text in texts)
     files = [r["file"] for r in json.loads(fit.text("model.wv.json"))["curves"][0]["replicates"]]
