@@ -78,7 +78,7 @@ impl<'a> Context<'a> {
         Self { out, ..self }
     }
 
-    /// Whether `--out` has this ending, packed or not.
+    /// True if `--out` has this ending, packed or not.
     pub(crate) fn writes(&self, ending: &str) -> bool {
         let name = |out: &PathBuf| out.to_string_lossy().to_lowercase();
         let mut names = self.out.iter().map(name);

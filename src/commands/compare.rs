@@ -30,7 +30,7 @@ mod models;
 /// (II_sr-awv, or II/sr-awv); --table prints the layout of the paper's Table I. All states are in the JSON file; a page
 /// with NEES, coverage and RMSE is written beside it.
 ///
-/// Of two model files: N, B, K, Q and the parameters of the processes, and which of them changed beyond their 95 % intervals.
+/// Two model files: N, B, K, Q and the parameters of the processes, and which of them changed beyond their 95 % intervals.
 #[derive(clap::Args, Debug, Clone)]
 #[command(before_help = "\
 Examples:

@@ -126,7 +126,7 @@ fn beyond(verdict: &Verdict, outages: &[(f64, f64)]) -> String {
     format!("beyond linear theory{place}: confirm with --method both")
 }
 
-/// What a verdict rests on.
+/// The samples of a verdict.
 fn samples(verdict: &Verdict) -> String {
     let worth = readable(verdict.independent_samples);
     match verdict.basis {
@@ -139,7 +139,7 @@ fn samples(verdict: &Verdict) -> String {
     }
 }
 
-/// What would decide.
+/// The samples that would decide.
 pub(crate) fn deciding(verdict: &Verdict) -> String {
     let times = verdict.times_to_decide.unwrap_or(1.0);
     let longer = (10.0 * times).ceil() / 10.0;

@@ -143,10 +143,6 @@ pub(crate) fn load_solution(
     if let Some(path) = covariance {
         doubts.extend(add_covariances(path, &mut stated)?);
     }
-    // a solution has columns of other states
-    doubts.retain(|text| {
-        !(text.contains("no attitude columns") || text.contains("columns not used"))
-    });
     Ok((stated, doubts))
 }
 
@@ -402,6 +398,8 @@ struct Rows {
     /// Whether positions are latitude and longitude, which may have been given in the wrong unit.
     geodetic: bool,
     doubts: Vec<String>,
+    /// Those that only a trajectory gives: columns that it does not use, and an attitude that follows the path.
+    of_trajectory: Vec<String>,
 }
 
 impl Rows {
@@ -411,9 +409,16 @@ impl Rows {
         self.doubts.push(text);
     }
 
+    fn doubt_of_trajectory(&mut self) {
+        for text in std::mem::take(&mut self.of_trajectory) {
+            self.doubt(None, text);
+        }
+    }
+
     /// The trajectory through all rows, and what is doubtful about it. Every format comes through here, so that
     /// what is refused in one is refused in all.
     fn trajectory(mut self) -> Result<(Trajectory, Vec<String>), Error> {
+        self.doubt_of_trajectory();
         self.check_heights()?;
         self.check_steps()?;
         let place = |s: &TrajectorySample| (s.t_s, geodetic_to_ecef(s.lat, s.lon, s.h));
@@ -572,10 +577,13 @@ fn rows(
         .then(|| format!("columns not used: {}", table.ignored.join(", ")));
     let axes = "axes taken as ROS has them: position east, north, up; body forward, left, up";
     let path = "no attitude columns: heading and pitch follow the path, roll is 0";
-    let doubts = left_out.into_iter().chain(unused);
+    rows.of_trajectory = unused
+        .into_iter()
+        .chain(rows.follows_path.then(|| path.to_owned()))
+        .collect();
+    let doubts = left_out.into_iter();
     let doubts = doubts.chain(table.assumptions.iter().chain(&table.warnings).cloned());
-    let doubts = doubts.chain(is_enu.then(|| axes.to_owned()));
-    for text in doubts.chain(rows.follows_path.then(|| path.to_owned())) {
+    for text in doubts.chain(is_enu.then(|| axes.to_owned())) {
         rows.doubt(None, text);
     }
     Ok(rows)
@@ -826,6 +834,7 @@ fn heading(rows: &Rows, trajectory: &Trajectory) -> Option<String> {
 impl Rows {
     /// The stretches of the rows between what no vehicle does, and what is doubtful about them.
     fn reference(mut self) -> Result<(Reference, Vec<String>), Error> {
+        self.doubt_of_trajectory();
         let found = breaks(&self.samples);
         let mut refused = None;
         if self.samples.is_empty() {

@@ -196,7 +196,7 @@ impl Normal {
     }
 
     /// The best values of the parts that are kept where the others are zero, and their covariance.
-    pub(super) fn without_the_rest(
+    fn without_the_rest(
         &self,
         x: &Vector4<f64>,
         kept: &[Range<usize>],
@@ -265,7 +265,7 @@ pub struct Whiteness {
 }
 
 impl Whiteness {
-    /// Of the positions of the fixes used; none where they are few.
+    /// For the positions of the fixes used; none where they are few.
     pub fn of<'a>(fixes: impl IntoIterator<Item = &'a FixRecord>) -> Option<Self> {
         Self::of_part(fixes, PARTS[0])
     }
@@ -328,7 +328,7 @@ pub struct Weighed {
     pub as_stated: Option<Solution>,
     /// Whiteness of the innovations with standard deviations as stated: of position, of velocity.
     pub whiteness: [Option<Whiteness>; 2],
-    /// How many times the stated standard deviations of these.
+    /// Factors on the stated standard deviations of these.
     pub sigma_factors: [f64; 2],
 }
 
@@ -407,7 +407,7 @@ pub fn fuse_correlated(
     })
 }
 
-/// Whether a gate would reject any fix.
+/// True if a gate would reject any fix.
 fn gates(solution: &Solution, level: Option<f64>) -> bool {
     let is_far = |f: &FixRecord| f.used && f.nis > Gate::bound(level, f.innovation.len());
     solution.fixes.iter().any(is_far)

@@ -25,7 +25,7 @@ pub(super) struct Gate {
     since_s: f64,
 }
 
-/// What becomes of a fix.
+/// Fate of a fix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Passage {
     /// It is used.

@@ -21,18 +21,18 @@ pub struct StatedRow {
     pub t_s: f64,
     /// Position; velocity and attitude where they are known.
     pub state: NavState,
-    /// Whether the solution has a velocity, and an attitude.
+    /// True if the solution has a velocity, an attitude.
     pub has: [bool; 2],
     /// Covariance of position (m, north, east, down), velocity (m/s), roll, pitch, yaw (degrees): NaN where none is stated.
     pub covariance: SMatrix<f64, REPORTED, REPORTED>,
-    /// Whether its correlations are stated too.
+    /// True if its correlations are stated too.
     pub has_correlations: bool,
 }
 
 /// Clock and point of a reference beside those of a solution.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct ReferenceOffset {
-    /// How late the stamps of the reference are (s).
+    /// Delay of the stamps of the reference (s).
     pub delay_s: f64,
     /// The reference's point from the solution's: front, right, down (m).
     pub lever_arm_m: DVec3,
@@ -73,7 +73,7 @@ pub struct FoundOffset {
     pub offset: ReferenceOffset,
     /// Standard deviations.
     pub sigma: ReferenceOffset,
-    /// Whether the clock is part of it, and the point.
+    /// True if the clock, the point is part of it.
     #[serde(skip)]
     pub parts: [bool; 2],
 }
@@ -94,7 +94,7 @@ pub enum Doubt {
     },
     /// Axes are others.
     Axes {
-        /// Of the body, or of navigation (north, east, down).
+        /// The body's, or those of navigation (north, east, down).
         axes: &'static str,
         /// Roll, pitch and yaw of the solution's axes in the reference's (degrees).
         angles_deg: [f64; 3],
@@ -109,28 +109,27 @@ pub enum Doubt {
 }
 
 /// A solution judged by a reference.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct Judgement {
     /// In one word.
     pub kind: VerdictKind,
-    /// What the errors over their standard deviations tell; none without standard deviations.
+    /// Verdict on the errors over their standard deviations; none without standard deviations.
     pub stated: Option<DriveVerdict>,
     /// The same without the offset that was found.
     pub without_offset: Option<DriveVerdict>,
-    /// What else explains the errors.
+    /// Other explanations of the errors.
     pub doubts: Vec<Doubt>,
     /// Another clock or point of the reference that was found, also where it explains little.
     pub offset: Option<FoundOffset>,
     /// Root mean square errors; NaN where not known.
     pub rmse: PerState<f64>,
-    /// Of the horizontal distance (m).
+    /// Root mean square of the horizontal distance (m).
     pub horizontal_rmse_m: f64,
     /// Largest horizontal distance (m).
     pub horizontal_max_m: f64,
     /// Rows that the reference reaches.
     pub rows: usize,
     /// Their errors.
-    #[serde(skip)]
     pub errors: Vec<StatedErrors>,
 }
 
@@ -480,7 +479,7 @@ fn normalised_error(row: &StatedRow, reference: &Reference, x: &Vector4<f64>) ->
     }))
 }
 
-/// How late the stamps of a reference are, to half a second, where another clock brings it much nearer; none where the
+/// Delay of the stamps of a reference (s), to half a second, where another clock brings it much nearer; none where the
 /// given one is as good.
 pub fn rough_delay_s(
     rows: &[StatedRow],

@@ -108,7 +108,7 @@ pub struct FromReference {
     nees_dof: usize,
     /// How well the velocity of the reference is known, which the NEES allows for: root mean square (m/s).
     pub velocity_sigma_m_s: f64,
-    /// What the errors over their standard deviations tell.
+    /// Verdict on the errors over their standard deviations.
     pub verdict: Option<DriveVerdict>,
 }
 
@@ -327,8 +327,6 @@ const FEWEST: usize = 50;
 /// Stretch in which the NIS is looked at by itself (s), and the share of bad ones that is too much.
 const STRETCH_S: f64 = 60.0;
 const BAD_STRETCHES: f64 = 0.1;
-/// How improbable errors at the ends of outages are doubtful, and how many times the stated ones, then, are too much.
-const ENDS: (f64, f64) = (1e-3, 2.0);
 /// Evidence on a solution.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(tag = "evidence", rename_all = "snake_case")]
@@ -385,7 +383,7 @@ pub enum Finding {
     Ends(Ends),
     /// Errors against the reference.
     Reference {
-        /// What they tell.
+        /// Verdict on them.
         verdict: Verdict,
     },
     /// Errors at the ends of windows in which fixes were withheld.
@@ -561,11 +559,13 @@ fn far(fixes: &[&FixRecord]) -> Option<f64> {
     (components > 0 && nis > nis_bound(components)).then_some(nis)
 }
 
-/// Errors at the ends of outages and gaps that are not as stated.
+/// Errors at the ends of outages and gaps that are larger than stated.
 fn ends_finding(outcome: &Outcome) -> Option<(VerdictKind, Finding)> {
-    let ends = outcome.ends.filter(|ends| ends.p_value < ENDS.0)?;
-    let is_much = ends.error_over_sigma > ENDS.1;
-    Some((too_large(is_much), Finding::Ends(ends)))
+    let ends = outcome.ends?;
+    let degrees = 2 * ends.count;
+    let sum = degrees as f64 * ends.error_over_sigma.powi(2);
+    let kind = Verdict::of_windows([(sum, degrees)].into_iter())?.kind;
+    (kind == VerdictKind::Overconfident).then_some((kind, Finding::Ends(ends)))
 }
 
 /// Verdict on errors that are larger than stated.
@@ -735,8 +735,8 @@ mod assessment_tests {
         );
     }
 
-    /// Nine outages of ends 1.8 times as far as stated are doubtful, 2.5 times is too much, and 1.3 is chance: of chi-square
-    /// of 18 degrees 58, 113 and 30 are exceeded with probabilities of 4e-6, 1e-15 and 0.03.
+    /// Ten outages of ends 1.5 and 2.5 times as far as stated are too much, and 1.3 is chance: chi-square of 20 degrees exceeds
+    /// 40, ratio 1.41, once in 200.
     #[test]
     fn ends_of_outages_count() {
         let verdict = |ratio: f64| {
@@ -752,10 +752,10 @@ mod assessment_tests {
                 .find(|(_, f)| matches!(f, Finding::Ends(_)))
         };
         assert_eq!(
-            [1.3, 1.8, 2.5].map(|ratio| verdict(ratio).map(|(kind, _)| kind)),
+            [1.3, 1.5, 2.5].map(|ratio| verdict(ratio).map(|(kind, _)| kind)),
             [
                 None,
-                Some(VerdictKind::Doubtful),
+                Some(VerdictKind::Overconfident),
                 Some(VerdictKind::Overconfident)
             ]
         );

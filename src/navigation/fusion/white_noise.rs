@@ -14,7 +14,7 @@ use crate::noise::{Composite, Kind, Model, Process};
 use serde::Serialize;
 use std::f64::consts::FRAC_PI_2;
 
-/// How many times the model's standard deviation is noise of another kind: the right IMU reads 0.2 to 1.3 on real drives,
+/// Factor on the model's standard deviation from which on noise is of another kind: the right IMU reads 0.2 to 1.3 on real drives,
 /// phones 3 to 43.
 const LARGER: f64 = 2.0;
 /// Sum of the squares of the coefficients of a fourth difference.
@@ -25,7 +25,7 @@ const FEWEST: usize = 200;
 const OF_MAD: f64 = 1.482_602;
 /// Loss in −2 ln(likelihood) from which the fixes disagree: odds of e^5. On a drive that hardly tells, it is 5 by chance.
 const DECIDES: f64 = 10.0;
-/// How much of a recording is looked at (s).
+/// Length of a recording that is looked at (s).
 const MOST_S: f64 = 1200.0;
 
 /// White noise of a sensor that is larger than the model's.
@@ -97,7 +97,7 @@ impl OwnNoise {
     }
 }
 
-/// Whether the first belief predicts the fixes as well as the second. What receivers state is right to a factor, so one
+/// True if the first belief predicts the fixes as well as the second. What receivers state is right to a factor, so one
 /// factor of all deviations is left open.
 pub fn predicts_as_well(
     recorded: &Recorded<'_>,

@@ -27,11 +27,11 @@ const ENOUGH: usize = 66;
 /// Errors at the ends of withheld windows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Withheld {
-    /// How many windows.
+    /// Number of windows.
     pub windows: usize,
-    /// How long each is (s).
+    /// Length of each (s).
     pub length_s: f64,
-    /// What the errors tell.
+    /// Verdict on the errors.
     pub verdict: Verdict,
 }
 

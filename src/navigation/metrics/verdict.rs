@@ -88,7 +88,7 @@ pub struct Verdict {
     pub by_covariance_analysis: Option<VerdictKind>,
     /// The first outage (from 0) in which errors are beyond linear theory, where covariance analysis does not hold.
     pub beyond_linear: Option<usize>,
-    /// What the samples are.
+    /// Kind of the samples.
     pub basis: Basis,
     /// Samples that count as independent; infinitely many (null) of a covariance analysis. Of a drive those of all states
     /// together.
@@ -97,7 +97,7 @@ pub struct Verdict {
     pub detectable_ratio: f64,
     /// The same of the state that is known least.
     pub detectable_state_ratio: f64,
-    /// How many times as many samples would decide; none (null) where the verdict is decided.
+    /// Factor on the number of samples that would decide; none (null) where the verdict is decided.
     pub times_to_decide: Option<f64>,
     /// Probability at which a right filter is called wrong, all statistics together.
     pub level: f64,
@@ -105,7 +105,7 @@ pub struct Verdict {
     pub tolerance: f64,
 }
 
-/// What a verdict rests on.
+/// Kind of the samples of a verdict.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Basis {
     /// Simulated runs, each with noise of its own.
@@ -223,7 +223,7 @@ impl Verdict {
         judged(runs, outages, independent_windows).0
     }
 
-    /// Of one recorded drive with outages (start, end) (s): errors in order of time. None without errors over their
+    /// The verdict on one recorded drive with outages (start, end) (s): errors in order of time. None without errors over their
     /// standard deviations.
     pub fn of_drive(errors: &[NormalisedErrors], outages: &[(f64, f64)]) -> Option<DriveVerdict> {
         let column = |state: usize| errors.iter().map(move |e| e.over_sigma[state]);
@@ -329,7 +329,7 @@ impl Verdict {
         })
     }
 
-    /// Of normalised squares of so many degrees of freedom each, independent of one another; none without any.
+    /// The verdict on normalised squares of so many degrees of freedom each, independent of one another; none without any.
     pub fn of_windows(squares: impl Iterator<Item = (f64, usize)>) -> Option<Self> {
         let (mut sum, mut degrees, mut windows) = (0.0, 0, 0.0);
         for (square, own) in squares {
@@ -385,7 +385,7 @@ struct Statistic {
     ratio: Estimate,
     /// Degrees of freedom of a sample, and independent samples.
     freedom: (usize, f64),
-    /// Where the ratio of a right filter lies.
+    /// Between these the ratio of a right filter lies.
     limits: (f64, f64),
 }
 
@@ -421,7 +421,7 @@ struct Judge {
 }
 
 impl Judge {
-    /// Of runs that all count alike.
+    /// For runs that all count alike.
     fn of_runs(
         runs: &[&RunRecord],
         outages: usize,
@@ -431,7 +431,7 @@ impl Judge {
         Self::new(runs, outages, windows, NEES_DOF, |_, _| independent)
     }
 
-    /// Of so many reported states; `samples`: how many are independent, of an outage (none: of the whole) and a state
+    /// For so many reported states; `samples`: how many are independent, of an outage (none: of the whole) and a state
     /// (none: of all together).
     fn new(
         runs: &[&RunRecord],
@@ -478,7 +478,7 @@ impl Judge {
         self.statistics.iter().filter(is_of)
     }
 
-    /// Those over the whole run, or, of an outage, its own.
+    /// The statistics over the whole run, or, of an outage, its own.
     fn deciding(&self, outage: Option<usize>) -> impl Iterator<Item = &Statistic> + Clone {
         let is_known = move |s: &&Statistic| s.outage == outage && !s.ratio.value.is_nan();
         self.statistics.iter().filter(is_known)
@@ -516,7 +516,7 @@ impl Judge {
         }
     }
 
-    /// Whether so many times the samples find errors that matter.
+    /// True if so many times the samples find errors that matter.
     fn is_decisive(&self, outage: Option<usize>, times: f64) -> bool {
         self.deciding(outage).all(|s| {
             let freedom = (s.freedom.0, s.freedom.1 * times);
