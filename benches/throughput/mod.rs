@@ -9,10 +9,10 @@ use nav_sim_navigation::ekf::{
     Belief, BeliefError, Ekf, FilterStates, Fix, InitialSettings, advance, update,
 };
 use nav_sim_navigation::frames::NavState;
-use nav_sim_navigation::lanes::{LANES, Lanes, Level, Vec3};
-use nav_sim_navigation::sensors::imu::{ImuErrors, LaneErrors, Truth};
+use nav_sim_navigation::sensors::imu::{LaneErrors, Truth};
 use nav_sim_navigation::strapdown::Strapdown;
 use nav_sim_signal::imu::ImuSample;
+use nav_sim_signal::lanes::{LANES, Lanes, Level, Vec3};
 use nav_sim_signal::noise::{Composite, Model, ParameterError, Process};
 use nav_sim_signal::rng::StreamKey;
 
@@ -76,8 +76,7 @@ impl<'a> Load<'a> {
             source: "",
             process: "",
         };
-        let imu = (0..LANES as u64)
-            .map(|run| ImuErrors::new(&Truth::Model(model), &[], key(run), SAMPLES));
+        let keys: Vec<_> = (0..LANES as u64).map(key).collect();
         let settings = InitialSettings::default();
         Ok(Self {
             ekf: Ekf::new(Strapdown::new(&start, gravity), &belief, &start, &settings)
@@ -86,7 +85,7 @@ impl<'a> Load<'a> {
                 omega_ib_b: DVec3::ZERO,
                 f_ib_b,
             }; SAMPLES],
-            errors: LaneErrors::new(imu.collect()),
+            errors: LaneErrors::new(&Truth::Model(model), &[], &keys, SAMPLES),
             fix: Fix {
                 lat: Lanes::splat(start.lat),
                 lon: Lanes::splat(start.lon),

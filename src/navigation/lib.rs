@@ -5,10 +5,9 @@
 //! order: one names only what stands above it.
 
 #[allow(unused_imports, reason = "sources are named in the documentation")]
-pub(crate) use nav_sim_signal::{bibliography, imu, minimise, noise, rng, units, wavelet};
+pub(crate) use nav_sim_signal::{bibliography, imu, lanes, minimise, noise, rng, units, wavelet};
 
 // L0
-pub mod lanes;
 pub mod linalg;
 // L1
 pub mod frames;

@@ -11,7 +11,7 @@
 //! use glam::{DQuat, DVec3};
 //! use nav_sim_navigation::earth::{GravityModel, gravity_down, omega_ie_n};
 //! use nav_sim_navigation::frames::NavState;
-//! use nav_sim_navigation::lanes::{Lanes, Vec3};
+//! use nav_sim_signal::lanes::{Lanes, Vec3};
 //! use nav_sim_navigation::strapdown::Strapdown;
 //!
 //! let start = NavState { lat: 0.9, lon: 0.2, h: 100.0, v_n: DVec3::ZERO, q_b_n: DQuat::IDENTITY };

@@ -93,9 +93,11 @@ sources! {
     /// R. B. Davies: *Hypothesis testing when a nuisance parameter is present only under the alternative*, Biometrika 64,
     /// 1977.
     Davies77;
-    /// J. A. Doornik: *An improved ziggurat method to generate normal random samples*, Nuffield College,
-    /// Oxford, 2005.
-    Doornik05;
+    /// G. E. P. Box, M. E. Muller: *A note on the generation of random normal deviates*, Ann. Math. Stat. 29, 1958.
+    BoxMuller58;
+    /// D. Blackman, S. Vigna: *Scrambled linear pseudorandom number generators*, ACM Trans. Mathematical Software 47, 2021
+    /// (xoshiro256++).
+    Blackman21;
     /// IEEE Std 952-1997 (and 647): *Specification Format Guide and Test Procedure for Single-Axis
     /// Interferometric Fiber Optic Gyros* (Allan variance of the noise terms).
     Ieee952;

@@ -6,6 +6,7 @@
 
 // L0
 pub mod bibliography;
+pub mod lanes;
 pub mod minimise;
 pub mod names;
 pub mod rng;

@@ -16,6 +16,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+use crate::lanes::{Bits, LANES};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -51,6 +52,11 @@ impl StreamKey<'_> {
 
     /// The generator of this stream, at its beginning.
     pub fn generator(&self) -> Generator {
+        Generator::from_seed(self.state())
+    }
+
+    /// The state of that generator: four words, little-endian.
+    fn state(&self) -> [u8; 32] {
         let mut hasher = blake3::Hasher::new();
         hasher
             .update(&self.seed.to_le_bytes())
@@ -60,7 +66,69 @@ impl StreamKey<'_> {
                 .update(&(part.len() as u64).to_le_bytes())
                 .update(part.as_bytes());
         }
-        Generator::from_seed(*hasher.finalize().as_bytes())
+        *hasher.finalize().as_bytes()
+    }
+}
+
+/// Eight generators that advance together, each as [`Generator`] does.
+#[derive(Debug, Clone)]
+pub struct LaneGenerator {
+    state: [[u64; LANES]; 4],
+}
+
+impl LaneGenerator {
+    /// The generators of at most eight streams, at their beginning; lanes beyond them draw zeros.
+    pub fn new(keys: &[StreamKey<'_>]) -> Self {
+        let mut state = [[0; LANES]; 4];
+        for (lane, key) in keys.iter().enumerate() {
+            let bytes = key.state();
+            for (of_lanes, word) in state.iter_mut().zip(bytes.as_chunks::<8>().0) {
+                of_lanes[lane] = u64::from_le_bytes(*word);
+            }
+        }
+        Self { state }
+    }
+
+    /// The generators in registers.
+    #[inline(always)]
+    pub fn load<B: Bits>(&self) -> Xoshiro<B> {
+        let s = &self.state;
+        Xoshiro([
+            B::load(&s[0]),
+            B::load(&s[1]),
+            B::load(&s[2]),
+            B::load(&s[3]),
+        ])
+    }
+
+    /// The generators back from registers.
+    #[inline(always)]
+    pub fn store<B: Bits>(&mut self, generators: Xoshiro<B>) {
+        for (words, register) in self.state.iter_mut().zip(generators.0) {
+            register.store(words);
+        }
+    }
+}
+
+/// The state of eight xoshiro256++ generators ([Blackman and Vigna](crate::bibliography::Blackman21)) in registers.
+#[derive(Clone, Copy)]
+pub struct Xoshiro<B>([B; 4]);
+
+impl<B: Bits> Xoshiro<B> {
+    /// The next number of each.
+    #[inline(always)]
+    pub fn next(&mut self) -> B {
+        let rotate = |x: B, count: u64| x.shl(count).or(x.shr(64 - count));
+        let s = &mut self.0;
+        let next = rotate(s[0].add(s[3]), 23).add(s[0]);
+        let t = s[1].shl(17);
+        s[2] = s[2].xor(s[0]);
+        s[3] = s[3].xor(s[1]);
+        s[1] = s[1].xor(s[2]);
+        s[0] = s[0].xor(s[3]);
+        s[2] = s[2].xor(t);
+        s[3] = rotate(s[3], 45);
+        next
     }
 }
 
@@ -104,6 +172,22 @@ mod tests {
         let first: std::collections::HashSet<u64> =
             keys.iter().map(|k| k.generator().next_u64()).collect();
         assert_eq!(first.len(), keys.len());
+    }
+
+    #[test]
+    fn lanes_draw_as_generators_do() {
+        let keys = [KEY, StreamKey { run: 1, ..KEY }];
+        let mut lanes = LaneGenerator::new(&keys);
+        let mut registers = lanes.load::<[u64; LANES]>();
+        let first = [registers.next(), registers.next()];
+        lanes.store(registers);
+        let third = lanes.load::<[u64; LANES]>().next();
+        for (lane, key) in keys.iter().enumerate() {
+            let mut alone = key.generator();
+            let drawn = [(); 3].map(|()| alone.next_u64());
+            assert_eq!([first[0][lane], first[1][lane], third[lane]], drawn);
+        }
+        assert_eq!(third[2..], [0; 6]);
     }
 
     /// Pins the numbers: a new version of a crate that changes them must not pass unnoticed.

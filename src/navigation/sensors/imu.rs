@@ -1,10 +1,10 @@
 //! The errors of the inertial sensors, run by run: synthesised from a model, or windows of recordings.
 
 use crate::imu::{Channel, Recording};
-use crate::lanes::Vec3;
+use crate::lanes::{Lanes, Vec3};
 use crate::noise::continuous::same_rate;
-use crate::noise::{Model, Synthesizer};
-use crate::rng::StreamKey;
+use crate::noise::{Composite, Model, Synthesizer};
+use crate::rng::{LaneGenerator, StreamKey};
 use crate::units::Refused;
 use crate::wavelet::haar;
 use rand::RngExt;
@@ -69,7 +69,14 @@ impl Truth<'_> {
         match self {
             Self::Model(model) => check_model(model),
             Self::Drawn([]) => refused("no model drawn"),
-            Self::Drawn(models) => models.iter().try_for_each(check_model),
+            Self::Drawn(models) => {
+                let labels = |model: &Model| model.axes.each_ref().map(Composite::labels);
+                let first = labels(&models[0]);
+                if models.iter().any(|model| labels(model) != first) {
+                    return refused("the models drawn do not have the same processes");
+                }
+                models.iter().try_for_each(check_model)
+            }
             Self::Static([]) => refused("no static recording given"),
             Self::Static(recordings) => recordings
                 .iter()
@@ -121,115 +128,112 @@ fn check_recording(recording: &Recording, imu_hz: f64, needs: usize) -> Result<(
     Ok(())
 }
 
-/// The errors of the six channels of one run, as streams of samples.
-#[derive(Debug, Clone)]
-pub struct ImuErrors<'a> {
-    channels: [ChannelErrors<'a>; 6],
-}
-
-#[derive(Debug, Clone)]
-enum ChannelErrors<'a> {
-    Synthesised(Box<Synthesizer>),
-    /// The rest of the window, and the level from which the window started (m/s² or rad/s).
-    Recorded(&'a [f64], f64),
-}
-
-impl<'a> ImuErrors<'a> {
-    /// The errors of run `key.run` over `samples` samples, which the truth must have; of recordings with their
-    /// [`best_spans`].
-    pub fn new(
-        truth: &Truth<'a>,
-        spans: &[[usize; 6]],
-        key: StreamKey<'_>,
-        samples: usize,
-    ) -> Self {
-        let synthesised = |model: &Model| {
-            Channel::ALL.map(|channel| {
-                let source = channel.to_string();
-                let synthesizer = Synthesizer::new(
-                    model.axis(channel),
-                    StreamKey {
-                        source: &source,
-                        ..key
-                    },
-                );
-                ChannelErrors::Synthesised(Box::new(synthesizer))
-            })
-        };
-        let channels = match truth {
-            Truth::Model(model) => synthesised(model),
-            // Of fewer models than runs each is taken again.
-            Truth::Drawn(models) => synthesised(&models[(key.run % models.len() as u64) as usize]),
-            Truth::Static(recordings) => {
-                let (index, start) = place(recordings, key, samples);
-                Channel::ALL.map(|channel| {
-                    let signal = recordings[index].signal(channel);
-                    let all = signal.map_or(&[][..], |s| &s.samples);
-                    let level = level_at(all, start, spans[index][channel.index()]);
-                    ChannelErrors::Recorded(&all[start..start + samples], level)
-                })
-            }
-        };
-        Self { channels }
-    }
-
-    /// Overwrites `out` with the next samples of a channel (m/s² or rad/s).
-    fn fill(&mut self, channel: Channel, out: &mut [f64]) {
-        match &mut self.channels[channel.index()] {
-            ChannelErrors::Synthesised(synthesizer) => synthesizer.fill(out),
-            ChannelErrors::Recorded(left, level) => {
-                let (now, later) = left.split_at(out.len());
-                // The level of the window's start, not its mean: a mean over the window would know the
-                // future, and hold the random walk down at both ends.
-                out.iter_mut()
-                    .zip(now)
-                    .for_each(|(error, sample)| *error = sample - *level);
-                *left = later;
-            }
-        }
-    }
-}
-
 /// The errors of up to eight runs, side by side.
 #[derive(Debug, Clone)]
 pub struct LaneErrors<'a> {
-    runs: Vec<ImuErrors<'a>>,
-    /// For each sample, accelerometer (m/s²) and gyroscope (rad/s).
+    source: Source<'a>,
+    /// For each sample, accelerometer (m/s²) and gyroscope (rad/s); the first `used` have been handed out.
     block: Vec<[Vec3; 2]>,
-    channel: Vec<f64>,
+    used: usize,
+    channel: Vec<Lanes>,
 }
 
+#[derive(Debug, Clone)]
+enum Source<'a> {
+    /// Of the six channels.
+    Synthesised(Box<[Synthesizer<LaneGenerator>; 6]>),
+    /// For each run the rest of its window on the six channels, and the level from which that started (m/s² or rad/s).
+    Recorded(Vec<[(&'a [f64], f64); 6]>),
+}
+
+/// Samples made at a time.
+const BLOCK: usize = 64;
+
 impl<'a> LaneErrors<'a> {
-    /// The errors of at most eight runs; lanes beyond them are without error.
-    pub fn new(runs: Vec<ImuErrors<'a>>) -> Self {
+    /// The errors of at most eight runs over `samples` samples, which the truth must have; of recordings with their
+    /// [`best_spans`]. Lanes beyond the runs are without error.
+    pub fn new(
+        truth: &Truth<'a>,
+        spans: &[[usize; 6]],
+        keys: &[StreamKey<'_>],
+        samples: usize,
+    ) -> Self {
+        let synthesised = |model_of: &dyn Fn(u64) -> &'a Model| {
+            Source::Synthesised(Box::new(Channel::ALL.map(|channel| {
+                let source = &*channel.to_string();
+                let keys = keys.iter().map(|key| StreamKey { source, ..*key });
+                let runs = keys.map(|key| (model_of(key.run).axis(channel), key));
+                Synthesizer::lanes(&runs.collect::<Vec<_>>())
+            })))
+        };
+        let source = match *truth {
+            Truth::Model(model) => synthesised(&|_| model),
+            // Of fewer models than runs each is taken again.
+            Truth::Drawn(models) => {
+                synthesised(&|run| &models[(run % models.len() as u64) as usize])
+            }
+            Truth::Static(recordings) => {
+                let window = |key: &StreamKey<'_>| {
+                    let (index, start) = place(recordings, *key, samples);
+                    Channel::ALL.map(|channel| {
+                        let signal = recordings[index].signal(channel);
+                        let all = signal.map_or(&[][..], |s| &s.samples);
+                        // The level of the window's start, not its mean: a mean over the window would know the
+                        // future, and hold the random walk down at both ends.
+                        let level = level_at(all, start, spans[index][channel.index()]);
+                        (&all[start..start + samples], level)
+                    })
+                };
+                Source::Recorded(keys.iter().map(window).collect())
+            }
+        };
         Self {
-            runs,
+            source,
             block: Vec::new(),
-            channel: Vec::new(),
+            used: 0,
+            channel: vec![Lanes::ZERO; BLOCK],
         }
     }
 
     /// Draws the errors of the next `n` samples: accelerometer (m/s²) and gyroscope (rad/s).
     pub fn next(&mut self, n: usize) -> &mut [[Vec3; 2]] {
-        self.block.resize(n, [Vec3::ZERO; 2]);
-        self.channel.resize(n, 0.0);
-        for (lane, errors) in self.runs.iter_mut().enumerate() {
-            for channel in Channel::ALL {
-                // A stretch of one channel at a time: a process is cheapest to synthesise along time; the
-                // lanes come afterwards.
-                errors.fill(channel, &mut self.channel);
-                let (sensor, axis) = (channel.sensor as usize, channel.axis as usize);
-                for (sample, value) in self.block.iter_mut().zip(&self.channel) {
-                    sample[sensor][axis][lane] = *value;
-                }
-            }
+        self.block.drain(..self.used);
+        self.used = n;
+        while self.block.len() < n {
+            self.extend();
         }
-        &mut self.block
+        &mut self.block[..n]
     }
 
-    /// What was drawn last.
+    /// Appends a block; behind the end of recordings it is without error.
+    fn extend(&mut self) {
+        let first = self.block.len();
+        self.block.resize(first + BLOCK, [Vec3::ZERO; 2]);
+        for channel in Channel::ALL {
+            match &mut self.source {
+                Source::Synthesised(channels) => channels[channel.index()].fill(&mut self.channel),
+                Source::Recorded(windows) => {
+                    self.channel.fill(Lanes::ZERO);
+                    for (lane, window) in windows.iter_mut().enumerate() {
+                        let (left, level) = &mut window[channel.index()];
+                        let (now, later) = left.split_at(left.len().min(BLOCK));
+                        for (error, sample) in self.channel.iter_mut().zip(now) {
+                            error[lane] = sample - *level;
+                        }
+                        *left = later;
+                    }
+                }
+            }
+            let (sensor, axis) = (channel.sensor as usize, channel.axis as usize);
+            for (sample, value) in self.block[first..].iter_mut().zip(&self.channel) {
+                sample[sensor][axis] = *value;
+            }
+        }
+    }
+
+    /// The samples drawn last.
     pub fn drawn(&self) -> &[[Vec3; 2]] {
-        &self.block
+        &self.block[..self.used]
     }
 }
 
@@ -342,17 +346,16 @@ mod tests {
         truth.check(100.0, 10).unwrap();
         let spans = best_spans(&truth);
         for run in 0..200 {
-            let mut errors = ImuErrors::new(&truth, &spans, StreamKey { run, ..KEY }, 10);
-            let mut first = [[0.0; 4]; 6];
-            for (channel, out) in Channel::ALL.into_iter().zip(&mut first) {
-                errors.fill(channel, out);
-            }
-            let start = first[0][0];
-            for (c, block) in first.iter().enumerate() {
-                assert_eq!(
-                    *block,
-                    std::array::from_fn(|k| start + (k + 1000 * c) as f64)
-                );
+            let key = StreamKey { run, ..KEY };
+            let mut errors = LaneErrors::new(&truth, &spans, &[key], 10);
+            let drawn = errors.next(4);
+            let start = drawn[0][0][0][0];
+            for channel in Channel::ALL {
+                let of_channel =
+                    |s: &[Vec3; 2]| s[channel.sensor as usize][channel.axis as usize][0];
+                let expected =
+                    [0, 1, 2, 3].map(|k| start + f64::from(k) + 1000.0 * channel.index() as f64);
+                assert!(drawn.iter().map(of_channel).eq(expected), "{channel}");
             }
             starts.insert(start as u64);
         }
@@ -463,12 +466,14 @@ mod windows_tests {
         let truth = Truth::Static(&recordings);
         for run in 0..20 {
             let key = StreamKey { run, ..KEY };
-            for errors in ImuErrors::new(&truth, &best_spans(&truth), key, 1000).channels {
-                let ChannelErrors::Recorded(samples, level) = errors else {
-                    panic!("not of a recording");
-                };
-                assert_eq!((samples[0], samples.len()), (level, 1000));
-            }
+            let mut errors = LaneErrors::new(&truth, &best_spans(&truth), &[key], 1000);
+            let first = errors.next(1)[0];
+            assert!(
+                first
+                    .iter()
+                    .flat_map(|sensor| sensor.0)
+                    .all(|x| x[0] == 0.0)
+            );
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::rng::{Generator, StreamKey};
 use crate::sensors::aiding::{Aid, AidNoise};
 use crate::sensors::defects::Defects;
 use crate::sensors::gnss::GnssNoise;
-use crate::sensors::imu::{ImuErrors, LaneErrors};
+use crate::sensors::imu::LaneErrors;
 use crate::sensors::normal;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
@@ -52,9 +52,7 @@ impl<'a> Source<'a> {
             process: "",
         };
         let keys: Vec<_> = (first..first + live as u64).map(key).collect();
-        let imu = keys
-            .iter()
-            .map(|k| ImuErrors::new(&experiment.truth, &plan.spans, *k, plan.samples()));
+        let imu = LaneErrors::new(&experiment.truth, &plan.spans, &keys, plan.samples());
         let gnss = keys
             .iter()
             .map(|k| GnssNoise::new(experiment.gnss, *k))
@@ -73,7 +71,7 @@ impl<'a> Source<'a> {
         let rate_hz = experiment.rate_hz;
         Self {
             rate_hz,
-            imu: LaneErrors::new(imu.collect()),
+            imu,
             gnss,
             baro,
             aiding,

@@ -1,25 +1,32 @@
-//! Synthesis: draws the noise of one axis from its model, block by block.
+//! Synthesis: draws the noise of one axis from its model, block by block, for one run or for eight side by side.
 
 use super::{Composite, Kind, Ladder, Process};
-use crate::rng::{Generator, StreamKey};
-use rand::{Rng, RngExt};
-use std::sync::LazyLock;
+use crate::lanes::{
+    Bits, Kernel, LANES, Lanes, Level, Real, Wide, dispatch, horner, sinc_cos_of_square,
+};
+use crate::rng::{Generator, LaneGenerator, StreamKey};
+use rand::Rng;
+use std::f64::consts::{FRAC_PI_2, LN_2};
 
-/// The noise of one axis of one run, as a stream of samples.
+/// The noise of one axis as a stream of samples: of one run, or of eight ([`Synthesizer::lanes`]), each of which has the
+/// numbers that it has alone.
 ///
 /// Every process of the sum draws from a stream of its own, so that adding or removing one changes no
-/// other's numbers. What comes out does not depend on the sizes of the blocks it is asked for.
+/// other's numbers. The output does not depend on the sizes of the blocks it is asked for.
 ///
 /// FN is a sum of AR1 ([`Ladder::FINE`]). AR1 and GM start stationary; MA1 and QN have a past; RW starts at 0 (its first sample is its first
 /// increment) and DR at one slope (X_t = slope·t, t = 1, 2, …).
 #[derive(Debug, Clone)]
-pub struct Synthesizer {
-    direct: Vec<Direct>,
-    recursive: Vec<Recursive>,
+pub struct Synthesizer<S: Streams = Generator> {
+    direct: Vec<Direct<S>>,
+    recursive: Vec<Recursive<S>>,
+    /// Samples made together, and how many of them have been handed out.
+    block: [S::Sample; BLOCK],
+    used: usize,
 }
 
-/// Samples made at a time: every process fills a block, then the blocks are summed.
-const BLOCK: usize = 64;
+/// Samples made at a time, an even number: every process fills a block, then the blocks are summed.
+pub(crate) const BLOCK: usize = 64;
 /// Recursions that advance together: each step waits for the last one of its own chain, and three chains side
 /// by side keep the processor busy meanwhile.
 const TOGETHER: usize = 3;
@@ -28,268 +35,434 @@ impl Synthesizer {
     /// The noise of one axis (units of the model) at its beginning. The key names seed, scenario, run and
     /// axis; its `process` is replaced by the label of each summand ([`Composite::labels`]).
     pub fn new(noise: &Composite, key: StreamKey<'_>) -> Self {
+        Self::of(&[(noise, key)])
+    }
+}
+
+impl Synthesizer<LaneGenerator> {
+    /// The same of at most eight runs; the composites have the same processes, with parameters of their own. Lanes
+    /// beyond the runs are zero.
+    pub fn lanes(runs: &[(&Composite, StreamKey<'_>)]) -> Self {
+        Self::of(runs)
+    }
+}
+
+impl<S: Streams> Synthesizer<S> {
+    fn of(runs: &[(&Composite, StreamKey<'_>)]) -> Self {
         let mut synthesizer = Self {
             direct: Vec::new(),
             recursive: Vec::new(),
+            block: [S::Sample::from(0.0); BLOCK],
+            used: BLOCK,
         };
-        for (process, label) in noise.processes.iter().zip(noise.labels()) {
-            let parts = process.parts(Ladder::FINE);
-            for (i, part) in parts.iter().enumerate() {
-                let label = match parts.len() {
+        let Some((first, _)) = runs.first() else {
+            return synthesizer;
+        };
+        for (i, label) in first.labels().into_iter().enumerate() {
+            let parts: Vec<Vec<Process>> = runs
+                .iter()
+                .map(|(noise, _)| noise.processes[i].parts(Ladder::FINE))
+                .collect();
+            for part in 0..parts[0].len() {
+                let label = match parts[0].len() {
                     1 => label.clone(),
-                    _ => format!("{label}.{i}"),
+                    _ => format!("{label}.{part}"),
                 };
-                let key = StreamKey {
-                    process: &label,
-                    ..key
-                };
-                synthesizer.add(part, key.generator());
+                let process = &*label;
+                let keys = runs.iter().map(|(_, key)| StreamKey { process, ..*key });
+                let of_runs: Vec<&Process> = parts.iter().map(|p| &p[part]).collect();
+                synthesizer.add(&of_runs, S::new(&keys.collect::<Vec<_>>()));
             }
         }
         synthesizer
     }
 
     /// Adds a process, unless it is identically zero.
-    fn add(&mut self, process: &Process, mut generator: Generator) {
-        let (theta, size) = (process.shape(), process.amplitude());
-        if size == 0.0 {
+    fn add(&mut self, runs: &[&Process], mut streams: S) {
+        if runs.iter().all(|process| process.amplitude() == 0.0) {
             return;
         }
-        let draw = |g: &mut Generator| Ziggurat::get().draw(g);
-        if let Some([phi, innovation, initial]) = process.recursion() {
+        let of = |value: &dyn Fn(&Process) -> f64| {
+            S::sample(|lane| runs.get(lane).map_or(0.0, |process| value(process)))
+        };
+        let size = of(&|p| p.amplitude().abs().sqrt());
+        if runs[0].recursion().is_some() {
+            let recursion = |p: &Process, i: usize| p.recursion().map_or(0.0, |r| r[i]);
             // X_0 from the stationary law, so that X_1 has it too.
-            let is_stationary = initial > 0.0;
-            let start = is_stationary.then(|| initial.sqrt() * draw(&mut generator));
+            let is_stationary = runs.iter().any(|p| recursion(p, 2) > 0.0);
+            let initial = of(&|p| recursion(p, 2).sqrt());
+            let last = if is_stationary {
+                initial * first_of(&mut streams, Law::Normal)
+            } else {
+                initial
+            };
             return self.recursive.push(Recursive {
-                phi,
-                sigma: innovation.sqrt(),
-                last: start.unwrap_or(0.0),
-                generator,
-                block: [0.0; BLOCK],
+                phi: of(&|p| recursion(p, 0)),
+                sigma: of(&|p| recursion(p, 1).sqrt()),
+                last,
+                streams,
             });
         }
-        let sigma = size.abs().sqrt();
-        let (filter, last) = match process.kind() {
-            Kind::White => (Filter::White { sigma }, 0.0),
-            Kind::Drift => (Filter::Drift { slope: size }, 0.0),
+        let zero = S::Sample::from(0.0);
+        let (filter, size, last) = match runs[0].kind() {
+            Kind::White => (Filter::White, size, zero),
+            Kind::Drift => (Filter::Drift, of(&Process::amplitude), zero),
             // The value before the first one is drawn too, so that the first sample has the variance 2 Q² of
             // all others.
             Kind::Quantization => {
-                let scale = (12.0 * size).sqrt();
-                (Filter::Quantization { scale }, generator.random())
+                let step = of(&|p| (12.0 * p.amplitude()).sqrt());
+                let last = first_of(&mut streams, Law::Uniform);
+                (Filter::Quantization, step, last)
             }
-            _ => (Filter::Ma1 { theta, sigma }, sigma * draw(&mut generator)),
+            _ => {
+                let last = size * first_of(&mut streams, Law::Normal);
+                (Filter::Ma1(of(&Process::shape)), size, last)
+            }
         };
         self.direct.push(Direct {
             filter,
+            size,
             last,
-            generator,
+            streams,
         });
     }
 
+    /// The next [`BLOCK`] samples.
+    fn make_block(&mut self) {
+        self.block = [S::Sample::from(0.0); BLOCK];
+        dispatch(Level::best(), MakeBlock(self));
+        self.used = 0;
+    }
+
     /// Overwrites `out` with the next samples.
-    pub fn fill(&mut self, out: &mut [f64]) {
-        for block in out.chunks_mut(BLOCK) {
-            block.fill(0.0);
-            self.direct.iter_mut().for_each(|d| d.add_to(block));
-            let (groups, rest) = self.recursive.as_chunks_mut::<TOGETHER>();
-            groups
-                .iter_mut()
-                .for_each(|group| add_recursive(group, block));
-            rest.iter_mut()
-                .for_each(|one| add_recursive(std::array::from_mut(one), block));
+    pub fn fill(&mut self, mut out: &mut [S::Sample]) {
+        while !out.is_empty() {
+            if self.used == BLOCK {
+                self.make_block();
+            }
+            let n = out.len().min(BLOCK - self.used);
+            let (now, later) = out.split_at_mut(n);
+            now.copy_from_slice(&self.block[self.used..self.used + n]);
+            self.used += n;
+            out = later;
+        }
+    }
+}
+
+struct MakeBlock<'a, S: Streams>(&'a mut Synthesizer<S>);
+
+impl<S: Streams> Kernel for MakeBlock<'_, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let Synthesizer {
+            direct,
+            recursive,
+            block,
+            ..
+        } = self.0;
+        for one in direct {
+            one.add_to::<W>(block);
+        }
+        let (groups, rest) = recursive.as_chunks_mut::<TOGETHER>();
+        for group in groups {
+            add_recursive::<W, S, TOGETHER>(group, block);
+        }
+        for one in rest {
+            add_recursive::<W, S, 1>(std::array::from_mut(one), block);
         }
     }
 }
 
 /// A process whose samples are made of fresh numbers and at most one past one.
 #[derive(Debug, Clone)]
-struct Direct {
-    filter: Filter,
+struct Direct<S: Streams> {
+    filter: Filter<S::Sample>,
+    /// Standard deviation of the fresh numbers; the step of a quantizer, the slope of a drift.
+    size: S::Sample,
     /// The past number (QN, MA1) or time (DR).
-    last: f64,
-    generator: Generator,
+    last: S::Sample,
+    streams: S,
 }
 
-#[derive(Debug, Clone)]
-enum Filter {
-    White { sigma: f64 },
-    Quantization { scale: f64 },
-    Drift { slope: f64 },
-    Ma1 { theta: f64, sigma: f64 },
+#[derive(Debug, Clone, Copy)]
+enum Filter<T> {
+    White,
+    Quantization,
+    Drift,
+    /// With its coefficient theta.
+    Ma1(T),
 }
 
-impl Direct {
-    /// Adds the next samples to `out`.
-    fn add_to(&mut self, out: &mut [f64]) {
-        // A local copy of the generator stays in registers; the one behind `self` would be stored at every
-        // draw.
-        let (z, mut g, mut last) = (Ziggurat::get(), self.generator.clone(), self.last);
+impl<S: Streams> Direct<S> {
+    /// Adds the next samples to `block`.
+    #[inline(always)]
+    fn add_to<W: Wide>(&mut self, block: &mut [S::Sample; BLOCK]) {
+        let mut fresh = [S::Sample::from(0.0); BLOCK];
         match self.filter {
-            Filter::White { sigma } => out.iter_mut().for_each(|x| *x += sigma * z.draw(&mut g)),
-            Filter::Quantization { scale } => out.iter_mut().for_each(|x| {
-                let u = g.random::<f64>();
-                *x += scale * (u - last);
-                last = u;
-            }),
-            Filter::Drift { slope } => out.iter_mut().for_each(|x| {
-                last += 1.0;
-                *x += slope * last;
-            }),
-            Filter::Ma1 { theta, sigma } => out.iter_mut().for_each(|x| {
-                let w = sigma * z.draw(&mut g);
-                *x += w + theta * last;
-                last = w;
-            }),
+            Filter::Drift => {}
+            Filter::Quantization => self.streams.fill::<W>(Law::Uniform, &mut fresh),
+            Filter::White | Filter::Ma1(_) => self.streams.fill::<W>(Law::Normal, &mut fresh),
         }
-        (self.generator, self.last) = (g, last);
+        let (size, mut last) = (S::load::<W>(&self.size), S::load::<W>(&self.last));
+        for (x, fresh) in block.iter_mut().zip(&fresh) {
+            let fresh = S::load::<W>(fresh);
+            let more = match &self.filter {
+                Filter::White => size * fresh,
+                Filter::Quantization => {
+                    let step = size * (fresh - last);
+                    last = fresh;
+                    step
+                }
+                Filter::Drift => {
+                    last = last + 1.0;
+                    size * last
+                }
+                Filter::Ma1(theta) => {
+                    let w = size * fresh;
+                    let sum = w + S::load::<W>(theta) * last;
+                    last = w;
+                    sum
+                }
+            };
+            S::store(S::load::<W>(x) + more, x);
+        }
+        S::store(last, &mut self.last);
     }
 }
 
 /// An AR1, or a random walk (phi = 1).
 #[derive(Debug, Clone)]
-struct Recursive {
-    phi: f64,
-    sigma: f64,
-    last: f64,
-    generator: Generator,
-    /// Fresh numbers, then samples.
-    block: [f64; BLOCK],
+struct Recursive<S: Streams> {
+    phi: S::Sample,
+    sigma: S::Sample,
+    last: S::Sample,
+    streams: S,
 }
 
-/// Adds the next samples of N recursions to `out`.
-fn add_recursive<const N: usize>(group: &mut [Recursive; N], out: &mut [f64]) {
-    let n = out.len().min(BLOCK);
-    // All numbers first, then all recursions: the draws branch, and would break up the chains that run side
-    // by side.
-    for r in group.iter_mut() {
-        let (z, mut g) = (Ziggurat::get(), r.generator.clone());
-        r.block[..n].iter_mut().for_each(|w| *w = z.draw(&mut g));
-        r.generator = g;
+/// Adds the next samples of N recursions to `block`.
+#[inline(always)]
+fn add_recursive<W: Wide, S: Streams, const N: usize>(
+    group: &mut [Recursive<S>; N],
+    block: &mut [S::Sample; BLOCK],
+) {
+    let zero = S::load::<W>(&S::Sample::from(0.0));
+    let mut fresh = [[S::Sample::from(0.0); BLOCK]; N];
+    let (mut phi, mut sigma, mut last) = ([zero; N], [zero; N], [zero; N]);
+    for i in 0..N {
+        group[i].streams.fill::<W>(Law::Normal, &mut fresh[i]);
+        phi[i] = S::load(&group[i].phi);
+        sigma[i] = S::load(&group[i].sigma);
+        last[i] = S::load(&group[i].last);
     }
-    let (phi, sigma) = (
-        group.each_ref().map(|r| r.phi),
-        group.each_ref().map(|r| r.sigma),
-    );
-    let mut last = group.each_ref().map(|r| r.last);
-    for (k, x) in out.iter_mut().enumerate().take(n) {
+    for k in 0..BLOCK {
+        let mut sum = S::load::<W>(&block[k]);
         for i in 0..N {
-            last[i] = phi[i] * last[i] + sigma[i] * group[i].block[k];
+            last[i] = phi[i] * last[i] + sigma[i] * S::load(&fresh[i][k]);
             // In the order of the list, however it is grouped: the rounding of the sum does not depend on
             // TOGETHER.
-            *x += last[i];
+            sum = sum + last[i];
         }
+        S::store(sum, &mut block[k]);
     }
-    for (r, last) in group.iter_mut().zip(last) {
-        r.last = last;
+    for i in 0..N {
+        S::store(last[i], &mut group[i].last);
     }
 }
 
-// Standard normal numbers, fast: the ziggurat of 256 layers ([Doornik](crate::bibliography::Doornik05)'s
-// ZIGNOR) with its common path small enough to be inlined and the generator kept in registers. A general
-// distribution library's sampler, which is called rather than inlined, costs twice as much here, where
-// noise is as dear as the filter.
+// Fresh numbers: uniform ones, and normal ones by [Box and Muller](crate::bibliography::BoxMuller58)'s transform, whose logarithm, sine and cosine are
+// polynomials. It has no branch, so that eight numbers are made together; the ziggurat, which has, takes three times
+// as long a number.
 
-const LAYERS: usize = 256;
-/// Beginning of the tail. With this value 256 layers of equal area close at the top (tested).
-const R: f64 = 3.654_152_885_361_009;
-/// Area of each layer, R·f(R) + ∫_R^∞ f, of the unnormalised density f.
-const AREA: f64 = 0.004_928_673_233_974_655;
-
-/// Edges of the layers and the density there.
-struct Ziggurat {
-    x: [f64; LAYERS + 1],
-    f: [f64; LAYERS + 1],
+/// Distribution of fresh numbers.
+#[derive(Debug, Clone, Copy)]
+enum Law {
+    /// On [0, 1), multiples of 2⁻⁵².
+    Uniform,
+    /// Of mean 0 and variance 1.
+    Normal,
 }
 
-/// The density, unnormalised.
-fn density(x: f64) -> f64 {
-    (-0.5 * x * x).exp()
+/// The streams of a process: one ([`Generator`]), or eight side by side ([`LaneGenerator`]).
+#[allow(
+    private_interfaces,
+    reason = "a trait of this module alone, named by its types"
+)]
+pub trait Streams: std::fmt::Debug + Clone {
+    /// A number of each stream.
+    type Sample: Real + std::fmt::Debug;
+    /// The same in a register.
+    type Register<W: Wide>: Real;
+    /// The streams at their beginning.
+    fn new(keys: &[StreamKey<'_>]) -> Self;
+    /// A value for each lane.
+    fn sample(of_lane: impl Fn(usize) -> f64) -> Self::Sample;
+    /// Into a register.
+    fn load<W: Wide>(sample: &Self::Sample) -> Self::Register<W>;
+    /// From a register.
+    fn store<W: Wide>(register: Self::Register<W>, sample: &mut Self::Sample);
+    /// The next numbers, which are even in number if normal.
+    fn fill<W: Wide>(&mut self, law: Law, out: &mut [Self::Sample]);
 }
 
-static ZIGGURAT: LazyLock<Ziggurat> = LazyLock::new(Ziggurat::new);
-
-impl Ziggurat {
-    /// The tables, computed once.
-    fn get() -> &'static Self {
-        &ZIGGURAT
-    }
-
-    fn new() -> Self {
-        let mut x = [0.0; LAYERS + 1];
-        // The bottom layer is as wide as a rectangle of its area, which includes the tail.
-        x[0] = AREA / density(R);
-        x[1] = R;
-        // Layers of one area: x[i−1] (f(x[i]) − f(x[i−1])) = AREA. x[LAYERS] stays 0, so the top layer has no
-        // part that is accepted unseen.
-        for i in 2..LAYERS {
-            x[i] = (-2.0 * (AREA / x[i - 1] + density(x[i - 1])).ln()).sqrt();
-        }
-        Self {
-            x,
-            f: x.map(density),
+/// The first number of streams; a pair is drawn for a normal one.
+fn first_of<S: Streams>(streams: &mut S, law: Law) -> S::Sample {
+    struct First<'a, S>(&'a mut S, Law);
+    impl<S: Streams> Kernel for First<'_, S> {
+        type Output = S::Sample;
+        #[inline(always)]
+        fn run<W: Wide>(self) -> S::Sample {
+            let mut pair = [S::Sample::from(0.0); 2];
+            let n = if matches!(self.1, Law::Normal) { 2 } else { 1 };
+            self.0.fill::<W>(self.1, &mut pair[..n]);
+            pair[0]
         }
     }
+    dispatch(Level::best(), First(streams, law))
+}
 
-    /// A standard normal number.
+#[allow(private_interfaces, reason = "as in the trait")]
+impl Streams for LaneGenerator {
+    type Sample = Lanes;
+    type Register<W: Wide> = W;
+    fn new(keys: &[StreamKey<'_>]) -> Self {
+        Self::new(keys)
+    }
+    fn sample(of_lane: impl Fn(usize) -> f64) -> Lanes {
+        Lanes(std::array::from_fn(of_lane))
+    }
     #[inline(always)]
-    fn draw(&self, g: &mut Generator) -> f64 {
-        let (layer, u, x) = self.candidate(g);
-        // Within the next narrower layer the whole height of this one lies below the density.
-        if x.abs() < self.x[layer + 1] {
-            return x;
-        }
-        // By value, so that the generator's address is never taken in the common path.
-        let (x, after) = self.edge(g.clone(), layer, u, x);
-        *g = after;
-        x
+    fn load<W: Wide>(sample: &Lanes) -> W {
+        W::load(sample)
     }
-
-    /// A layer, a uniform number in [−1, 1) and the point of the layer there: 8 and 52 bits of one draw.
     #[inline(always)]
-    fn candidate(&self, g: &mut Generator) -> (usize, f64, f64) {
-        let bits = g.next_u64();
-        let layer = (bits & 0xff) as usize;
-        // Mantissa bits under the exponent of 2: uniform on [2, 4), and the subtraction is exact. The layer's
-        // 8 bits are not among them.
-        let u = f64::from_bits((bits >> 12) | 2.0_f64.to_bits()) - 3.0;
-        (layer, u, u * self.x[layer])
+    fn store<W: Wide>(register: W, sample: &mut Lanes) {
+        register.store(sample);
     }
+    #[inline(always)]
+    fn fill<W: Wide>(&mut self, law: Law, out: &mut [Lanes]) {
+        let mut generators = self.load::<W::Bits>();
+        match law {
+            Law::Uniform => {
+                for x in out {
+                    uniform::<W>(generators.next()).store(x);
+                }
+            }
+            Law::Normal => {
+                for [a, b] in out.as_chunks_mut::<2>().0 {
+                    let [x, y] = normals::<W>(generators.next(), generators.next());
+                    x.store(a);
+                    y.store(b);
+                }
+            }
+        }
+        LaneGenerator::store(self, generators);
+    }
+}
 
-    /// The 1.2 % that fall on a layer's edge or into the tail.
-    #[cold]
-    #[inline(never)]
-    fn edge(&self, mut g: Generator, mut layer: usize, mut u: f64, mut x: f64) -> (f64, Generator) {
-        loop {
-            if layer == 0 {
-                return (tail(&mut g).copysign(u), g);
+#[allow(private_interfaces, reason = "as in the trait")]
+impl Streams for Generator {
+    type Sample = f64;
+    type Register<W: Wide> = f64;
+    fn new(keys: &[StreamKey<'_>]) -> Self {
+        keys[0].generator()
+    }
+    fn sample(of_lane: impl Fn(usize) -> f64) -> f64 {
+        of_lane(0)
+    }
+    #[inline(always)]
+    fn load<W: Wide>(sample: &f64) -> f64 {
+        *sample
+    }
+    #[inline(always)]
+    fn store<W: Wide>(register: f64, sample: &mut f64) {
+        *sample = register;
+    }
+    /// Eight numbers or eight pairs of the one stream at a time; a block's are no others.
+    #[inline(always)]
+    fn fill<W: Wide>(&mut self, law: Law, out: &mut [f64]) {
+        match law {
+            Law::Uniform => {
+                for x in out {
+                    *x = uniform::<Lanes>([self.next_u64(); LANES])[0];
+                }
             }
-            // A uniform height within the layer, accepted below the density: von Neumann's rejection on the
-            // edge.
-            let (low, high) = (self.f[layer], self.f[layer + 1]);
-            if high + (low - high) * g.random::<f64>() < density(x) {
-                return (x, g);
-            }
-            (layer, u, x) = self.candidate(&mut g);
-            if x.abs() < self.x[layer + 1] {
-                return (x, g);
+            Law::Normal => {
+                for pairs in out.chunks_mut(2 * LANES) {
+                    let (mut radius, mut angle) = ([0; LANES], [0; LANES]);
+                    for i in 0..pairs.len() / 2 {
+                        (radius[i], angle[i]) = (self.next_u64(), self.next_u64());
+                    }
+                    let [x, y] = normals::<W>(W::Bits::load(&radius), W::Bits::load(&angle));
+                    let (mut a, mut b) = (Lanes::ZERO, Lanes::ZERO);
+                    x.store(&mut a);
+                    y.store(&mut b);
+                    for (i, pair) in pairs.as_chunks_mut::<2>().0.iter_mut().enumerate() {
+                        *pair = [a[i], b[i]];
+                    }
+                }
             }
         }
     }
 }
 
-/// A number beyond R (Marsaglia 1964).
-fn tail(g: &mut Generator) -> f64 {
-    // 1 − U is in (0, 1]: its logarithm is finite.
-    let mut exponential = || -(1.0 - g.random::<f64>()).ln();
-    loop {
-        let (x, y) = (exponential() / R, exponential());
-        // f(R + x) is e^(−Rx)·e^(−x²/2) but for a constant: the first factor is drawn, the second accepts
-        // with P(y > x²/2).
-        if 2.0 * y > x * x {
-            return R + x;
-        }
-    }
+/// The bits of 1.0: with 52 bits below them a number on [1, 2).
+const ONE: u64 = 0x3ff0_0000_0000_0000;
+
+/// A uniform number on [0, 1) from the upper 52 bits.
+#[inline(always)]
+fn uniform<W: Wide>(bits: W::Bits) -> W {
+    W::from_bits(bits.shr(12).or(W::Bits::splat(ONE))) - W::from(1.0)
+}
+
+/// Two independent standard normal numbers: r cos a and r sin a with r² = −2 ln u.
+#[inline(always)]
+fn normals<W: Wide>(radius: W::Bits, angle: W::Bits) -> [W; 2] {
+    // 1 − u is in (0, 1]: its logarithm is finite.
+    let r = (ln_of_fraction(W::from(1.0) - uniform::<W>(radius)) * -2.0).sqrt();
+    // An angle within an eighth of a turn to both sides of the axis; three of the bits that it leaves over choose the axis.
+    let x = (uniform::<W>(angle) - W::from(0.5)) * FRAC_PI_2;
+    let (sinc, cos) = sinc_cos_of_square(x * x);
+    let (c, s) = (cos.to_bits(), (x * sinc).to_bits());
+    // All ones where the lowest bit is 0.
+    let stays = angle.and(W::Bits::splat(1)).add(W::Bits::splat(u64::MAX));
+    let exchanged = c.xor(s).and(stays);
+    let sign = |bits: W::Bits| bits.and(W::Bits::splat(1)).shl(63);
+    let c = W::from_bits(c.xor(exchanged).xor(sign(angle.shr(1))));
+    let s = W::from_bits(s.xor(exchanged).xor(sign(angle.shr(2))));
+    [r * c, r * s]
+}
+
+/// ln x for 0 < x ≤ 1, x normal: exponent and mantissa m on [√½, √2), and ln m = 2 artanh((m − 1)/(m + 1)) as a series.
+#[inline(always)]
+fn ln_of_fraction<W: Wide>(x: W) -> W {
+    const ROOT_HALF: u64 = 0x3fe6_a09e_0000_0000; // upper half of the bits of √½
+    const MANTISSA: u64 = (1 << 52) - 1;
+    /// 2/(2k + 1): with z ≤ 0.0295 the first term left out is 4e-17 of the sum.
+    const ARTANH: [f64; 10] = [
+        2.0 / 19.0,
+        2.0 / 17.0,
+        2.0 / 15.0,
+        2.0 / 13.0,
+        2.0 / 11.0,
+        2.0 / 9.0,
+        2.0 / 7.0,
+        2.0 / 5.0,
+        2.0 / 3.0,
+        2.0,
+    ];
+    // Counted from √½, so that exponents change there and not at 1.
+    let bits = x.to_bits().add(W::Bits::splat(ONE - ROOT_HALF));
+    let mantissa = bits
+        .and(W::Bits::splat(MANTISSA))
+        .add(W::Bits::splat(ROOT_HALF));
+    // An integer below 2^52 in the mantissa of 2^52 is that number, exactly.
+    const TWO_52: f64 = 4_503_599_627_370_496.0;
+    let exponent = W::from_bits(bits.shr(52).or(W::Bits::splat(TWO_52.to_bits())));
+    let exponent = exponent - W::from(TWO_52 + 1023.0);
+    let m = W::from_bits(mantissa);
+    let s = (m - W::from(1.0)) / (m + 1.0);
+    exponent.mul_add(W::from(LN_2), s * horner(&ARTANH, s * s))
 }
 
 #[cfg(test)]
@@ -547,20 +720,34 @@ mod tests {
 #[cfg(test)]
 mod normal_tests {
     use super::*;
-    use rand::SeedableRng;
     use statrs::distribution::{ContinuousCDF, Normal};
 
+    const KEY: StreamKey<'_> = StreamKey {
+        seed: 3,
+        scenario: "",
+        run: 0,
+        source: "gyro.z",
+        process: "WN",
+    };
+
+    fn draw(n: usize) -> Vec<f64> {
+        let white = Composite::new(vec![Process::white(1.0).unwrap()]);
+        let mut out = vec![f64::NAN; n];
+        Synthesizer::new(&white, KEY).fill(&mut out);
+        out
+    }
+
     #[test]
-    fn the_layers_close_at_the_top_and_have_the_area() {
-        let z = Ziggurat::new();
-        let top = AREA / z.x[LAYERS - 1] + z.f[LAYERS - 1];
-        assert!((top - 1.0).abs() < 1e-12, "{top}");
-        let beyond = Normal::new(0.0, 1.0).unwrap().sf(R) * std::f64::consts::TAU.sqrt();
-        assert!(
-            (R * density(R) + beyond - AREA).abs() < 1e-12,
-            "{}",
-            R * density(R) + beyond
-        );
+    fn the_logarithm_is_within_two_roundings() {
+        for k in 1..100_000 {
+            let x = f64::from(k) / 100_000.0 * 2.0_f64.powi(-(k % 52));
+            let ln = ln_of_fraction(Lanes::splat(x))[0];
+            assert!(
+                (ln - x.ln()).abs() <= 2.0 * f64::EPSILON * x.ln().abs(),
+                "{x}"
+            );
+        }
+        assert_eq!(ln_of_fraction(Lanes::splat(1.0))[0], 0.0);
     }
 
     /// Counts in bins of equal probability, chi-square with 255 degrees of freedom: sd √(2·255).
@@ -568,13 +755,12 @@ mod normal_tests {
     fn all_quantiles_are_hit_evenly() {
         const BINS: usize = 256;
         let law = Normal::new(0.0, 1.0).unwrap();
-        let mut g = Generator::seed_from_u64(3);
-        let n = 1_000_000;
+        let x = draw(1_000_000);
         let mut counts = [0.0; BINS];
-        for _ in 0..n {
-            counts[(law.cdf(Ziggurat::get().draw(&mut g)) * BINS as f64) as usize] += 1.0;
+        for x in &x {
+            counts[(law.cdf(*x) * BINS as f64) as usize] += 1.0;
         }
-        let expected = f64::from(n) / BINS as f64;
+        let expected = x.len() as f64 / BINS as f64;
         let chi2: f64 = counts
             .iter()
             .map(|c: &f64| (c - expected).powi(2) / expected)
@@ -587,33 +773,91 @@ mod normal_tests {
     #[test]
     fn tails_and_fourth_moment() {
         let law = Normal::new(0.0, 1.0).unwrap();
-        let mut g = Generator::seed_from_u64(4);
-        let n = 8_000_000;
-        let bounds = [3.0, R, 4.0, 4.5];
-        let (mut above, mut below, mut fourth) = ([0.0; 4], [0.0; 4], 0.0);
-        for _ in 0..n {
-            let x = Ziggurat::get().draw(&mut g);
-            fourth += x.powi(4);
-            for (i, b) in bounds.iter().enumerate() {
-                above[i] += f64::from(u8::from(x > *b));
-                below[i] += f64::from(u8::from(x < -*b));
-            }
-        }
-        for (i, b) in bounds.iter().enumerate() {
-            let expected = f64::from(n) * law.sf(*b);
-            for count in [above[i], below[i]] {
-                let off: f64 = count - expected;
+        let x = draw(8_000_000);
+        let n = x.len() as f64;
+        for bound in [3.0, 4.0, 4.5, 5.0] {
+            let expected = n * law.sf(bound);
+            for sign in [-1.0, 1.0] {
+                let count = x.iter().filter(|x| sign * **x > bound).count() as f64;
+                let off = (count - expected).abs();
                 assert!(
-                    off.abs() < 5.0 * expected.sqrt(),
-                    "beyond {b}: {count}, {expected}"
+                    off < 5.0 * expected.max(1.0).sqrt(),
+                    "beyond {bound}: {count}, {expected}"
                 );
             }
         }
-        let n = f64::from(n);
-        assert!(
-            (fourth / n - 3.0).abs() < 5.0 * (96.0 / n).sqrt(),
-            "{}",
-            fourth / n
-        );
+        let fourth = x.iter().map(|x| x.powi(4)).sum::<f64>() / n;
+        assert!((fourth - 3.0).abs() < 5.0 * (96.0 / n).sqrt(), "{fourth}");
+    }
+
+    /// The two numbers of a pair share a radius: their squares are independent too. The standard deviation of a mean of
+    /// (x² − 1)(y² − 1) is 2/√n.
+    #[test]
+    fn the_numbers_of_a_pair_are_independent() {
+        let x = draw(2_000_000);
+        let pairs = x.as_chunks::<2>().0;
+        let n = pairs.len() as f64;
+        let mean = |f: &dyn Fn(&[f64; 2]) -> f64| pairs.iter().map(f).sum::<f64>() / n;
+        assert!(mean(&|[x, y]| x * y).abs() < 5.0 / n.sqrt());
+        assert!(mean(&|[x, y]| (x * x - 1.0) * (y * y - 1.0)).abs() < 10.0 / n.sqrt());
+    }
+
+    /// Fused products round once: the widths agree to a few roundings of r.
+    #[test]
+    fn vector_units_change_no_number_but_by_rounding() {
+        struct Draw;
+        impl Kernel for Draw {
+            type Output = [Lanes; 1000];
+            #[inline(always)]
+            fn run<W: Wide>(self) -> [Lanes; 1000] {
+                let mut out = [Lanes::ZERO; 1000];
+                let keys: Vec<_> = (0..8).map(|run| StreamKey { run, ..KEY }).collect();
+                LaneGenerator::new(&keys).fill::<W>(Law::Normal, &mut out);
+                out
+            }
+        }
+        let portable = dispatch(Level::Portable, Draw);
+        for level in [Level::Avx2, Level::Avx512] {
+            for (a, b) in dispatch(level, Draw).iter().zip(&portable) {
+                for lane in 0..LANES {
+                    assert!((a[lane] - b[lane]).abs() < 1e-14, "{level}");
+                }
+            }
+        }
+    }
+
+    /// Eight runs side by side, with parameters of their own, are each what it is alone, to the last bit.
+    #[test]
+    fn lanes_are_the_runs_alone() {
+        let noise = |run: usize| {
+            let scale = 1.0 + run as f64;
+            Composite::new(vec![
+                Process::white(scale).unwrap(),
+                Process::ar1(0.9 - 0.1 * scale, 2.0).unwrap(),
+                Process::ar1(0.999, scale).unwrap(),
+                Process::quantization(0.5 * scale).unwrap(),
+                Process::random_walk(0.1 * scale).unwrap(),
+                Process::ma1(0.1 * scale, 1.5).unwrap(),
+                Process::drift(1e-3 * scale).unwrap(),
+            ])
+        };
+        let noises: Vec<Composite> = (0..5).map(noise).collect();
+        let key = |run: usize| StreamKey {
+            run: run as u64,
+            ..KEY
+        };
+        let runs: Vec<_> = noises
+            .iter()
+            .enumerate()
+            .map(|(i, n)| (n, key(i)))
+            .collect();
+        let mut together = vec![Lanes::splat(f64::NAN); 1000];
+        Synthesizer::lanes(&runs).fill(&mut together);
+        for (lane, (noise, key)) in runs.iter().enumerate() {
+            let mut alone = vec![f64::NAN; 1000];
+            Synthesizer::new(noise, *key).fill(&mut alone);
+            assert!(together.iter().map(|x| x[lane]).eq(alone), "lane {lane}");
+        }
+        assert!(together.iter().all(|x| x.0[5..] == [0.0; 3]));
     }
 }

@@ -1,7 +1,7 @@
 //! The lane type: eight independent `f64` that advance together, and the small vectors made of it.
 //!
 //! Eight Monte-Carlo runs share one instruction stream. [`Lanes`] is how they stand in memory; in the
-//! kernels of the filter they are registers of the machine ([`Wide`]), chosen at run time by `dispatch`,
+//! kernels of noise and filter they are registers of the machine ([`Wide`]), chosen at run time by [`dispatch`],
 //! so a plain `cargo build --release` reaches the vector units. The formulas are written once, over
 //! [`Real`]: the Earth model for a scalar (trajectories), strapdown and covariance for any width.
 //!
@@ -9,8 +9,7 @@
 //! with shuffles between (seen in the profile).
 
 use std::ops::{Add, AddAssign, Div, Index, IndexMut, Mul, Neg, Sub, SubAssign};
-pub(crate) use wide::{Kernel, dispatch};
-pub use wide::{Level, Wide};
+pub use wide::{Bits, Kernel, Level, Wide, dispatch};
 
 mod wide;
 
@@ -67,7 +66,7 @@ pub struct Lanes(pub [f64; LANES]);
 
 impl Lanes {
     /// All lanes zero.
-    pub(crate) const ZERO: Self = Self([0.0; LANES]);
+    pub const ZERO: Self = Self([0.0; LANES]);
 
     /// The same value in every lane.
     #[inline(always)]
@@ -206,7 +205,7 @@ fn sin_cos<L: Real>(angle: L) -> (L, L) {
 
 /// The nearest integer, |x| < 2^51: adding and subtracting 1.5·2^52 leaves no room for a fraction.
 #[inline(always)]
-pub(crate) fn rounded<L: Real>(x: L) -> L {
+pub fn rounded<L: Real>(x: L) -> L {
     const ROUND: f64 = 6_755_399_441_055_744.0;
     // The compiler may not simplify this: floating-point addition is not associative in Rust.
     (x + ROUND) - L::from(ROUND)
@@ -221,7 +220,7 @@ fn sin_cos_kernel<L: Real>(x: L) -> (L, L) {
 
 /// (sin x / x, cos x) as functions of x², exact to rounding for |x| ≤ π/4.
 #[inline(always)]
-fn sinc_cos_of_square<L: Real>(x2: L) -> (L, L) {
+pub fn sinc_cos_of_square<L: Real>(x2: L) -> (L, L) {
     // (−1)^k/(2k + 1)! and below (−1)^k/(2k)!: at π/4 the first terms left out are 1e-19 and 3e-21.
     const SINC: [f64; 9] = [
         1.0 / 355_687_428_096_000.0,
@@ -251,7 +250,7 @@ fn sinc_cos_of_square<L: Real>(x2: L) -> (L, L) {
 
 /// The polynomial with the given coefficients, highest power first.
 #[inline(always)]
-fn horner<L: Real, const N: usize>(coefficients: &[f64; N], x: L) -> L {
+pub fn horner<L: Real, const N: usize>(coefficients: &[f64; N], x: L) -> L {
     let mut sum = L::from(coefficients[0]);
     for i in 1..N {
         sum = sum.mul_add(x, L::from(coefficients[i]));
@@ -270,12 +269,12 @@ impl Vec3 {
     pub const ZERO: Self = Self([Lanes::ZERO; 3]);
 
     /// The vector of one lane.
-    pub(crate) fn lane(&self, i: usize) -> glam::DVec3 {
+    pub fn lane(&self, i: usize) -> glam::DVec3 {
         glam::DVec3::new(self.0[0][i], self.0[1][i], self.0[2][i])
     }
 
     /// Sets the vector of one lane.
-    pub(crate) fn set_lane(&mut self, i: usize, v: glam::DVec3) {
+    pub fn set_lane(&mut self, i: usize, v: glam::DVec3) {
         for k in 0..3 {
             self.0[k][i] = v[k];
         }
@@ -283,7 +282,7 @@ impl Vec3 {
 
     /// Into registers.
     #[inline(always)]
-    pub(crate) fn load<W: Wide>(&self) -> Vec3<W> {
+    pub fn load<W: Wide>(&self) -> Vec3<W> {
         Vec3([
             W::load(&self.0[0]),
             W::load(&self.0[1]),
@@ -293,7 +292,7 @@ impl Vec3 {
 
     /// From registers.
     #[inline(always)]
-    pub(crate) fn store<W: Wide>(&mut self, v: Vec3<W>) {
+    pub fn store<W: Wide>(&mut self, v: Vec3<W>) {
         for i in 0..3 {
             v.0[i].store(&mut self.0[i]);
         }
@@ -309,7 +308,7 @@ impl<L: Real> Vec3<L> {
 
     /// Cross product.
     #[inline(always)]
-    pub(crate) fn cross(self, b: Self) -> Self {
+    pub fn cross(self, b: Self) -> Self {
         let (a, b) = (self.0, b.0);
         let minor = |i: usize, j: usize| a[i].mul_add(b[j], -(a[j] * b[i]));
         Self([minor(1, 2), minor(2, 0), minor(0, 1)])
@@ -317,13 +316,13 @@ impl<L: Real> Vec3<L> {
 
     /// Scalar product.
     #[inline(always)]
-    pub(crate) fn dot(self, b: Self) -> L {
+    pub fn dot(self, b: Self) -> L {
         dot3(&self.0, &b)
     }
 
     /// self · s + term.
     #[inline(always)]
-    pub(crate) fn mul_add(self, s: L, term: Self) -> Self {
+    pub fn mul_add(self, s: L, term: Self) -> Self {
         let (a, t) = (self.0, term.0);
         Self([
             a[0].mul_add(s, t[0]),
@@ -397,14 +396,14 @@ impl Mat3 {
 impl<L: Real> Mat3<L> {
     /// The cross-product matrix \[v×\].
     #[inline(always)]
-    pub(crate) fn skew(v: Vec3<L>) -> Self {
+    pub fn skew(v: Vec3<L>) -> Self {
         let z = L::from(0.0);
         Self([[z, -v[2], v[1]], [v[2], z, -v[0]], [-v[1], v[0], z]])
     }
 
     /// Every element times s.
     #[inline(always)]
-    pub(crate) fn scaled(mut self, s: L) -> Self {
+    pub fn scaled(mut self, s: L) -> Self {
         for row in &mut self.0 {
             for value in row {
                 *value = *value * s;
@@ -460,20 +459,20 @@ pub struct Quat<L = Lanes> {
 
 impl Quat {
     /// The rotation of one lane.
-    pub(crate) fn lane(&self, i: usize) -> glam::DQuat {
+    pub fn lane(&self, i: usize) -> glam::DQuat {
         let v = self.v.lane(i);
         glam::DQuat::from_xyzw(v.x, v.y, v.z, self.w[i])
     }
 
     /// Sets the rotation of one lane.
-    pub(crate) fn set_lane(&mut self, i: usize, q: glam::DQuat) {
+    pub fn set_lane(&mut self, i: usize, q: glam::DQuat) {
         self.w[i] = q.w;
         self.v.set_lane(i, q.xyz());
     }
 
     /// Into registers.
     #[inline(always)]
-    pub(crate) fn load<W: Wide>(&self) -> Quat<W> {
+    pub fn load<W: Wide>(&self) -> Quat<W> {
         Quat {
             w: W::load(&self.w),
             v: self.v.load(),
@@ -482,7 +481,7 @@ impl Quat {
 
     /// From registers.
     #[inline(always)]
-    pub(crate) fn store<W: Wide>(&mut self, q: Quat<W>) {
+    pub fn store<W: Wide>(&mut self, q: Quat<W>) {
         q.w.store(&mut self.w);
         self.v.store(q.v);
     }
@@ -491,7 +490,7 @@ impl Quat {
 impl<L: Real> Quat<L> {
     /// The same rotation in every lane.
     #[inline(always)]
-    pub(crate) fn splat(q: glam::DQuat) -> Self {
+    pub fn splat(q: glam::DQuat) -> Self {
         Self {
             w: L::from(q.w),
             v: Vec3::splat(q.xyz()),
@@ -500,7 +499,7 @@ impl<L: Real> Quat<L> {
 
     /// The rotation by a rotation vector of at most π/2 radians.
     #[inline(always)]
-    pub(crate) fn from_rotation_vector(phi: Vec3<L>) -> Self {
+    pub fn from_rotation_vector(phi: Vec3<L>) -> Self {
         let half = phi * L::from(0.5);
         // sin(θ/2)/(θ/2) as a series in θ²: no division by θ, and so no branch for a rotation of zero.
         let (sinc, cos) = sinc_cos_of_square(half.dot(half));
@@ -512,7 +511,7 @@ impl<L: Real> Quat<L> {
 
     /// One Newton step towards unit length: enough after each product of unit quaternions.
     #[inline(always)]
-    pub(crate) fn renormalised(self) -> Self {
+    pub fn renormalised(self) -> Self {
         // 1/√x ≈ (3 − x)/2 near 1: an error ε of the norm becomes 3ε²/2.
         let scale = (self.w * self.w + self.v.dot(self.v)) * -0.5 + 1.5;
         Self {

@@ -4,17 +4,49 @@
     reason = "vector instructions, used only after the processor was asked for them"
 )]
 
-use super::{Lanes, Real};
+use super::{LANES, Lanes, Real};
 
 /// Eight lanes as a kernel computes with them.
 pub trait Wide: Real {
+    /// The same register as integers.
+    type Bits: Bits;
     /// From memory.
     fn load(lanes: &Lanes) -> Self;
     /// To memory.
     fn store(self, lanes: &mut Lanes);
+    /// The numbers that have this binary representation.
+    fn from_bits(bits: Self::Bits) -> Self;
+    /// Their binary representation.
+    fn to_bits(self) -> Self::Bits;
+}
+
+/// Eight integers of 64 bits.
+pub trait Bits: Copy {
+    /// From memory.
+    fn load(lanes: &[u64; LANES]) -> Self;
+    /// To memory.
+    fn store(self, lanes: &mut [u64; LANES]);
+    /// The same value in every lane.
+    #[inline(always)]
+    fn splat(value: u64) -> Self {
+        Self::load(&[value; LANES])
+    }
+    /// Sum modulo 2^64.
+    fn add(self, other: Self) -> Self;
+    /// Bitwise and.
+    fn and(self, other: Self) -> Self;
+    /// Bitwise or.
+    fn or(self, other: Self) -> Self;
+    /// Bitwise exclusive or.
+    fn xor(self, other: Self) -> Self;
+    /// Shifted left by `count` < 64 bits.
+    fn shl(self, count: u64) -> Self;
+    /// Shifted right by `count` < 64 bits, zeros from the left.
+    fn shr(self, count: u64) -> Self;
 }
 
 impl Wide for Lanes {
+    type Bits = [u64; LANES];
     #[inline(always)]
     fn load(lanes: &Lanes) -> Self {
         *lanes
@@ -23,6 +55,44 @@ impl Wide for Lanes {
     fn store(self, lanes: &mut Lanes) {
         *lanes = self;
     }
+    #[inline(always)]
+    fn from_bits(bits: [u64; LANES]) -> Self {
+        Self(bits.map(f64::from_bits))
+    }
+    #[inline(always)]
+    fn to_bits(self) -> [u64; LANES] {
+        self.0.map(f64::to_bits)
+    }
+}
+
+macro_rules! lane_integer_operator {
+    ($method:ident, $lane:ident, $other:ident, $argument:ty, $result:expr) => {
+        #[inline(always)]
+        fn $method(self, $other: $argument) -> Self {
+            let mut result = self;
+            for $lane in 0..LANES {
+                result[$lane] = $result(self[$lane]);
+            }
+            result
+        }
+    };
+}
+
+impl Bits for [u64; LANES] {
+    #[inline(always)]
+    fn load(lanes: &[u64; LANES]) -> Self {
+        *lanes
+    }
+    #[inline(always)]
+    fn store(self, lanes: &mut [u64; LANES]) {
+        *lanes = self;
+    }
+    lane_integer_operator!(add, i, other, Self, |x: u64| x.wrapping_add(other[i]));
+    lane_integer_operator!(and, i, other, Self, |x: u64| x & other[i]);
+    lane_integer_operator!(or, i, other, Self, |x: u64| x | other[i]);
+    lane_integer_operator!(xor, i, other, Self, |x: u64| x ^ other[i]);
+    lane_integer_operator!(shl, i, count, u64, |x: u64| x << count);
+    lane_integer_operator!(shr, i, count, u64, |x: u64| x >> count);
 }
 
 /// What the processor can do.
@@ -73,7 +143,7 @@ impl std::fmt::Display for Level {
 /// A computation written for any width. `run` and all it calls must be `#[inline(always)]`, loops rather
 /// than closures or `array::map`: what is not inlined into the dispatching function is not compiled for
 /// the wider units (a factor of four from one `map`, seen in the profile).
-pub(crate) trait Kernel {
+pub trait Kernel {
     /// What it returns.
     type Output;
     /// Computes with registers of type `W`.
@@ -81,7 +151,7 @@ pub(crate) trait Kernel {
 }
 
 /// Runs a kernel at a level, or portably where the machine does not have it.
-pub(crate) fn dispatch<K: Kernel>(level: Level, kernel: K) -> K::Output {
+pub fn dispatch<K: Kernel>(level: Level, kernel: K) -> K::Output {
     match level {
         // Safety: the processor has what the functions were compiled for.
         #[cfg(target_arch = "x86_64")]
@@ -97,7 +167,7 @@ mod x86 {
     //! The register types are private to this module: they exist only inside the two functions below,
     //! whose caller has asked the processor. That is why every `unsafe` here is sound.
 
-    use super::{Kernel, Lanes, Real, Wide};
+    use super::{Bits, Kernel, LANES, Lanes, Real, Wide};
     use crate::lanes::derived_operators;
     use std::arch::x86_64::*;
     use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -127,10 +197,65 @@ mod x86 {
         };
     }
 
+    macro_rules! integer_operator {
+        ($count:literal, $method:ident, $intrinsic:ident) => {
+            #[inline(always)]
+            fn $method(mut self, other: Self) -> Self {
+                for i in 0..$count {
+                    self.0[i] = unsafe { $intrinsic(self.0[i], other.0[i]) };
+                }
+                self
+            }
+        };
+    }
+
+    /// Eight integers in `$count` registers of `$width` lanes.
+    macro_rules! wide_integers {
+        ($name:ident, $register:ident, $count:literal, $width:literal, $load:ident, $store:ident,
+         $add:ident, $and:ident, $or:ident, $xor:ident, $shl:ident, $shr:ident) => {
+            #[derive(Clone, Copy)]
+            struct $name([$register; $count]);
+            impl Bits for $name {
+                #[inline(always)]
+                fn load(lanes: &[u64; LANES]) -> Self {
+                    Self(std::array::from_fn(|i| unsafe {
+                        $load(lanes.as_ptr().add($width * i).cast())
+                    }))
+                }
+                #[inline(always)]
+                fn store(self, lanes: &mut [u64; LANES]) {
+                    for i in 0..$count {
+                        unsafe { $store(lanes.as_mut_ptr().add($width * i).cast(), self.0[i]) };
+                    }
+                }
+                integer_operator!($count, add, $add);
+                integer_operator!($count, and, $and);
+                integer_operator!($count, or, $or);
+                integer_operator!($count, xor, $xor);
+                #[inline(always)]
+                fn shl(mut self, count: u64) -> Self {
+                    let counts = Self::splat(count);
+                    for i in 0..$count {
+                        self.0[i] = unsafe { $shl(self.0[i], counts.0[i]) };
+                    }
+                    self
+                }
+                #[inline(always)]
+                fn shr(mut self, count: u64) -> Self {
+                    let counts = Self::splat(count);
+                    for i in 0..$count {
+                        self.0[i] = unsafe { $shr(self.0[i], counts.0[i]) };
+                    }
+                    self
+                }
+            }
+        };
+    }
+
     /// Eight lanes in `$count` registers of `$width` lanes.
     macro_rules! wide {
-        ($name:ident, $register:ident, $count:literal, $width:literal, $set:ident, $load:ident, $store:ident,
-         $add:ident, $sub:ident, $mul:ident, $div:ident, $sqrt:ident, $fma:ident) => {
+        ($name:ident, $bits:ident, $register:ident, $count:literal, $width:literal, $set:ident, $load:ident, $store:ident,
+         $add:ident, $sub:ident, $mul:ident, $div:ident, $sqrt:ident, $fma:ident, $to_bits:ident, $from_bits:ident) => {
             #[derive(Clone, Copy)]
             struct $name([$register; $count]);
             operator!($name, $count, Add, add, $add);
@@ -169,6 +294,15 @@ mod x86 {
                 }
             }
             impl Wide for $name {
+                type Bits = $bits;
+                #[inline(always)]
+                fn from_bits(bits: $bits) -> Self {
+                    Self(bits.0.map(|register| unsafe { $from_bits(register) }))
+                }
+                #[inline(always)]
+                fn to_bits(self) -> $bits {
+                    $bits(self.0.map(|register| unsafe { $to_bits(register) }))
+                }
                 #[inline(always)]
                 fn load(lanes: &Lanes) -> Self {
                     let mut result = Self::from(0.0);
@@ -188,8 +322,37 @@ mod x86 {
         };
     }
 
+    wide_integers!(
+        Avx512Bits,
+        __m512i,
+        1,
+        8,
+        _mm512_loadu_si512,
+        _mm512_storeu_si512,
+        _mm512_add_epi64,
+        _mm512_and_si512,
+        _mm512_or_si512,
+        _mm512_xor_si512,
+        _mm512_sllv_epi64,
+        _mm512_srlv_epi64
+    );
+    wide_integers!(
+        Avx2Bits,
+        __m256i,
+        2,
+        4,
+        _mm256_loadu_si256,
+        _mm256_storeu_si256,
+        _mm256_add_epi64,
+        _mm256_and_si256,
+        _mm256_or_si256,
+        _mm256_xor_si256,
+        _mm256_sllv_epi64,
+        _mm256_srlv_epi64
+    );
     wide!(
         Avx512,
+        Avx512Bits,
         __m512d,
         1,
         8,
@@ -201,10 +364,13 @@ mod x86 {
         _mm512_mul_pd,
         _mm512_div_pd,
         _mm512_sqrt_pd,
-        _mm512_fmadd_pd
+        _mm512_fmadd_pd,
+        _mm512_castpd_si512,
+        _mm512_castsi512_pd
     );
     wide!(
         Avx2,
+        Avx2Bits,
         __m256d,
         2,
         4,
@@ -216,6 +382,8 @@ mod x86 {
         _mm256_mul_pd,
         _mm256_div_pd,
         _mm256_sqrt_pd,
-        _mm256_fmadd_pd
+        _mm256_fmadd_pd,
+        _mm256_castpd_si256,
+        _mm256_castsi256_pd
     );
 }
