@@ -9,7 +9,7 @@ use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::Plan;
-use nav_sim_navigation::simulation::run_batch;
+use nav_sim_navigation::simulation::{Gains, run_batch};
 #[path = "../benches/throughput/mod.rs"]
 #[allow(dead_code, reason = "its model alone is used")]
 mod throughput;
@@ -39,7 +39,7 @@ unsafe impl GlobalAlloc for Counting {
 static COUNTING: Counting = Counting;
 
 /// Allocations of a batch of eight runs along a profile that drives straight for `duration_s`.
-fn allocations(duration_s: u32) -> u64 {
+fn allocations(duration_s: u32, gains: Gains) -> u64 {
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("straight.toml");
     let profile = format!(
@@ -58,20 +58,23 @@ fn allocations(duration_s: u32) -> u64 {
             end_s: 30.0,
         }],
     );
-    let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &outages, 1);
+    let mut experiment =
+        scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &outages, 1);
+    experiment.gains = gains;
     let plan = Plan::new(&experiment).unwrap();
+    let runs_from = |first| assert_eq!(run_batch(&plan, first, 8)[0].runs.len(), 8);
+    runs_from(0); // shared gains are computed once
     let before = ALLOCATIONS.load(Ordering::Relaxed);
-    let batches = run_batch(&plan, 0, 8);
-    let made = ALLOCATIONS.load(Ordering::Relaxed) - before;
-    assert_eq!(batches[0].runs.len(), 8);
-    made
+    runs_from(8);
+    ALLOCATIONS.load(Ordering::Relaxed) - before
 }
 
 #[test]
 fn the_time_loop_allocates_nothing() {
-    allocations(40); // tables that are made once
-    let (short, long) = (allocations(60), allocations(120));
-    assert_eq!(short, long);
-    // what a batch is made of: eight runs of six axes of five processes, and records
-    assert!(short > 0, "the allocator counts");
+    for gains in [Gains::Own, Gains::Shared] {
+        let (short, long) = (allocations(60, gains), allocations(120, gains));
+        assert_eq!(short, long);
+        // the parts of a batch: eight runs of six axes of five processes, and records
+        assert!(short > 0, "the allocator counts");
+    }
 }

@@ -16,7 +16,7 @@ use crate::sensors::outage::{
     RandomOutages,
 };
 use crate::simulation::lincov::{Alike, Track, reduced_belief};
-use crate::simulation::{Experiment, ExperimentError, samples_per};
+use crate::simulation::{Experiment, ExperimentError, Gains, samples_per};
 use crate::trajectory::Trajectory;
 use crate::units::{Probability, SettingError};
 use schemars::JsonSchema;
@@ -106,6 +106,8 @@ pub struct FilterSettings {
     pub gravity: GravityModel,
     /// How the filter uses a fix.
     pub update: FixUpdate,
+    /// Where sampled runs take the gains of the filter from.
+    pub gains: Gains,
 }
 
 /// How a noise model is reduced to white noise and one Gauss-Markov bias per axis.
@@ -143,6 +145,7 @@ impl Scenario {
             baro: self.baro.as_ref(),
             aiding: &self.aiding,
             update: self.filter.update,
+            gains: self.filter.gains,
             outages,
             seed,
             coverage_level: self.run.coverage_level,

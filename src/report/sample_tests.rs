@@ -1,6 +1,6 @@
 //! A small made-up result for the tests of this room.
 
-use nav_sim_navigation::simulation::{EpochSums, OutageRecord, RunRecord, RunResult};
+use nav_sim_navigation::simulation::{EpochSums, GainsUsed, OutageRecord, RunRecord, RunResult};
 
 /// Four runs of 12 epochs, one outage from 4 to 8 s, errors as large as the filter believes.
 pub(crate) fn result() -> RunResult {
@@ -56,5 +56,6 @@ pub(crate) fn result() -> RunResult {
         coverage_level: 0.95,
         run_epochs: 4800,
         independent_windows: None,
+        gains: GainsUsed::default(),
     }
 }

@@ -9,9 +9,9 @@ use nav_sim::navigation::sensors::ideal_imu::ideal_imu;
 use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim_navigation::closure::{Bounds, Closure};
 use nav_sim_navigation::earth::ned_difference;
-use nav_sim_navigation::lanes::Vec3;
 use nav_sim_navigation::strapdown::Strapdown;
 use nav_sim_navigation::trajectory::plausibility::examine;
+use nav_sim_signal::lanes::Vec3;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 

@@ -10,7 +10,7 @@ use nav_sim_document::{
 use nav_sim_navigation::ekf::FixUpdate;
 use nav_sim_navigation::metrics::{EpochMetrics, OutageSummary, Summary, VerdictKind};
 use nav_sim_navigation::scenario::Method;
-use nav_sim_navigation::simulation::REPORTED_NAMES;
+use nav_sim_navigation::simulation::{GainsUsed, REPORTED_NAMES};
 
 /// Outages whose tables are shown: of more, those with the largest errors.
 const OUTAGES: usize = 3;
@@ -89,11 +89,42 @@ fn notes(summary: &Summary, answer: &RunAnswer, page: &mut Document) {
             .into_iter()
             .for_each(|doubt| page.note(Importance::Detail, doubt));
     }
+    if let Some(gains) = summary.gains {
+        let importance = if gains.disagree() {
+            Importance::Warning
+        } else {
+            Importance::Detail
+        };
+        page.note(importance, gains_line(gains));
+    }
     for outage in largest(summary, 1).iter().map(|k| &summary.outages[*k]) {
         sources(outage)
             .into_iter()
             .for_each(|line| page.note(Importance::Remark, line));
     }
+}
+
+/// `gains shared by all runs; their standard deviations are within 0.4 %`
+fn gains_line(gains: GainsUsed) -> String {
+    let [kind, compared] = if gains.is_shared {
+        [
+            "gains shared by all runs",
+            "their standard deviations are within",
+        ]
+    } else {
+        [
+            "gains of each run's own covariance",
+            "shared ones would be off by",
+        ]
+    };
+    let compared = |difference: f64| format!("; {compared} {:.1} %", 100.0 * difference);
+    let compared = gains.largest_difference.map_or(String::new(), compared);
+    let remedy = if gains.disagree() {
+        ": --gains own is exact"
+    } else {
+        ""
+    };
+    format!("{kind}{compared}{remedy}")
 }
 
 /// `sources of the horizontal error at the end of 300–390 s: gyro.AR1 78 %, gyro.WN 11 %, gnss.velocity 10 %`

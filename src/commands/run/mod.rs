@@ -25,7 +25,7 @@ use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
     FilterPass, Instant, Track, TruthSide, assess, strapdown_over_sigma, weak_heading,
 };
-use nav_sim_navigation::simulation::{Experiment, Plan, REPORTED, RunResult};
+use nav_sim_navigation::simulation::{Experiment, Gains, Plan, REPORTED, RunResult};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::{Recording, Sensor};
 use nav_sim_signal::noise::reduction::is_exact;
@@ -79,6 +79,10 @@ pub struct Run {
     /// both (runs, compared with their expected values)
     #[arg(long, value_name = "METHOD", value_parser = parse::one_of::<Method>(&Method::NAMES))]
     method: Option<Method>,
+    /// Covariance that the gains of sampled runs come from: own (of each run), shared (one along the reference) or
+    /// auto (shared where its standard deviations agree within 2 % with those of runs 0 to 7) [default: auto]
+    #[arg(long, value_name = "GAINS", value_parser = parse::one_of::<Gains>(&Gains::NAMES))]
+    gains: Option<Gains>,
     /// Limit on an error at the end of every outage, as NAME<=LIMIT (repeatable): p50_m, p95_m (horizontal),
     /// rmse_pos_e_m, yaw_deg and the other states; or "consistent"; exit code 3 if it is not met
     #[arg(long, value_name = "NAME<=LIMIT")]
@@ -201,6 +205,7 @@ impl Run {
         let mut scenario = self.settings.scenario()?;
         scenario.run.runs = self.runs.unwrap_or(scenario.run.runs);
         scenario.run.method = self.method.unwrap_or(scenario.run.method);
+        scenario.filter.gains = self.gains.unwrap_or(scenario.filter.gains);
         self.filter
             .over(&mut scenario.filter.states, &mut scenario.initial);
         scenario.validate().refuse()?;

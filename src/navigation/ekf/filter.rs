@@ -44,6 +44,8 @@ pub struct Ekf {
     pub(super) scratch: Scratch,
     pub(super) level: Level,
     pub(super) fix_update: FixUpdate,
+    /// The covariance is set before every measurement and not propagated here.
+    pub(crate) covariance_is_given: bool,
 }
 
 /// Working vectors of the measurement update, one entry a state.
@@ -132,6 +134,7 @@ impl Ekf {
             },
             level: Level::best(),
             fix_update: FixUpdate::default(),
+            covariance_is_given: false,
         }
     }
 
@@ -245,7 +248,11 @@ impl Ekf {
         self.omega_ib_b.store(omega_ib_b);
         let seconds = W::from(dt);
         // The nominal state first: the map is linearised about the interval it has just passed through.
-        let sample = Sample::new(&ins.step(omega_ib_b * seconds, f_ib_b * seconds, dt), dt);
+        let passed = ins.step(omega_ib_b * seconds, f_ib_b * seconds, dt);
+        if self.covariance_is_given {
+            return;
+        }
+        let sample = Sample::new(&passed, dt);
         let sources = Sources::new(&self.belief, &self.steps, &self.regressors);
         self.p.step(&sample, &sources);
         if let Some(transition) = &mut self.transition {

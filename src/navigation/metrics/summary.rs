@@ -5,7 +5,7 @@ use super::outage::{Budget, EpochMetrics, outages};
 use super::verdict::{OutageVerdict, Verdict, VerdictKind, judged};
 use crate::linalg::{by_value, mean};
 use crate::simulation::lincov::{self, Assessment};
-use crate::simulation::{NEES_DOF, REPORTED, REPORTED_NAMES, RunResult};
+use crate::simulation::{GainsUsed, NEES_DOF, REPORTED, REPORTED_NAMES, RunResult};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::fmt;
@@ -31,6 +31,8 @@ pub struct Summary {
     pub independent_runs: f64,
     /// States of the filter.
     pub filter_states: usize,
+    /// The gains of the filter in sampled runs; none for a covariance analysis.
+    pub gains: Option<GainsUsed>,
     /// Seed of all random numbers; none for a covariance analysis that drew nothing.
     pub seed: Option<u64>,
     /// Means over all epochs, with and without fixes.
@@ -214,6 +216,7 @@ impl Summary {
             diverged: diverged_runs.len() as u64,
             diverged_runs,
             filter_states: result.filter_states,
+            gains: Some(result.gains),
             seed: Some(seed),
             outages: with_verdicts(outages(result, epochs), verdicts),
             nis: nis(result),

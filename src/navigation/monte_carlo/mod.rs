@@ -32,7 +32,8 @@
 use crate::ekf::Belief;
 use crate::lanes::LANES;
 use crate::simulation::{
-    EpochSums, Experiment, ExperimentError, Plan, REPORTED, RunRecord, RunResult, run_batch,
+    EpochSums, Experiment, ExperimentError, GainsUsed, Plan, REPORTED, RunRecord, RunResult,
+    run_batch,
 };
 use rayon::prelude::*;
 
@@ -82,7 +83,7 @@ pub fn run_range(
         for parts in together.par_iter().map(batch).collect::<Option<Vec<_>>>()? {
             for (result, part) in results.iter_mut().zip(parts) {
                 result.run_epochs += (plan.samples() * part.runs.len()) as u64;
-                result.add(part.epochs, part.runs);
+                result.add(part.epochs, part.runs, part.gains);
             }
         }
     }
@@ -93,14 +94,16 @@ pub fn run_range(
 const TOGETHER: usize = 64;
 
 impl RunResult {
-    fn add(&mut self, epochs: Vec<EpochSums>, runs: Vec<RunRecord>) {
+    fn add(&mut self, epochs: Vec<EpochSums>, runs: Vec<RunRecord>, gains: GainsUsed) {
         if self.epochs.is_empty() {
             self.epochs = epochs;
+            self.gains = gains;
         } else {
             self.epochs
                 .iter_mut()
                 .zip(&epochs)
                 .for_each(|(sum, epoch)| sum.add(epoch));
+            self.gains.add(gains);
         }
         self.runs.extend(runs);
     }
@@ -108,7 +111,7 @@ impl RunResult {
     /// Adds the result of further runs of the same experiment, made at the same epochs.
     pub fn append(&mut self, later: Self) {
         self.run_epochs += later.run_epochs;
-        self.add(later.epochs, later.runs);
+        self.add(later.epochs, later.runs, later.gains);
     }
 }
 

@@ -12,7 +12,7 @@ use crate::sensors::defects::{Defects, ImuSettings};
 use crate::sensors::gnss::{BaroSettings, GnssSettings};
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
-use crate::simulation::NEES_DOF;
+use crate::simulation::{Gains, NEES_DOF};
 use crate::trajectory::{Trajectory, TrajectorySample};
 use crate::units::DEG;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -65,6 +65,7 @@ struct Setting {
     defects: ImuSettings,
     baro: Option<BaroSettings>,
     update: FixUpdate,
+    gains: Gains,
     seed: u64,
     aiding: AidingSettings,
 }
@@ -88,6 +89,7 @@ impl Setting {
             baro: None,
             aiding: AidingSettings::default(),
             update: FixUpdate::default(),
+            gains: Gains::default(),
         }
     }
 
@@ -104,6 +106,7 @@ impl Setting {
             baro: self.baro.as_ref(),
             aiding: &self.aiding,
             update: self.update,
+            gains: self.gains,
             outages: &self.outages,
             seed: self.seed,
             coverage_level: 0.95,
@@ -511,4 +514,44 @@ fn windows_of_recordings_leave_the_matched_filter_consistent() {
             "NEES {nees} at {look} s not in {low}..{high}"
         );
     }
+}
+
+/// At the end of an outage, on the same noise: the errors of runs hang on the gains by far less than they scatter.
+#[test]
+fn shared_gains_leave_errors_as_they_are() {
+    let mut setting = Setting::new(60.0, &[1.0]);
+    // A minute is alignment for the most part: with less to align than by default.
+    setting.initial.att_sigma_deg = [0.1, 0.1, 0.5];
+    setting.gains = Gains::Own;
+    let own = setting.run(64).swap_remove(0);
+    setting.gains = Gains::Auto;
+    let shared = setting.run(64).swap_remove(0);
+    assert!(shared.gains.is_shared && !own.gains.is_shared);
+    assert!(shared.gains.largest_difference.unwrap() <= 0.02);
+    let rmse = |result: &RunResult, i: usize| {
+        let squares = result
+            .runs
+            .iter()
+            .map(|r| r.outages[0].error_end[i].powi(2));
+        (squares.sum::<f64>() / result.runs.len() as f64).sqrt()
+    };
+    for i in 0..REPORTED {
+        // 64 runs know an RMSE to 9 %.
+        let ratio = rmse(&shared, i) / rmse(&own, i);
+        assert!((ratio - 1.0).abs() < 0.005, "state {i}: {ratio}");
+    }
+    assert!(own.runs[5].outages[0].error_end != shared.runs[5].outages[0].error_end);
+}
+
+/// A start 20° wrong in yaw is beyond a linear filter: gains are not shared, and the results are those of own gains.
+#[test]
+fn gains_are_not_shared_where_errors_are_large() {
+    let mut setting = Setting::new(60.0, &[1.0]);
+    setting.initial.att_sigma_deg[2] = 20.0;
+    let auto = setting.run(16).swap_remove(0);
+    setting.gains = Gains::Own;
+    let own = setting.run(16).swap_remove(0);
+    assert!(!auto.gains.is_shared);
+    assert!(auto.gains.largest_difference.unwrap() > 0.02);
+    assert!(bits(&auto.epochs) == bits(&own.epochs) && bits(&auto.runs) == bits(&own.runs));
 }

@@ -1,12 +1,14 @@
 //! Eight runs through the schedule: noise, prediction, fixes, and what is kept of them.
 
+use super::gains::{Covariances, GainsUsed};
 use super::plan::{Event, Plan};
 use super::source::{Measured, Source};
 use super::{BIASES, COVERAGE_DOF, EpochSums, NEES_DOF, OutageRecord, REPORTED, RunRecord};
 use crate::earth::ned_difference;
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::{
-    BodyVelocity, Ekf, advance, settle, update, update_body_velocity, update_height, update_yaw,
+    Belief, BodyVelocity, Ekf, advance, settle, update, update_body_velocity, update_height,
+    update_yaw,
 };
 use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::Sensor;
@@ -17,36 +19,37 @@ use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
 
-/// What one candidate made of up to eight runs.
-#[derive(Debug)]
+/// The errors of one candidate in up to eight runs.
+#[derive(Debug, Clone)]
 pub struct Batch {
     /// Sums over the runs that did not diverge, one an epoch.
     pub epochs: Vec<EpochSums>,
     /// One record a run.
     pub runs: Vec<RunRecord>,
+    /// The gains of the filter.
+    pub gains: GainsUsed,
 }
 
-/// Runs `first..first + live` (at most [`LANES`]) through all candidates: the noise is drawn once.
-pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
-    let experiment = plan.experiment;
+/// A filter, and its covariances along the reference where runs share them.
+pub(super) type BatchFilter<'a> = (&'a Belief, Option<&'a Covariances>);
+
+/// Runs `first..first + live` (at most [`LANES`]) through filters: the noise is drawn once.
+pub(super) fn run_candidates(
+    plan: &Plan<'_>,
+    first: u64,
+    live: usize,
+    filters: &[BatchFilter<'_>],
+) -> Vec<Batch> {
     let mut source = Source::new(plan, first, live);
     let starts = source.starts(plan);
-    let mut candidates: Vec<Candidate> = experiment
-        .beliefs
+    let mut candidates: Vec<Candidate<'_>> = filters
         .iter()
-        .map(|b| Candidate::new(plan, b, &starts, live))
+        .map(|filter| Candidate::new(plan, *filter, &starts, live))
         .collect();
     let mut done = 0;
     for (index, event) in plan.events.iter().enumerate() {
         let samples = &plan.ideal[done..event.sample];
-        // At every epoch of the receiver, also within outages, so that an outage changes no random number
-        // after it.
-        let fix = event.gnss_epoch.then(|| source.fix(plan, event));
-        let measured = Measured {
-            fix: fix.filter(|_| event.fix),
-            height: source.height(plan, event),
-            aids: source.aids(event),
-        };
+        let measured = source.measured(plan, event);
         // Drawn once for all candidates: their errors are paired, and ratios between them scatter far less
         // than each.
         let errors = source.errors(plan, done..event.sample);
@@ -59,9 +62,41 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
     candidates.into_iter().map(|c| c.finish(first)).collect()
 }
 
+/// Uses all measurements of an instant; returns the NIS of the fix.
+pub(super) fn measure(ekf: &mut Ekf, plan: &Plan<'_>, measured: &Measured) -> Option<Lanes> {
+    let nis = measured.fix.as_ref().map(|fix| update(ekf, fix));
+    if let (Some(h), Some(baro)) = (&measured.height, plan.experiment.baro) {
+        let _ = update_height(ekf, h, baro.sigma_m);
+    }
+    for (aid, value) in &measured.aids {
+        use_aid(ekf, plan, *aid, value);
+    }
+    nis
+}
+
+fn use_aid(ekf: &mut Ekf, plan: &Plan<'_>, aid: Aid, value: &Vec3) {
+    let aiding = plan.experiment.aiding;
+    let variance = aiding.sigmas(aid)[0].powi(2);
+    if aid == Aid::Heading {
+        let _ = update_yaw(ekf, &value[0], variance);
+        return;
+    }
+    let lever_arm_b = aiding.lever_arm_b(aid);
+    let velocity = BodyVelocity {
+        value: *value,
+        axes: aid.axes(),
+        variance,
+        lever_arm_b,
+        vehicle_b: DVec3::AXES,
+    };
+    let _ = update_body_velocity(ekf, &velocity);
+}
+
 /// One filter on eight runs, and what is kept of it.
-struct Candidate {
+struct Candidate<'a> {
     ekf: Ekf,
+    /// Before the measurements of each event, where runs share them.
+    covariances: Option<&'a Covariances>,
     live: usize,
     trace: Vec<EpochLanes>,
     /// A record for each outage and run.
@@ -70,8 +105,13 @@ struct Candidate {
     nis: (Lanes, u64),
 }
 
-impl Candidate {
-    fn new(plan: &Plan<'_>, belief: &crate::ekf::Belief, starts: &[NavState], live: usize) -> Self {
+impl<'a> Candidate<'a> {
+    fn new(
+        plan: &Plan<'_>,
+        (belief, covariances): BatchFilter<'a>,
+        starts: &[NavState],
+        live: usize,
+    ) -> Self {
         let mut nominal = Strapdown::new(&plan.start, plan.experiment.gravity);
         for (lane, start) in starts.iter().enumerate() {
             nominal.set_lane(lane, start);
@@ -82,9 +122,12 @@ impl Candidate {
                 ..Default::default()
             })
         };
+        let mut ekf = Ekf::new(nominal, belief, &plan.start, plan.experiment.initial)
+            .with_update(plan.experiment.update);
+        ekf.covariance_is_given = covariances.is_some();
         Self {
-            ekf: Ekf::new(nominal, belief, &plan.start, plan.experiment.initial)
-                .with_update(plan.experiment.update),
+            ekf,
+            covariances,
             live,
             trace: Vec::with_capacity(plan.events.len()),
             outages: plan.experiment.outages.iter().map(|_| outage()).collect(),
@@ -94,17 +137,14 @@ impl Candidate {
 
     /// Outage ends, the fix if one is used, the report if one is due.
     fn at_event(&mut self, plan: &Plan<'_>, index: usize, event: &Event, measured: &Measured) {
+        if let Some(covariances) = self.covariances {
+            self.ekf.p.set_shared(&covariances[index]);
+        }
         // Before the fix of the same instant: the end of an outage is where the error is largest.
         self.end_outages(plan, index, event);
-        if let Some(fix) = &measured.fix {
-            self.nis.0 += update(&mut self.ekf, fix);
+        if let Some(nis) = measure(&mut self.ekf, plan, measured) {
+            self.nis.0 += nis;
             self.nis.1 += 1;
-        }
-        if let (Some(h), Some(baro)) = (&measured.height, plan.experiment.baro) {
-            let _ = update_height(&mut self.ekf, h, baro.sigma_m);
-        }
-        for (aid, value) in &measured.aids {
-            self.use_aid(plan, *aid, value);
         }
         if event.report {
             settle(&mut self.ekf);
@@ -112,24 +152,6 @@ impl Candidate {
             self.follow_outages(plan, event, &epoch);
             self.trace.push(epoch);
         }
-    }
-
-    fn use_aid(&mut self, plan: &Plan<'_>, aid: Aid, value: &Vec3) {
-        let aiding = plan.experiment.aiding;
-        let variance = aiding.sigmas(aid)[0].powi(2);
-        if aid == Aid::Heading {
-            let _ = update_yaw(&mut self.ekf, &value[0], variance);
-            return;
-        }
-        let lever_arm_b = aiding.lever_arm_b(aid);
-        let velocity = BodyVelocity {
-            value: *value,
-            axes: aid.axes(),
-            variance,
-            lever_arm_b,
-            vehicle_b: DVec3::AXES,
-        };
-        let _ = update_body_velocity(&mut self.ekf, &velocity);
     }
 
     /// Error and belief just before the first fix after an outage, or at the trajectory's end.
@@ -215,6 +237,10 @@ impl Candidate {
         Batch {
             epochs,
             runs: (0..self.live).map(record).collect(),
+            gains: GainsUsed {
+                is_shared: self.covariances.is_some(),
+                largest_difference: None,
+            },
         }
     }
 }

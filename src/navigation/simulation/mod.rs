@@ -1,12 +1,14 @@
 //! One lane batch: eight runs through one trajectory.
 
 mod batch;
+mod gains;
 pub mod lincov;
 mod plan;
 mod source;
 
+pub use batch::Batch;
 pub(crate) use batch::reported_error;
-pub use batch::{Batch, run_batch};
+pub use gains::{Gains, GainsUsed, run_batch};
 pub(crate) use plan::samples_per;
 pub use plan::{Experiment, ExperimentError, Plan};
 pub use source::{Recording, record};
@@ -142,4 +144,7 @@ pub struct RunResult {
     /// How many windows of the recordings that made the errors do not overlap: more runs than these share
     /// their noise. None: every run has noise of its own.
     pub independent_windows: Option<f64>,
+    /// The gains of the filter.
+    #[serde(default)]
+    pub gains: GainsUsed,
 }

@@ -1,5 +1,6 @@
 //! What all runs of an experiment share, computed once: ideal samples, reference, schedule.
 
+use super::gains::{Decision, Gains};
 use crate::earth::{GravityModel, MAX_LATITUDE};
 use crate::ekf::{Belief, FixUpdate, InitialSettings};
 use crate::frames::NavState;
@@ -16,6 +17,7 @@ use crate::trajectory::Trajectory;
 use crate::units::{DEG, Refused};
 use glam::DVec3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::sync::OnceLock;
 
 /// One experiment: a trajectory, what makes the errors, what filters believe, what is measured when.
 #[derive(Debug, Clone)]
@@ -42,6 +44,8 @@ pub struct Experiment<'a> {
     pub aiding: &'a AidingSettings,
     /// How the filters use a fix.
     pub update: FixUpdate,
+    /// Where runs take their gains from.
+    pub gains: Gains,
     /// When fixes are missing.
     pub outages: &'a [Outage],
     /// Seed of all random numbers.
@@ -114,6 +118,7 @@ pub struct Plan<'a> {
     pub(super) outages: Vec<(f64, usize)>,
     /// Quantile of the coverage statistic.
     pub(super) coverage_quantile: f64,
+    decision: OnceLock<Decision>,
 }
 
 impl<'a> Plan<'a> {
@@ -167,7 +172,13 @@ impl<'a> Plan<'a> {
             events,
             outages,
             coverage_quantile: experiment.coverage_quantile(),
+            decision: OnceLock::new(),
         })
+    }
+
+    /// The gains of the candidates, decided when a run first needs them.
+    pub(super) fn decision(&self) -> &Decision {
+        self.decision.get_or_init(|| Decision::new(self))
     }
 
     /// What the IMU feels over a sample, as it is in its middle.

@@ -27,6 +27,40 @@ pub(super) struct Measured {
     pub aids: Vec<(Aid, Vec3)>,
 }
 
+impl Measured {
+    /// The measurements of an instant without error.
+    pub(super) fn exact(plan: &Plan<'_>, event: &Event) -> Self {
+        let aids = event.aids.iter().filter(|aided| !aided.withheld);
+        Self {
+            fix: event.fix.then(|| exact_fix(plan, event)),
+            height: event.baro.then(|| Lanes::splat(event.reference.h)),
+            aids: aids
+                .map(|aided| (aided.aid, exact_aid(event, aided)))
+                .collect(),
+        }
+    }
+}
+
+fn exact_fix(plan: &Plan<'_>, event: &Event) -> Fix {
+    let (gnss, (antenna, velocity)) = (plan.experiment.gnss, event.antenna);
+    Fix {
+        lat: Lanes::splat(antenna[0]),
+        lon: Lanes::splat(antenna[1]),
+        h: Lanes::splat(antenna[2]),
+        v_n: gnss.vel_sigma_m_s.map(|_| Vec3::splat(velocity)),
+        pos_sigma_m: gnss.pos_sigma_m.into(),
+        vel_sigma_m_s: gnss.vel_sigma_m_s.unwrap_or_default().into(),
+        lever_arm_b: gnss.lever_arm_m.into(),
+    }
+}
+
+fn exact_aid(event: &Event, aided: &Aided) -> Vec3 {
+    Vec3::splat(match aided.aid {
+        Aid::Heading => DVec3::X * RollPitchYaw::from_quat(event.reference.q_b_n).yaw,
+        _ => aided.v_b,
+    })
+}
+
 /// Everything random of eight runs.
 pub(super) struct Source<'a> {
     /// Rate of the IMU (Hz).
@@ -104,8 +138,19 @@ impl<'a> Source<'a> {
         block
     }
 
+    /// The measurements of this epoch. Fixes are drawn within outages too, so that an outage changes no random number
+    /// after it.
+    pub(super) fn measured(&mut self, plan: &Plan<'_>, event: &Event) -> Measured {
+        let fix = event.gnss_epoch.then(|| self.fix(plan, event));
+        Measured {
+            fix: fix.filter(|_| event.fix),
+            height: self.height(plan, event),
+            aids: self.aids(event),
+        }
+    }
+
     /// The heights of this epoch, if the barometer has one.
-    pub(super) fn height(&mut self, plan: &Plan<'_>, event: &Event) -> Option<Lanes> {
+    fn height(&mut self, plan: &Plan<'_>, event: &Event) -> Option<Lanes> {
         let baro = plan.experiment.baro.filter(|_| event.baro)?;
         let mut h = Lanes::splat(event.reference.h);
         for (lane, stream) in self.baro.iter_mut().enumerate() {
@@ -115,18 +160,12 @@ impl<'a> Source<'a> {
     }
 
     /// What the vehicle measures of itself at this epoch.
-    pub(super) fn aids(&mut self, event: &Event) -> Vec<(Aid, Vec3)> {
+    fn aids(&mut self, event: &Event) -> Vec<(Aid, Vec3)> {
         let after_s = event.sample as f64 / self.rate_hz;
-        let yaw = || RollPitchYaw::from_quat(event.reference.q_b_n).yaw;
         let mut measure = |aided: &Aided| {
             let is_heading = aided.aid == Aid::Heading;
-            let exact = if is_heading {
-                DVec3::X * yaw()
-            } else {
-                aided.v_b
-            };
             let axes = if is_heading { &[0] } else { aided.aid.axes() };
-            let mut value: Vec3 = Vec3::splat(exact);
+            let mut value = exact_aid(event, aided);
             for (lane, noise) in self.aiding.iter_mut().enumerate() {
                 for &axis in axes {
                     value[axis][lane] += noise.draw(aided.aid, axis, after_s, aided.v_b, aided.a_b);
@@ -139,17 +178,9 @@ impl<'a> Source<'a> {
     }
 
     /// The fixes of this epoch.
-    pub(super) fn fix(&mut self, plan: &Plan<'_>, event: &Event) -> Fix {
-        let (gnss, (antenna, velocity)) = (plan.experiment.gnss, event.antenna);
-        let mut fix = Fix {
-            lat: Lanes::splat(antenna[0]),
-            lon: Lanes::splat(antenna[1]),
-            h: Lanes::splat(antenna[2]),
-            v_n: gnss.vel_sigma_m_s.map(|_| Vec3::splat(velocity)),
-            pos_sigma_m: gnss.pos_sigma_m.into(),
-            vel_sigma_m_s: gnss.vel_sigma_m_s.unwrap_or_default().into(),
-            lever_arm_b: gnss.lever_arm_m.into(),
-        };
+    fn fix(&mut self, plan: &Plan<'_>, event: &Event) -> Fix {
+        let (antenna, velocity) = event.antenna;
+        let mut fix = exact_fix(plan, event);
         for (lane, noise) in self.gnss.iter_mut().enumerate() {
             let (position, speed) = noise.draw();
             [fix.lat[lane], fix.lon[lane], fix.h[lane]] = moved(antenna, position);

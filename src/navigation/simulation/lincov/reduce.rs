@@ -21,7 +21,7 @@ use crate::sensors::gnss::GnssSettings;
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
 use crate::simulation::plan::Experiment;
-use crate::simulation::{NEES_DOF, REPORTED};
+use crate::simulation::{Gains, NEES_DOF, REPORTED};
 use crate::trajectory::Trajectory;
 use crate::trajectory::profile::{
     Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
@@ -342,6 +342,7 @@ pub fn drive(
         baro: None,
         aiding: &AidingSettings::default(),
         update: FixUpdate::default(),
+        gains: Gains::default(),
         outages: &outages,
         seed: 0,
         coverage_level: 0.95,

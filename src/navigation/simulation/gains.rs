@@ -1,0 +1,187 @@
+//! One covariance for all runs of a filter.
+//!
+//! The gains of a filter depend on its own estimate only through the point about which it linearises. The covariance
+//! along the reference therefore serves every run, and runs need strapdown and corrections alone. That holds while
+//! errors are small: runs are made both ways in the first batch and in one of [`CHECKED`], and compared.
+
+use super::EpochSums;
+use super::batch::{Batch, BatchFilter, measure, run_candidates};
+use super::plan::{Event, Plan};
+use super::source::Measured;
+use crate::ekf::covariance::SharedCovariance;
+use crate::ekf::{Belief, Ekf, FixUpdate, advance, settle};
+use crate::lanes::{LANES, Vec3};
+use crate::strapdown::Strapdown;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Covariance from which the runs of a filter take their gains.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Gains {
+    /// Shared where its standard deviations agree within 2 % with those of runs 0 to 7, else their own.
+    #[default]
+    Auto,
+    /// Of each run, about its own estimate.
+    Own,
+    /// Along the reference, the same for all runs.
+    Shared,
+}
+
+nav_sim_signal::named!(Gains { Auto = "auto", Own = "own", Shared = "shared" });
+
+/// The gains that runs had.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct GainsUsed {
+    /// Whether they shared those along the reference.
+    pub is_shared: bool,
+    /// Largest relative difference between the standard deviations of shared and own gains, in the mean of eight runs,
+    /// wherever runs were made both ways.
+    pub largest_difference: Option<f64>,
+}
+
+impl GainsUsed {
+    /// Adds the comparison of further runs.
+    pub(crate) fn add(&mut self, further: Self) {
+        let differences = [self.largest_difference, further.largest_difference];
+        self.largest_difference = differences.into_iter().flatten().reduce(f64::max);
+    }
+
+    /// Whether runs made both ways later differ by more than the mean of eight runs does by chance.
+    pub fn disagree(&self) -> bool {
+        self.is_shared
+            && self
+                .largest_difference
+                .is_some_and(|found| found > 3.0 * AGREEMENT)
+    }
+}
+
+/// Standard deviations may differ by this share: as much as 1000 runs know of an RMSE.
+const AGREEMENT: f64 = 0.02;
+/// One batch in so many is made both ways.
+const CHECKED: u64 = 64;
+
+/// Covariances of a filter along the reference, before the measurements of each event.
+pub(super) type Covariances = Vec<SharedCovariance>;
+
+/// The gains of all candidates, decided once a plan.
+#[derive(Debug)]
+pub(super) struct Decision {
+    /// For each candidate its covariances, or none where runs have their own.
+    shared: Vec<Option<Covariances>>,
+    /// Runs 0 to 7, where they were made to decide it.
+    first: Option<Vec<Batch>>,
+}
+
+impl Decision {
+    pub(super) fn new(plan: &Plan<'_>) -> Self {
+        let (beliefs, gains) = (plan.experiment.beliefs, plan.experiment.gains);
+        if gains == Gains::Own || plan.experiment.update == FixUpdate::Iterated {
+            let shared = beliefs.iter().map(|_| None).collect();
+            return Self {
+                shared,
+                first: None,
+            };
+        }
+        let along = |belief| Some(along_reference(plan, belief));
+        let mut shared: Vec<_> = beliefs.iter().map(along).collect();
+        if gains == Gains::Shared {
+            return Self {
+                shared,
+                first: None,
+            };
+        }
+        let mut first = Vec::new();
+        for (i, (batch, own)) in both_ways(plan, 0, LANES, &shared).into_iter().enumerate() {
+            let difference = batch.gains.largest_difference;
+            match own.filter(|_| difference.is_some_and(|found| found > AGREEMENT)) {
+                Some(mut own) => {
+                    shared[i] = None;
+                    own.gains.largest_difference = difference;
+                    first.push(own);
+                }
+                None => first.push(batch),
+            }
+        }
+        let first = Some(first);
+        Self { shared, first }
+    }
+}
+
+/// Runs `first..first + live` (at most [`LANES`]) through all candidates: the noise is drawn once.
+pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
+    let decision = plan.decision();
+    let is_whole = live == LANES;
+    let Some(decided) = decision.first.as_ref().filter(|_| is_whole) else {
+        return run_candidates(plan, first, live, &filters(plan, &decision.shared));
+    };
+    if first == 0 {
+        return decided.clone();
+    }
+    if (first / LANES as u64).is_multiple_of(CHECKED) {
+        let both = both_ways(plan, first, live, &decision.shared).into_iter();
+        return both.map(|(batch, _)| batch).collect();
+    }
+    run_candidates(plan, first, live, &filters(plan, &decision.shared))
+}
+
+fn filters<'a>(plan: &'a Plan<'_>, shared: &'a [Option<Covariances>]) -> Vec<BatchFilter<'a>> {
+    let shared = shared.iter().map(Option::as_ref);
+    plan.experiment.beliefs.iter().zip(shared).collect()
+}
+
+/// A batch with the gains given, and for each candidate that shares them the same with its own.
+fn both_ways(
+    plan: &Plan<'_>,
+    first: u64,
+    live: usize,
+    shared: &[Option<Covariances>],
+) -> Vec<(Batch, Option<Batch>)> {
+    let mut candidates = filters(plan, shared);
+    let sharing = candidates
+        .clone()
+        .into_iter()
+        .filter(|(_, covariances)| covariances.is_some());
+    candidates.extend(sharing.map(|(belief, _)| (belief, None)));
+    let mut batches = run_candidates(plan, first, live, &candidates);
+    let mut owns = batches.split_off(shared.len()).into_iter();
+    let compared = |(mut batch, shared): (Batch, &Option<Covariances>)| {
+        let own = shared.as_ref().and_then(|_| owns.next());
+        batch.gains.largest_difference = own.as_ref().map(|own| largest_difference(&batch, own));
+        (batch, own)
+    };
+    batches.into_iter().zip(shared).map(compared).collect()
+}
+
+/// Largest relative difference of the mean standard deviations of two batches; infinite where a run diverged.
+fn largest_difference(shared: &Batch, own: &Batch) -> f64 {
+    let mut runs = shared.runs.iter().chain(&own.runs);
+    if runs.any(|run| run.diverged) {
+        return f64::INFINITY;
+    }
+    let of_epoch = |(a, b): (&EpochSums, &EpochSums)| {
+        let states = a.see.iter().zip(&b.see);
+        let all = states.chain(a.bias_see.iter().zip(&b.bias_see));
+        all.map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max)
+    };
+    let epochs = shared.epochs.iter().zip(&own.epochs);
+    epochs.map(of_epoch).fold(0.0, f64::max)
+}
+
+/// The covariance of a filter whose errors are zero, as are those of its measurements.
+fn along_reference(plan: &Plan<'_>, belief: &Belief) -> Covariances {
+    let nominal = Strapdown::new(&plan.start, plan.experiment.gravity);
+    let mut ekf = Ekf::new(nominal, belief, &plan.start, plan.experiment.initial);
+    let (mut done, mut none) = (0, Vec::new());
+    let at = |event: &Event| {
+        let samples = &plan.ideal[done..event.sample];
+        none.resize(samples.len(), [Vec3::ZERO; 2]);
+        advance(&mut ekf, samples, &none);
+        done = event.sample;
+        settle(&mut ekf);
+        let covariance = ekf.p.shared();
+        let _ = measure(&mut ekf, plan, &Measured::exact(plan, event));
+        covariance
+    };
+    plan.events.iter().map(at).collect()
+}
