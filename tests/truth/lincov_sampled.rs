@@ -16,6 +16,7 @@ use nav_sim::navigation::trajectory::profile::{
 use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::earth::gravity_down;
 use nav_sim_navigation::metrics::Budget;
+use nav_sim_navigation::simulation::Gains;
 use nav_sim_navigation::simulation::lincov::{FilterPass, TruthSide};
 
 const RATE_HZ: f64 = 100.0;
@@ -101,19 +102,22 @@ fn assert_agree(name: &str, scenario: &str, truth: &Model) {
     let (path, believed, outages) = (drive(), model(1.0), [OUTAGE]);
     let track = scenario.track(&path, &believed, &outages).unwrap();
     let beliefs = [scenario.belief(&believed, &outages, &track).unwrap()];
-    let experiment = scenario.experiment(&path, Truth::Model(truth), &beliefs, &outages, 11);
-    let sampled = &monte_carlo::run(&experiment, RUNS, &|_| {}).unwrap()[0];
+    let mut experiment = scenario.experiment(&path, Truth::Model(truth), &beliefs, &outages, 11);
     let expected = Expected::along(&track, &experiment, &beliefs[0], truth).unwrap();
-    assert_epochs_agree(name, sampled, &expected);
-    assert_outage_agrees(name, sampled, &expected);
-    let nis = Estimate::mean_of(sampled.runs.iter().map(|r| r.nis.0), None);
-    let z = (nis.value - expected.record.nis.0) / nis.std_error;
-    assert!(
-        z.abs() < BOUND,
-        "{name}: NIS {} {}",
-        nis.value,
-        expected.record.nis.0
-    );
+    for gains in [Gains::Own, Gains::Auto] {
+        experiment.gains = gains;
+        let sampled = &monte_carlo::run(&experiment, RUNS, &|_| {}).unwrap()[0];
+        assert_epochs_agree(name, sampled, &expected);
+        assert_outage_agrees(name, sampled, &expected);
+        let nis = Estimate::mean_of(sampled.runs.iter().map(|r| r.nis.0), None);
+        let z = (nis.value - expected.record.nis.0) / nis.std_error;
+        assert!(
+            z.abs() < BOUND,
+            "{name}: NIS {} {}",
+            nis.value,
+            expected.record.nis.0
+        );
+    }
 }
 
 /// Every ten seconds: ASEE within half a percent, RMSE and bias within their standard errors, NEES and coverage.

@@ -527,7 +527,7 @@ fn shared_gains_leave_errors_as_they_are() {
     setting.gains = Gains::Auto;
     let shared = setting.run(64).swap_remove(0);
     assert!(shared.gains.is_shared && !own.gains.is_shared);
-    assert!(shared.gains.largest_difference.unwrap() <= 0.02);
+    assert!(shared.gains.largest_difference.unwrap() <= 0.03);
     let rmse = |result: &RunResult, i: usize| {
         let squares = result
             .runs
@@ -552,6 +552,6 @@ fn gains_are_not_shared_where_errors_are_large() {
     setting.gains = Gains::Own;
     let own = setting.run(16).swap_remove(0);
     assert!(!auto.gains.is_shared);
-    assert!(auto.gains.largest_difference.unwrap() > 0.02);
+    assert!(auto.gains.largest_difference.unwrap() > 0.03);
     assert!(bits(&auto.epochs) == bits(&own.epochs) && bits(&auto.runs) == bits(&own.runs));
 }
