@@ -513,6 +513,7 @@ pub struct Tuning {
     efficiency: f64,
     c: f64,
     a: f64,
+    bias: f64,
     quantization: QuantizationResponse,
 }
 
@@ -557,6 +558,7 @@ impl Tuning {
             efficiency: moments.efficiency(),
             c: high,
             a,
+            bias: moments.bias(),
             quantization: QuantizationResponse::new(high, a),
         })
     }
@@ -575,8 +577,8 @@ impl Tuning {
     /// high): 0.295 at efficiency 0.6, 0 for the classical variance. To second order in the estimating
     /// equation it is 1 + 2 cov(chi, chi')/var chi − E chi''/E chi', derivatives with respect to ln s of
     /// chi(W/√s).
-    pub fn bias(&self) -> f64 {
-        Moments::new(self.c).bias()
+    pub const fn bias(&self) -> f64 {
+        self.bias
     }
 
     /// Response of the robust wavelet variance to quantization noise.
