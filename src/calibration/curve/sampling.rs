@@ -12,6 +12,7 @@ use crate::noise::{Composite, Kind, Process};
 use crate::rng::Generator;
 use crate::wavelet::interval::edof_robust;
 use crate::wavelet::{Curve, QuantizationResponse, Tuning};
+use multiversion::multiversion;
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -250,13 +251,41 @@ fn factor(correlation: &DMatrix<f64>) -> DMatrix<f64> {
         .map_or_else(|| DMatrix::identity(n, n), |c| c.l())
 }
 
+/// Frequencies that advance together.
+const WIDTH: usize = 8;
+
+/// Adds the products of the gains of all levels at some frequencies, of which sin²(πf) and the density are given.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn add_products(
+    lanes: &mut [[f64; WIDTH]],
+    gains: &mut [[f64; WIDTH]],
+    base: [f64; WIDTH],
+    density: [f64; WIDTH],
+) {
+    let (levels, mut sin2, mut m) = (gains.len(), base, 1.0);
+    for gain in gains.iter_mut() {
+        for lane in 0..WIDTH {
+            let s = sin2[lane];
+            // sin2 is sin²(πfm) here, base sin²(πf). Midpoints leave out f = 0, where a random walk has no
+            // density.
+            gain[lane] = density[lane] * s * s / (m * m * base[lane]);
+            sin2[lane] = 4.0 * s * (1.0 - s);
+        }
+        m *= 2.0;
+    }
+    for j in 0..levels {
+        let own = gains[j];
+        for (sum, gain) in lanes[j * levels..][j..levels].iter_mut().zip(&gains[j..]) {
+            (0..WIDTH).for_each(|lane| sum[lane] += gain[lane] * own[lane]);
+        }
+    }
+}
+
 /// ∫ |H_j|² |H_k|² S² df over −½ … ½, for all pairs of levels (units⁴).
 ///
 /// A sum over 2^(levels + 1) frequencies: exact where the autocovariance of the coefficients of the longest
 /// scale ends within that scale, as it does for WN, QN, MA1 and RW.
 fn products(model: &Composite, levels: usize) -> DMatrix<f64> {
-    /// Frequencies that advance together.
-    const WIDTH: usize = 8;
     let half = 1_usize << levels;
     let mut lanes = vec![[0.0; WIDTH]; levels * levels];
     let mut gains = vec![[0.0; WIDTH]; levels];
@@ -275,23 +304,7 @@ fn products(model: &Composite, levels: usize) -> DMatrix<f64> {
                 0.0
             }
         });
-        let mut sin2 = base;
-        for (i, gain) in gains.iter_mut().enumerate() {
-            let m2 = f64::from(2 * i as u32).exp2();
-            for lane in 0..WIDTH {
-                let s = sin2[lane];
-                // sin2 is sin²(πfm) here, base sin²(πf). Midpoints leave out f = 0, where a random walk has no
-                // density.
-                gain[lane] = density[lane] * s * s / (m2 * base[lane]);
-                sin2[lane] = 4.0 * s * (1.0 - s);
-            }
-        }
-        for j in 0..levels {
-            let own = gains[j];
-            for (sum, gain) in lanes[j * levels..][j..levels].iter_mut().zip(&gains[j..]) {
-                (0..WIDTH).for_each(|lane| sum[lane] += gain[lane] * own[lane]);
-            }
-        }
+        add_products(&mut lanes, &mut gains, base, density);
     }
     let mut sums = DMatrix::from_fn(levels, levels, |i, j| {
         lanes[j * levels + i].iter().sum::<f64>()

@@ -9,7 +9,7 @@
 //! (means of 1000 records; the command is in docs/limits.md).
 
 use super::WaveletError;
-use super::haar::{BLOCK, Compensated, Pyramid, WIDTH, butterflies, pairwise};
+use super::haar::{BLOCK, Compensated, Pyramid, WIDTH, array, butterflies, pairwise};
 use super::interval::edof_eta3;
 use crate::minimise::golden_section;
 use multiversion::multiversion;
@@ -328,71 +328,51 @@ impl Equation<'_> {
     }
 }
 
-/// Σ q(1 − q)₊⁴ with q = k·y over the squares y, and its derivatives with respect to −ln k, Σ q(1 − q)₊³(5q − 1) and
-/// Σ q(1 − q)₊²(25q² − 14q + 1). As k = 1/(c² s), those are the derivatives with respect to ln s.
-struct Biweight {
-    k: f64,
-    lanes: [[f64; WIDTH]; 3],
-    added: usize,
-    sums: [Compensated; 3],
-}
-
-impl Biweight {
+/// Adds Σ q(1 − q)₊⁴ with q = k·y over a block of squares y, and its derivatives with respect to −ln k, Σ q(1 − q)₊³(5q − 1)
+/// and Σ q(1 − q)₊²(25q² − 14q + 1). As k = 1/(c² s), those are the derivatives with respect to ln s.
+#[inline(always)]
+fn add_biweights(sums: &mut [Compensated; 3], block: &[f64], k: f64) {
     #[inline(always)]
-    fn new(k: f64) -> Self {
-        Self {
-            k,
-            lanes: [[0.0; WIDTH]; 3],
-            added: 0,
-            sums: Default::default(),
+    fn terms(q: f64) -> [f64; 3] {
+        // A select, not a branch: rejected coefficients add 0, and the loop stays a vector loop.
+        let z = if q < 1.0 { 1.0 - q } else { 0.0 };
+        let square = q * z * z;
+        let [value, slope] = [z * z, z * (5.0 * q - 1.0)];
+        [value, slope, (25.0 * q - 14.0) * q + 1.0].map(|factor| square * factor)
+    }
+    let [mut values, mut slopes, mut curvatures] = [[0.0; WIDTH]; 3];
+    let chunks = block.chunks_exact(WIDTH);
+    let rest = chunks.remainder();
+    for chunk in chunks {
+        let y: [f64; WIDTH] = array(chunk);
+        for i in 0..WIDTH {
+            let [value, slope, curvature] = terms(k * y[i]);
+            values[i] += value;
+            slopes[i] += slope;
+            curvatures[i] += curvature;
         }
     }
-
-    /// Adds as many squares as there are lanes, or fewer.
-    #[inline(always)]
-    fn add(&mut self, squares: &[f64]) {
-        for (i, y) in squares.iter().enumerate() {
-            let q = self.k * y;
-            // A select, not a branch: rejected coefficients add 0, and the loop stays a vector loop.
-            let z = if q < 1.0 { 1.0 - q } else { 0.0 };
-            let square = q * z * z;
-            self.lanes[0][i] += square * (z * z);
-            self.lanes[1][i] += square * (z * (5.0 * q - 1.0));
-            self.lanes[2][i] += square * ((25.0 * q - 14.0) * q + 1.0);
-        }
-        self.added += 1;
-        if self.added == BLOCK / WIDTH {
-            self.flush();
-        }
+    for (i, y) in rest.iter().enumerate() {
+        let [value, slope, curvature] = terms(k * y);
+        values[i] += value;
+        slopes[i] += slope;
+        curvatures[i] += curvature;
     }
-
-    #[inline(always)]
-    fn flush(&mut self) {
-        for (sum, lanes) in self.sums.iter_mut().zip(&mut self.lanes) {
-            sum.add(pairwise(lanes));
-            *lanes = [0.0; WIDTH];
-        }
-        self.added = 0;
-    }
-
-    #[inline(always)]
-    fn sums(mut self) -> [f64; 3] {
-        self.flush();
-        self.sums.map(|sum| sum.value())
+    for (sum, lanes) in sums.iter_mut().zip([values, slopes, curvatures]) {
+        sum.add(pairwise(&lanes));
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn biweight_sums(squares: &[f64], k: f64) -> [f64; 3] {
-    let mut biweight = Biweight::new(k);
-    let chunks = squares.chunks_exact(WIDTH);
-    let rest = chunks.remainder();
-    chunks.for_each(|chunk| biweight.add(chunk));
-    biweight.add(rest);
-    biweight.sums()
+    let mut sums: [Compensated; 3] = Default::default();
+    for block in squares.chunks(BLOCK) {
+        add_biweights(&mut sums, block, k);
+    }
+    sums.map(|sum| sum.value())
 }
 
-/// A step of the pyramid, its squares, and their sums.
+/// A step of the pyramid, its squares, and their sums while a block of them is in the cache.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn step_measuring(
     sums: &mut [f64],
@@ -401,13 +381,19 @@ fn step_measuring(
     k: f64,
     of_squares: &mut [f64; 3],
 ) -> f64 {
-    let mut biweight = Biweight::new(k);
-    let total = butterflies(sums, half, |t, values| {
-        squares[t..t + values.len()].copy_from_slice(values);
-        biweight.add(values);
-    });
-    *of_squares = biweight.sums();
-    total
+    let mut total = Compensated::default();
+    let mut biweights: [Compensated; 3] = Default::default();
+    let mut from = 0;
+    for block in squares.chunks_mut(BLOCK) {
+        let own = &mut sums[from..from + block.len() + half];
+        total.add(butterflies(own, half, |t, values| {
+            block[t..t + values.len()].copy_from_slice(values)
+        }));
+        add_biweights(&mut biweights, block, k);
+        from += block.len();
+    }
+    *of_squares = biweights.map(|sum| sum.value());
+    total.value()
 }
 
 /// (median |W|/0.6745)².
