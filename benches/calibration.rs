@@ -4,11 +4,14 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 
-use nav_sim::calibration::{ModelSpec, Weighting, fit};
+use nav_sim::calibration::{
+    Bootstrap, Group, ModelSpec, Replicate, Scope, Settings, Weighting, calibrate, fit, infer,
+};
+use nav_sim::signal::imu::Sensor;
 use nav_sim::signal::noise::Process;
 use nav_sim::signal::rng::StreamKey;
 use nav_sim::signal::wavelet;
-use nav_sim::signal::wavelet::{Curve, Tuning};
+use nav_sim::signal::wavelet::{Curve, RobustVariance, Status, Tuning};
 use nav_sim_signal::wavelet::interval;
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -73,6 +76,18 @@ fn wavelet_variance(c: &mut Criterion) {
     group.finish();
 }
 
+/// A day at 200 Hz: longer than any cache.
+fn a_day(c: &mut Criterion) {
+    let signal: Vec<f64> = signal().into_iter().cycle().take(17_280_000).collect();
+    let tuning = Tuning::new(0.6).unwrap();
+    let mut group = c.benchmark_group("wavelet variance, 17280000 samples, 23 scales");
+    group.sample_size(10);
+    group.bench_function("classical and robust", |b| {
+        b.iter(|| wavelet::both(black_box(&signal), 23, &tuning));
+    });
+    group.finish();
+}
+
 /// The N2 curve of a consumer accelerometer, its wavelet variances off by a few of their standard deviations.
 fn noisy_curve() -> Curve {
     let levels: Vec<u32> = (1..=LEVELS).collect();
@@ -113,5 +128,50 @@ fn fits(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, wavelet_variance, fits);
+/// Intervals of N2 from 99 draws of three replicates.
+fn bootstrap(c: &mut Criterion) {
+    let curve = noisy_curve();
+    let replicate = |k: i32| {
+        let noisy = curve.wv.iter().zip(&curve.edof).enumerate();
+        let noisy = noisy.map(|(j, (nu, edof))| {
+            let phase = f64::from(k) + 1.7 * j as f64;
+            nu * (1.0 + phase.sin() * (2.0 / edof).sqrt().min(0.5))
+        });
+        let classical: Vec<f64> = noisy.collect();
+        let robust = |nu: &f64| RobustVariance {
+            value: *nu,
+            status: Status::Ok,
+            zeros: 0.0,
+        };
+        Replicate {
+            name: k.to_string(),
+            axis: None,
+            samples: SAMPLES,
+            robust: classical.iter().map(robust).collect(),
+            classical,
+            coverage: Vec::new(),
+            trend: f64::NAN,
+            mean: f64::NAN,
+        }
+    };
+    let scope = Scope {
+        sensor: Sensor::Accel,
+        axis: None,
+    };
+    let replicates = (0..3).map(replicate).collect();
+    let groups = [Group { scope, replicates }];
+    let settings = Settings::default();
+    let outcomes = calibrate(&groups, &settings).unwrap();
+    let bootstrap = Bootstrap { draws: 99, seed: 1 };
+    let mut group = c.benchmark_group("bootstrap");
+    group
+        .sample_size(10)
+        .measurement_time(Duration::from_secs(5));
+    group.bench_function("N2, 99 draws", |b| {
+        b.iter(|| infer(&groups, &mut outcomes.clone(), &settings, bootstrap));
+    });
+    group.finish();
+}
+
+criterion_group!(benches, wavelet_variance, a_day, fits, bootstrap);
 criterion_main!(benches);

@@ -4,7 +4,7 @@ use crate::curve::{CalibrationError, Estimator, Pool, Scope, Trim, implied};
 use crate::fit::{Fit, Weighting, avlr, refit, score};
 use crate::imu::Axis;
 use crate::model::{ModelSpec, SpecError};
-use crate::noise::practical::AxisParameters;
+use crate::noise::practical::{Minimum, Pair};
 use crate::noise::{Composite, Model, ParameterRef};
 use crate::wavelet::{Curve, Tuning};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -270,8 +270,10 @@ pub struct Inference {
 /// Practitioners' parameters of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Practical {
-    /// N, K, B and T, of the policy "matched" over the default horizon.
-    pub parameters: AxisParameters,
+    /// N and K, of the policy "matched" over the default horizon.
+    pub walk: Pair,
+    /// B.
+    pub minimum: Option<Minimum>,
     /// 95 % intervals of N, K and B.
     pub intervals: PracticalIntervals,
     /// Longest averaging time that was observed (s): how far a minimum was looked for.
@@ -290,8 +292,7 @@ impl Practical {
     /// octave of these: where they do not, K is what the pair says of times that nobody saw, or that were seen to be otherwise.
     pub fn walk_is_observed(&self) -> bool {
         let lasts = |from: f64| self.walk_until_s.is_none_or(|until| until >= 2.0 * from);
-        self.parameters
-            .walk
+        self.walk
             .crossover_s()
             .is_some_and(|from| from <= self.range_s && lasts(from))
     }

@@ -6,6 +6,7 @@
 //! axis are those that its step explains. [`LEVEL`] bounds the false alarms of each fact and recording.
 
 use crate::imu::{Recording, Sensor};
+use std::borrow::Cow;
 use std::collections::HashSet;
 use std::f64::consts::SQRT_2;
 use std::ops::Range;
@@ -31,9 +32,26 @@ fn is_beyond(count: usize, trials: usize, p: f64) -> bool {
     q > p && n * (term(q, p) + term(1.0 - q, 1.0 - p)) > -LEVEL.ln()
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+/// The middle of some numbers, the upper one of an even number. They are counted by their first bits and only those about the
+/// middle are held: a copy of the column of a day costs more than a second pass.
+fn median(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    // sign, exponent and three bits of the mantissa, in the order of the numbers
+    let bin = |x: f64| {
+        let bits = x.to_bits();
+        let order = bits ^ ((bits.cast_signed() >> 63).cast_unsigned() | 1 << 63);
+        (order >> 49) as usize
+    };
+    let mut counts = vec![0_usize; 1 << 15];
+    values.clone().for_each(|x| counts[bin(x)] += 1);
+    let mut place = counts.iter().sum::<usize>() / 2;
+    let mut of_middle = 0;
+    while place >= counts[of_middle] {
+        place -= counts[of_middle];
+        of_middle += 1;
+    }
+    let mut near: Vec<f64> = Vec::with_capacity(counts[of_middle]);
+    near.extend(values.filter(|x| bin(*x) == of_middle));
+    *near.select_nth_unstable_by(place, f64::total_cmp).1
 }
 
 /// Step of a quantiser, and the median change from one sample to the next in such steps.
@@ -45,14 +63,31 @@ pub struct Grain {
     pub changes: f64,
 }
 
+/// Changes of a column that are not zero.
+fn changes(axis: &[f64]) -> impl Iterator<Item = f64> + Clone {
+    let changes = axis.windows(2).map(|x| (x[1] - x[0]).abs());
+    changes.filter(|change| *change > 0.0)
+}
+
+/// Smallest change of a column; none of a constant one.
+fn step(axis: &[f64]) -> Option<f64> {
+    changes(axis).reduce(f64::min)
+}
+
 /// The grain of a column; none of a constant one.
 #[must_use]
 pub fn grain(axis: &[f64]) -> Option<Grain> {
-    let changes = axis.windows(2).map(|x| (x[1] - x[0]).abs());
-    let changes: Vec<f64> = changes.filter(|change| *change > 0.0).collect();
-    let step = changes.iter().copied().reduce(f64::min)?;
-    let changes = median(changes) / step;
+    let step = step(axis)?;
+    let changes = median(changes(axis)) / step;
     Some(Grain { step, changes })
+}
+
+/// The values that are there.
+fn present(axis: &[f64]) -> Cow<'_, [f64]> {
+    match axis.iter().any(|x| x.is_nan()) {
+        true => axis.iter().copied().filter(|x| !x.is_nan()).collect(),
+        false => Cow::from(axis),
+    }
 }
 
 /// Chance that all axes have the value of the row before. An axis explains its own share of such rows, but no more than its
@@ -109,7 +144,7 @@ pub fn zero_rows(columns: &[&[f64]], accel: &[&[f64]]) -> Vec<usize> {
             .filter(|x| **x != 0.0)
             .map(|x| (x - mean).powi(2));
         let spread = (spread.sum::<f64>() / (rows - zero.len()).max(1) as f64).sqrt();
-        let step = grain(axis).map_or(f64::INFINITY, |grain| grain.step);
+        let step = step(axis).unwrap_or(f64::INFINITY);
         mean.abs() > (10.0 * step).max(6.0 * spread)
     };
     let is_lost = !zero.is_empty() && accel.iter().any(has_gravity);
@@ -120,11 +155,13 @@ pub fn zero_rows(columns: &[&[f64]], accel: &[&[f64]]) -> Vec<usize> {
 /// the density at zero is at most that within the median of |x|, times two for its mode.
 #[must_use]
 pub fn zeros(axis: &[f64]) -> Option<f64> {
-    let other: Vec<f64> = axis.iter().map(|x| x.abs()).filter(|x| *x > 0.0).collect();
     let zeros = axis.iter().filter(|x| **x == 0.0).count();
-    let there = zeros + other.len();
-    let grain = grain(axis)?;
-    let width = median(other) / grain.step;
+    if zeros == 0 {
+        return None;
+    }
+    let other = axis.iter().map(|x| x.abs()).filter(|x| *x > 0.0);
+    let there = zeros + other.clone().count();
+    let width = median(other) / step(axis)?;
     let p = 10.0 / width;
     let share = zeros as f64 / there as f64;
     (p < 0.5 && share > p + 0.005 && is_beyond(zeros, there, p)).then_some(share)
@@ -136,15 +173,14 @@ pub fn zeros(axis: &[f64]) -> Option<f64> {
 #[must_use]
 pub fn clipped(axis: &[f64]) -> Option<(f64, f64)> {
     let there = || axis.iter().copied().filter(|x| x.is_finite());
-    let (step, middle) = (grain(axis)?.step, median(there().collect()));
     let ends = [f64::min as fn(f64, f64) -> f64, f64::max];
     ends.into_iter().find_map(|farther| {
         let end = there().reduce(farther)?;
         let inside = there().filter(|x| *x != end).reduce(farther)?;
         let count = |value: f64| there().filter(|x| *x == value).count();
         let (at_end, next) = (count(end), count(inside));
-        let is_tail = (end - middle).abs() >= FINE * step;
-        (is_tail && is_beyond(at_end, at_end + next, 0.75))
+        let is_tail = || Some((end - median(there())).abs() >= FINE * step(axis)?);
+        (is_beyond(at_end, at_end + next, 0.75) && is_tail()?)
             .then(|| (at_end as f64 / there().count() as f64, end))
     })
 }
@@ -161,16 +197,15 @@ pub struct Repeats {
 }
 
 /// First rows and lengths of stretches in which no axis changes.
-fn runs(axes: &[&[f64]]) -> Vec<(usize, usize)> {
+fn runs<'a>(axes: &'a [&'a [f64]]) -> impl Iterator<Item = (usize, usize)> + Clone + 'a {
     let rows = axes.first().map_or(0, |axis| axis.len());
-    let mut runs: Vec<(usize, usize)> = Vec::new();
-    for k in 0..rows {
-        match runs.last_mut() {
-            Some(run) if axes.iter().all(|x| x[k] == x[k - 1]) => run.1 += 1,
-            _ => runs.push((k, 1)),
-        }
-    }
-    runs
+    let begins = move |k: &usize| *k == rows || axes.iter().any(|x| x[*k] != x[k - 1]);
+    let mut from = 0;
+    (1..=rows).filter(begins).map(move |to| {
+        let run = (from, to - from);
+        from = to;
+        run
+    })
 }
 
 /// The repeated rows of a sensor, if there are more than its steps explain. Stretches far longer than the usual one are
@@ -180,14 +215,15 @@ pub fn repeats(axes: &[&[f64]]) -> Option<Repeats> {
     /// Share of repeated rows that changes no figure.
     const LEAST: [f64; 2] = [0.005, 0.05];
     let runs = runs(axes);
-    if runs.is_empty() {
+    runs.clone().next()?;
+    let usual = median(runs.clone().map(|(_, rows)| rows as f64));
+    let longest = 8 * usual as usize + 24;
+    let counted = runs.clone().filter(|(_, rows)| *rows <= longest);
+    let add = |(rows, repeated), (_, own)| (rows + own, repeated + own - 1);
+    let (rows, repeated) = counted.clone().fold((0, 0), add);
+    if repeated == 0 {
         return None;
     }
-    let usual = median(runs.iter().map(|(_, rows)| *rows as f64).collect());
-    let longest = 8 * usual as usize + 24;
-    let counted: Vec<_> = runs.iter().filter(|(_, rows)| *rows <= longest).collect();
-    let rows: usize = counted.iter().map(|(_, rows)| rows).sum();
-    let repeated = rows - counted.len();
     let p = repeated as f64 / rows.max(1) as f64;
     let beyond = |by_chance: f64| (p - by_chance) / (1.0 - by_chance);
     let by_chance = chance(axes, 0.0);
@@ -201,16 +237,14 @@ pub fn repeats(axes: &[&[f64]]) -> Option<Repeats> {
     }
     // a stretch of n rows is of as many samples as have no more rows
     let per_sample = 1.0 / (1.0 - share);
-    let firsts = runs.iter().flat_map(|&(from, rows)| {
+    let firsts = runs.flat_map(|(from, rows)| {
         let samples = ((rows - 1) as f64 / per_sample) as usize + 1;
         (0..samples).map(move |k| from + k * rows / samples)
     });
     let firsts: Vec<usize> = firsts.collect();
     let total = axes[0].len();
     let per_sample = total as f64 / firsts.len() as f64;
-    let repeated = counted
-        .iter()
-        .flat_map(|(from, rows)| from + 1..from + rows);
+    let repeated = counted.flat_map(|(from, rows)| from + 1..from + rows);
     Some(Repeats {
         share,
         rows: repeated.filter(|_| is_rare).collect(),
@@ -228,7 +262,7 @@ fn is_regular(firsts: &[usize], rows: usize) -> bool {
             *count += 1.0;
         }
     }
-    let usual = median(counts.clone());
+    let usual = median(counts.iter().copied());
     let near = counts.iter().filter(|count| (*count - usual).abs() <= 2.0);
     10 * near.count() >= 9 * counts.len()
 }
@@ -237,14 +271,17 @@ fn is_regular(firsts: &[usize], rows: usize) -> bool {
 /// explains.
 #[must_use]
 pub fn frozen(axis: &[f64]) -> Vec<Range<usize>> {
-    let Some(grain) = grain(axis).filter(|grain| grain.changes >= FINE) else {
+    /// Fewest rows.
+    const LEAST: usize = 16;
+    let axes = [axis];
+    let long = |least| runs(&axes).filter(move |(_, rows)| *rows >= least);
+    let grain = long(LEAST).next().and_then(|_| grain(axis));
+    let Some(grain) = grain.filter(|grain| grain.changes >= FINE) else {
         return Vec::new();
     };
     let longest = (axis.len() as f64 / LEVEL).ln() / grain.changes.ln();
-    let least = (3.0 * longest).ceil().max(16.0) as usize;
-    let runs = runs(&[axis]).into_iter();
-    let long = runs.filter(|(_, rows)| *rows >= least);
-    long.map(|(from, rows)| from..from + rows).collect()
+    let least = ((3.0 * longest).ceil() as usize).max(LEAST);
+    long(least).map(|(from, rows)| from..from + rows).collect()
 }
 
 /// Share of samples on the line between their neighbours, where steps do not explain it: samples that were interpolated. Second
@@ -252,31 +289,36 @@ pub fn frozen(axis: &[f64]) -> Vec<Range<usize>> {
 /// and that of the noise.
 #[must_use]
 pub fn interpolated(axis: &[f64]) -> Option<f64> {
-    let step = grain(axis)?.step;
+    let step = step(axis)?;
     let largest = axis.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let rounding = (2.01 * step).max(4.0 * f64::EPSILON * largest);
     let moving = axis.windows(3).filter(|x| x[0] != x[1] && x[1] != x[2]);
     let second = moving.map(|x| (x[2] - 2.0 * x[1] + x[0]).abs());
-    let second: Vec<f64> = second.filter(|d| d.is_finite()).collect();
-    let trials = second.len();
+    let second = second.filter(|d| d.is_finite());
+    let count = |(trials, on_line, near), d| {
+        let (is_on_line, is_near) = (d <= rounding, d > rounding && d <= 8.0 * rounding);
+        (
+            trials + 1,
+            on_line + usize::from(is_on_line),
+            near + usize::from(is_near),
+        )
+    };
+    let (trials, on_line, near) = second.clone().fold((0, 0, 0), count);
     if trials < BLOCK {
         return None;
     }
-    let others: Vec<f64> = second.into_iter().filter(|d| *d > rounding).collect();
-    let near = others.iter().filter(|d| **d <= 8.0 * rounding).count();
-    let on_line = trials - others.len();
     // of the rounded 5 values against 28; twice and more for a peak
     let explained = 0.5 * near as f64 / trials.max(1) as f64;
     let share = on_line as f64 / trials.max(1) as f64;
-    let is_apart = !others.is_empty() && median(others) > 8.0 * rounding;
-    (is_apart && share > 0.1 + explained && is_beyond(on_line, trials, explained)).then_some(share)
+    let is_apart = || on_line < trials && median(second.filter(|d| *d > rounding)) > 8.0 * rounding;
+    (share > 0.1 + explained && is_beyond(on_line, trials, explained) && is_apart())
+        .then_some(share)
 }
 
 /// White noise of a column (units·√s), from the median change of its samples; none where steps hide it.
 #[must_use]
 pub fn white_noise(axis: &[f64], rate_hz: f64) -> Option<f64> {
-    let present: Vec<f64> = axis.iter().copied().filter(|x| !x.is_nan()).collect();
-    let grain = grain(&present).filter(|grain| grain.changes >= FINE)?;
+    let grain = grain(&present(axis)).filter(|grain| grain.changes >= FINE)?;
     Some(grain.changes * grain.step / (NORMAL * SQRT_2 * rate_hz.sqrt()))
 }
 
@@ -317,13 +359,7 @@ pub fn moving(recording: &Recording) -> (usize, usize) {
     let z = (2.0 * (12.0 * seconds as f64 / LEVEL).ln()).sqrt();
     let mut moves = vec![false; seconds];
     for signal in &recording.signals {
-        let present: Vec<f64> = signal
-            .samples
-            .iter()
-            .copied()
-            .filter(|x| !x.is_nan())
-            .collect();
-        let step = grain(&present).map_or(0.0, |grain| grain.step);
+        let step = step(&present(&signal.samples)).unwrap_or(0.0);
         let windows = || signal.samples.chunks_exact(width);
         let means: Vec<f64> = windows()
             .map(|x| x.iter().sum::<f64>() / width as f64)
@@ -344,15 +380,15 @@ pub fn moving(recording: &Recording) -> (usize, usize) {
         if usual.is_empty() || own.is_empty() {
             continue;
         }
-        let level = median(own.clone()).max(step * step);
+        let level = median(own.iter().copied()).max(step * step);
         let levels = own
             .iter()
             .map(|square| (square.max(step * step) / level).ln().abs());
         // the squares of second differences of white noise are of half as many
         let explained = 2.0 * NORMAL / (width as f64).sqrt() * sampling;
-        let is_stationary = median(levels.collect()) < explained;
+        let is_stationary = median(levels) < explained;
         let usual = if is_stationary {
-            median(usual) / NORMAL
+            median(usual.into_iter()) / NORMAL
         } else {
             0.0
         };

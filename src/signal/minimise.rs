@@ -246,8 +246,22 @@ impl Bounded {
 
     /// The minimiser. Lower bounds are finite.
     pub fn minimise(&self) -> Vector {
+        self.minimise_near([false; MOST])
+    }
+
+    /// The same, sooner where the parameters between their bounds are those of `is_free`, the others on their lower ones.
+    pub fn minimise_near(&self, is_free: [bool; MOST]) -> Vector {
         let mut x = self.lower;
         let mut places = [Place::Lower; MOST];
+        let near = is_free.map(|free| if free { Place::Free } else { Place::Lower });
+        let is_inside = |goal: &Vector| {
+            (0..self.n).all(|i| goal[i] >= self.lower[i] && goal[i] <= self.upper[i])
+        };
+        if is_free[..self.n].contains(&true)
+            && let Some(goal) = self.solve_free(&x, &near).filter(is_inside)
+        {
+            (x, places) = (goal, near);
+        }
         let mut refused = [false; MOST];
         // Each pass lowers the objective strictly, so no set of free parameters comes twice; the limit
         // guards against rounding.

@@ -12,11 +12,13 @@ use crate::noise::{Composite, Kind, Process};
 use crate::rng::Generator;
 use crate::wavelet::interval::edof_robust;
 use crate::wavelet::{Curve, QuantizationResponse, Tuning};
+use multiversion::multiversion;
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 use statrs::function::erf::erfc;
 use statrs::function::gamma::ln_gamma;
+use std::array;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 /// The law of the wavelet variances of one model at levels 1, 2, …
@@ -249,36 +251,64 @@ fn factor(correlation: &DMatrix<f64>) -> DMatrix<f64> {
         .map_or_else(|| DMatrix::identity(n, n), |c| c.l())
 }
 
+/// Frequencies that advance together.
+const WIDTH: usize = 8;
+
+/// Adds the products of the gains of all levels at some frequencies, of which sin²(πf) and the density are given.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn add_products(
+    lanes: &mut [[f64; WIDTH]],
+    gains: &mut [[f64; WIDTH]],
+    base: [f64; WIDTH],
+    density: [f64; WIDTH],
+) {
+    let (levels, mut sin2, mut m) = (gains.len(), base, 1.0);
+    for gain in gains.iter_mut() {
+        for lane in 0..WIDTH {
+            let s = sin2[lane];
+            // sin2 is sin²(πfm) here, base sin²(πf). Midpoints leave out f = 0, where a random walk has no
+            // density.
+            gain[lane] = density[lane] * s * s / (m * m * base[lane]);
+            sin2[lane] = 4.0 * s * (1.0 - s);
+        }
+        m *= 2.0;
+    }
+    for j in 0..levels {
+        let own = gains[j];
+        for (sum, gain) in lanes[j * levels..][j..levels].iter_mut().zip(&gains[j..]) {
+            (0..WIDTH).for_each(|lane| sum[lane] += gain[lane] * own[lane]);
+        }
+    }
+}
+
 /// ∫ |H_j|² |H_k|² S² df over −½ … ½, for all pairs of levels (units⁴).
 ///
 /// A sum over 2^(levels + 1) frequencies: exact where the autocovariance of the coefficients of the longest
 /// scale ends within that scale, as it does for WN, QN, MA1 and RW.
 fn products(model: &Composite, levels: usize) -> DMatrix<f64> {
     let half = 1_usize << levels;
-    let mut sums = DMatrix::zeros(levels, levels);
-    let mut gains = vec![0.0; levels];
-    for k in 0..half {
+    let mut lanes = vec![[0.0; WIDTH]; levels * levels];
+    let mut gains = vec![[0.0; WIDTH]; levels];
+    for first in (0..half).step_by(WIDTH) {
         // sin²(πf) of the midpoint; then sin²(2x) = 4 sin²x (1 − sin²x) from level to level.
-        let base = (0.5 * PI * (k as f64 + 0.5) / half as f64).sin().powi(2);
-        let density = model
-            .processes
-            .iter()
-            .map(|p| p.spectrum(base))
-            .sum::<f64>();
-        let mut sin2 = base;
-        for (i, gain) in gains.iter_mut().enumerate() {
-            let m = f64::from(i as u32).exp2();
-            // sin2 is sin²(πfm) here, base sin²(πf). Midpoints leave out f = 0, where a random walk has no
-            // density.
-            *gain = density * sin2 * sin2 / (m * m * base);
-            sin2 = 4.0 * sin2 * (1.0 - sin2);
-        }
-        for j in 0..levels {
-            for i in j..levels {
-                sums[(i, j)] += gains[i] * gains[j];
+        let base: [f64; WIDTH] = array::from_fn(|lane| {
+            let k = (first + lane) as f64;
+            (0.5 * PI * (k + 0.5) / half as f64).sin().powi(2)
+        });
+        let density: [f64; WIDTH] = array::from_fn(|lane| {
+            let spectra = model.processes.iter().map(|p| p.spectrum(base[lane]));
+            // Up to level 2 there are fewer frequencies than lanes.
+            if first + lane < half {
+                spectra.sum()
+            } else {
+                0.0
             }
-        }
+        });
+        add_products(&mut lanes, &mut gains, base, density);
     }
+    let mut sums = DMatrix::from_fn(levels, levels, |i, j| {
+        lanes[j * levels + i].iter().sum::<f64>()
+    });
     // The midpoint rule with step ½/half over 0 … ½, doubled for the negative frequencies.
     sums /= half as f64;
     sums.fill_upper_triangle_with_lower_triangle();
@@ -497,7 +527,7 @@ pub fn implied(model: &Composite, curve: &Curve) -> Vec<f64> {
 
 /// Derivatives of nu·b(q/nu), q the variance of quantization noise and nu that of all: with respect to q and to that of
 /// any other process. nu·b is homogeneous, so that it is q times the first plus (nu − q) times the second.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub(crate) struct Response {
     pub(crate) quantization: f64,
     pub(crate) others: f64,

@@ -151,7 +151,7 @@ fn settled(
             rate_hz,
             fit.within_its_basin(),
             MOST_ROUNDS,
-            Effort::WITHIN,
+            Effort::WHOLE.within(),
         )
         .map(|(_, fit)| fit)
     });
@@ -260,7 +260,14 @@ pub(crate) fn refit(
     // The model of the curve that this one resembles is known better than one draw knows itself; the weights change little:
     // the basin of the first round is that of the others.
     let first = first(&curve, expected(&curve, like))?.within_its_basin();
-    let (_, last) = reweighted(&curve, spec, rate_hz, first, FEW_ROUNDS, Effort::WITHIN)?;
+    let (_, last) = reweighted(
+        &curve,
+        spec,
+        rate_hz,
+        first,
+        FEW_ROUNDS,
+        Effort::AGAIN.within(),
+    )?;
     Ok(Fit {
         lack_of_fit: like.lack_of_fit,
         ..last.at_own_weights(&plain)
@@ -370,7 +377,7 @@ pub(crate) fn outside(e: ParameterError) -> CalibrationError {
 fn assemble(objective: &Objective, found: &Found, rate_hz: f64) -> Result<Fit, CalibrationError> {
     let unit = objective.length * objective.length;
     let best = &found.ends[0];
-    let solution = objective.solve(&best.coordinates);
+    let solution = objective.solve(&best.coordinates, None);
     let mut terms = terms(objective, &best.coordinates, &solution.amplitudes);
     let by_time = |a: &Term, b: &Term| b.coordinate.total_cmp(&a.coordinate);
     terms.sort_by(|a, b| a.kind.cmp(&b.kind).then_with(|| by_time(a, b)));

@@ -11,6 +11,7 @@ use crate::minimise::{Bounded, Descent, MOST, Matrix, Vector, cholesky_solve};
 use crate::noise::Kind;
 use crate::wavelet::{Curve, QuantizationResponse};
 use rayon::prelude::*;
+use std::cell::RefCell;
 
 /// Largest number of points in one dimension.
 const POINTS: usize = 160;
@@ -22,6 +23,8 @@ pub(crate) struct Effort {
     combinations: usize,
     /// Largest number of local minima of the grid from which a descent starts.
     starts: usize,
+    /// Whether all ends are minima to rounding; if not, the best of them, to a small part of its standard deviations.
+    is_exact: bool,
 }
 
 impl Effort {
@@ -29,17 +32,21 @@ impl Effort {
     pub(crate) const WHOLE: Self = Self {
         combinations: 6000,
         starts: 16,
+        is_exact: true,
     };
     /// For a curve that resembles one already fitted: its minima are known, and another is seldom far from the grid's best.
     pub(crate) const AGAIN: Self = Self {
         combinations: 300,
         starts: 2,
+        is_exact: false,
     };
     /// Descents from the known minima only.
-    pub(crate) const WITHIN: Self = Self {
-        combinations: 0,
-        starts: 1,
-    };
+    pub(crate) const fn within(self) -> Self {
+        Self {
+            combinations: 0,
+            ..self
+        }
+    }
 }
 
 /// Result of the search.
@@ -54,7 +61,7 @@ pub(crate) struct Found {
 pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) -> Found {
     let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
     if dimensions.is_empty() {
-        let cost = objective.solve(&[]).cost();
+        let cost = objective.solve(&[], None).cost();
         let end = End {
             coordinates: Vec::new(),
             cost,
@@ -68,7 +75,13 @@ pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) 
     let mut starts = known.to_vec();
     let mut tried = 0;
     if effort.combinations > 0 || known.is_empty() {
-        let grid = Grid::new(objective, &dimensions, effort.combinations);
+        // What the grid of a similar curve is for is the order of its combinations: the shares of quantization noise are those
+        // of the best minimum known.
+        let responses = match known.first() {
+            Some(best) if !effort.is_exact => Some(objective.solve(best, None).responses),
+            _ => None,
+        };
+        let grid = Grid::new(objective, &dimensions, effort.combinations, responses);
         let choices = grid.choices();
         tried = choices.len();
         // The grid first: of ends with the same cost the sort keeps that order, whatever is known.
@@ -76,9 +89,18 @@ pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) 
     }
     let mut ends: Vec<End> = starts
         .par_iter()
-        .map(|start| descend(objective, start))
+        .map(|start| {
+            let end = descend(objective, start, &Precision::ROUGH);
+            match effort.is_exact {
+                true => descend(objective, &end.coordinates, &Precision::EXACT),
+                false => end,
+            }
+        })
         .collect();
     ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    if !effort.is_exact {
+        ends[0] = descend(objective, &ends[0].coordinates, &Precision::FINE);
+    }
     Found {
         ends,
         combinations: tried,
@@ -93,14 +115,21 @@ struct Grid<'a> {
     repeats: Vec<bool>,
     /// Shapes of the components without a coordinate, then those of the points of each dimension.
     shapes: Vec<Shape>,
-    /// Their columns.
-    columns: Vec<Column>,
+    /// Whether the columns serve for every combination.
+    is_linear: bool,
+    /// Inner products of the columns of all shapes, and with the target.
     gram: Vec<f64>,
     right: Vec<f64>,
 }
 
 impl<'a> Grid<'a> {
-    fn new(objective: &'a Objective, dimensions: &[(usize, Range)], combinations: usize) -> Self {
+    /// `responses`: those of all combinations; none where they follow from the amplitudes of each.
+    fn new(
+        objective: &'a Objective,
+        dimensions: &[(usize, Range)],
+        combinations: usize,
+        responses: Option<Vec<Response>>,
+    ) -> Self {
         let count = points_per_dimension(dimensions.len(), combinations);
         let points: Vec<Vec<f64>> = dimensions.iter().map(|(_, r)| spread(*r, count)).collect();
         let repeats = (0..dimensions.len())
@@ -116,15 +145,20 @@ impl<'a> Grid<'a> {
         for ((owner, _), points) in dimensions.iter().zip(&points) {
             shapes.extend(points.iter().map(|u| objective.shape(*owner, *u)));
         }
-        let plain = objective.plain_responses();
+        let is_linear = objective.is_linear() || responses.is_some();
+        let responses = responses.unwrap_or_else(|| objective.plain_responses());
         let columns: Vec<Column> = shapes
             .iter()
-            .map(|shape| objective.column(shape, &plain))
+            .map(|shape| objective.column(shape, &responses))
             .collect();
         let n = columns.len();
-        let gram = (0..n * n)
-            .map(|k| dot(&columns[k / n].values, &columns[k % n].values))
-            .collect();
+        let mut gram = vec![0.0; n * n];
+        for i in 0..n {
+            for j in 0..=i {
+                gram[i * n + j] = dot(&columns[i].values, &columns[j].values);
+                gram[j * n + i] = gram[i * n + j];
+            }
+        }
         let right = columns
             .iter()
             .map(|c| dot(&c.values, &objective.target))
@@ -134,7 +168,7 @@ impl<'a> Grid<'a> {
             points,
             repeats,
             shapes,
-            columns,
+            is_linear,
             gram,
             right,
         }
@@ -143,7 +177,7 @@ impl<'a> Grid<'a> {
     /// Least Σ residual² for a choice of points, one for each dimension.
     fn cost(&self, choice: &[usize]) -> f64 {
         let mut selected = [0; MOST];
-        let fixed = self.columns.len() - self.points.iter().map(Vec::len).sum::<usize>();
+        let fixed = self.shapes.len() - self.points.iter().map(Vec::len).sum::<usize>();
         let mut n = fixed;
         (0..fixed).for_each(|i| selected[i] = i);
         let mut offset = fixed;
@@ -152,7 +186,7 @@ impl<'a> Grid<'a> {
             offset += points.len();
             n += 1;
         }
-        if !self.objective.is_linear() {
+        if !self.is_linear {
             let mut shapes: Vec<&Shape> = selected[..n].iter().map(|i| &self.shapes[*i]).collect();
             // The amplitudes and their bounds are in the order of the components.
             shapes.sort_unstable_by_key(|shape| shape.component);
@@ -162,11 +196,11 @@ impl<'a> Grid<'a> {
         for a in 0..n {
             let i = selected[a];
             for b in 0..n {
-                problem.gram[a][b] = self.gram[i * self.columns.len() + selected[b]];
+                problem.gram[a][b] = self.gram[i * self.shapes.len() + selected[b]];
             }
             problem.right[a] = self.right[i];
         }
-        let x = problem.minimise();
+        let x = problem.minimise_near([true; MOST]);
         let linear: f64 = (0..n).map(|i| problem.right[i] * x[i]).sum();
         let quadratic: f64 = (0..n)
             .map(|i| x[i] * (0..n).map(|j| problem.gram[i][j] * x[j]).sum::<f64>())
@@ -302,7 +336,7 @@ impl Component {
     }
 }
 
-/// Wavelet variance of a component per unit of its amplitude, at all levels.
+/// Wavelet variance of a component per unit of its amplitude, at all levels, in the weights of the curve.
 #[derive(Debug, Clone)]
 pub(crate) struct Shape {
     component: usize,
@@ -326,16 +360,36 @@ struct LinearBest {
     /// Amplitudes, in units of their columns' lengths.
     x: Vector,
     /// Those on no bound.
-    active: Vec<usize>,
+    is_free: [bool; MOST],
     residuals: Vec<f64>,
 }
 
-/// Rounds at most until the shares of quantization noise have settled; each takes off two digits or so.
-const SETTLED: usize = 16;
-/// Changes of the response that are rounding.
-const SETTLED_CHANGE: f64 = 1e-13;
-/// Rounds that tell which of the grid's combinations are near.
-const NEARLY_SETTLED: usize = 3;
+/// How far the shares of quantization noise settle.
+#[derive(Clone, Copy)]
+struct Settling {
+    /// Rounds at most; each takes off two digits or so.
+    rounds: usize,
+    /// Largest change of a response that is left: the cost errs by its square.
+    change: f64,
+}
+
+impl Settling {
+    /// To rounding.
+    const WHOLE: Self = Self {
+        rounds: 16,
+        change: 1e-13,
+    };
+    /// The cost to rounding, its derivatives to 1e-8.
+    const OF_COST: Self = Self {
+        rounds: 16,
+        change: 1e-8,
+    };
+    /// Tells which of the grid's combinations are near.
+    const NEARLY: Self = Self {
+        rounds: 3,
+        change: 1e-4,
+    };
+}
 
 /// The least-squares problem: weighted curve, in units of its length.
 pub(crate) struct Objective {
@@ -349,7 +403,7 @@ pub(crate) struct Objective {
 }
 
 /// The best amplitudes for given coordinates.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Solution {
     /// Amplitudes, in the parameters' units.
     pub(crate) amplitudes: Vec<f64>,
@@ -358,6 +412,10 @@ pub(crate) struct Solution {
     /// Derivative of the residuals with respect to each coordinate, the amplitudes following: Kaufman's
     /// approximation. In the order of the components that have a coordinate.
     jacobian: Vec<Vec<f64>>,
+    /// Responses of the curve there.
+    responses: Vec<Response>,
+    /// The amplitudes that are on no bound.
+    is_free: [bool; MOST],
 }
 
 impl Solution {
@@ -370,6 +428,17 @@ impl Solution {
     /// derivatives do not matter.
     fn gradient(&self, coordinate: usize) -> f64 {
         dot(&self.jacobian[coordinate], &self.residuals)
+    }
+
+    /// Half the second derivatives, without those of the residuals (Gauss and Newton).
+    fn curvature(&self) -> Matrix {
+        let mut curvature = [[0.0; MOST]; MOST];
+        for (row, a) in curvature.iter_mut().zip(&self.jacobian) {
+            row.iter_mut()
+                .zip(&self.jacobian)
+                .for_each(|(x, b)| *x = dot(a, b));
+        }
+        curvature
     }
 }
 
@@ -420,11 +489,11 @@ impl Objective {
 
     fn shape(&self, component: usize, u: f64) -> Shape {
         let process = &self.components[component];
-        let (values, slopes) = self
-            .levels
-            .iter()
-            .map(|level| process.shape(u, *level))
-            .unzip();
+        let weighted = |(level, root): (&u32, &f64)| {
+            let (value, slope) = process.shape(u, *level);
+            (root * value, root * slope)
+        };
+        let (values, slopes) = self.levels.iter().zip(&self.roots).map(weighted).unzip();
         Shape {
             component,
             values,
@@ -434,29 +503,22 @@ impl Objective {
 
     /// The column of a shape where the curve responds so, level by level.
     fn column(&self, shape: &Shape, responses: &[Response]) -> Column {
-        let mut values = self.weighted(shape.component, &shape.values, responses);
+        let mut values = self.read(shape.component, &shape.values, responses);
         // Unit columns: the Gram matrix has a unit diagonal, and its condition is that of the shapes, not of
         // the units.
         let length = dot(&values, &values).sqrt();
-        values.iter_mut().for_each(|v| *v /= length);
+        let scale = 1.0 / length;
+        values.iter_mut().for_each(|v| *v *= scale);
         Column { values, length }
     }
 
-    /// What a component has at each level, in the weights of the curve.
-    fn weighted(&self, component: usize, levels: &[f64], responses: &[Response]) -> Vec<f64> {
-        let is_quantization = self.components[component].kind == Kind::Quantization;
-        let weights = self.roots.iter().zip(responses).map(|(root, response)| {
-            root * if is_quantization {
-                response.quantization
-            } else {
-                response.others
-            }
-        });
-        levels
-            .iter()
-            .zip(weights)
-            .map(|(value, weight)| value * weight)
-            .collect()
+    /// What the curve reads of a component at each level.
+    fn read(&self, component: usize, levels: &[f64], responses: &[Response]) -> Vec<f64> {
+        let pairs = levels.iter().zip(responses);
+        match self.components[component].kind {
+            Kind::Quantization => pairs.map(|(x, r)| x * r.quantization).collect(),
+            _ => pairs.map(|(x, r)| x * r.others).collect(),
+        }
     }
 
     /// Responses of a curve that reads quantization noise as it is: 1 at every level.
@@ -489,7 +551,17 @@ impl Objective {
     }
 
     /// The best amplitudes for the coordinates given (one for each component that has one).
-    pub(crate) fn solve(&self, coordinates: &[f64]) -> Solution {
+    pub(crate) fn solve(&self, coordinates: &[f64], near: Option<&Solution>) -> Solution {
+        self.solve_to(Settling::WHOLE, coordinates, near)
+    }
+
+    /// `near`: a solution nearby, from which the shares of quantization noise settle sooner.
+    fn solve_to(
+        &self,
+        settling: Settling,
+        coordinates: &[f64],
+        near: Option<&Solution>,
+    ) -> Solution {
         let mut next = coordinates.iter();
         let mut coordinate_of = |c: &Component| {
             c.coordinate
@@ -504,7 +576,7 @@ impl Objective {
             .map(|(i, c)| self.shape(i, coordinate_of(c)))
             .collect();
         let shapes: Vec<&Shape> = shapes.iter().collect();
-        let best = self.best_amplitudes(&shapes, SETTLED);
+        let best = self.best_amplitudes(&shapes, settling, near);
         let jacobian = self
             .shaped()
             .map(|(i, _)| self.tangent(&best, shapes[i], i))
@@ -514,60 +586,76 @@ impl Objective {
             amplitudes,
             residuals: best.residuals,
             jacobian,
+            responses: best.responses,
+            is_free: best.is_free,
         }
     }
 
     /// Σ residual² for shapes of all components, in their order; the shares of quantization noise are nearly settled.
     fn cost_near(&self, shapes: &[&Shape]) -> f64 {
-        let residuals = self.best_amplitudes(shapes, NEARLY_SETTLED).residuals;
+        let residuals = self
+            .best_amplitudes(shapes, Settling::NEARLY, None)
+            .residuals;
         dot(&residuals, &residuals)
     }
 
-    /// The best amplitudes for shapes of all components, in their order, after so many rounds at most.
-    fn best_amplitudes(&self, shapes: &[&Shape], rounds: usize) -> LinearBest {
-        let mut best = self.linear_best(shapes, self.plain_responses());
-        for _ in 0..if self.is_linear() { 0 } else { rounds } {
+    /// The best amplitudes for shapes of all components, in their order.
+    fn best_amplitudes(
+        &self,
+        shapes: &[&Shape],
+        settling: Settling,
+        near: Option<&Solution>,
+    ) -> LinearBest {
+        let (responses, is_free) = match near {
+            Some(near) => (near.responses.clone(), near.is_free),
+            None => (self.plain_responses(), [true; MOST]),
+        };
+        let mut best = self.linear_best(shapes, responses, is_free);
+        for _ in 0..if self.is_linear() { 0 } else { settling.rounds } {
             let next = self.responses(shapes, &self.amplitudes(&best.columns, &best.x));
             let change = |(a, b): (&Response, &Response)| {
                 (a.others - b.others)
                     .abs()
                     .max((a.quantization - b.quantization).abs())
             };
-            if next
+            let largest = next
                 .iter()
                 .zip(&best.responses)
                 .map(change)
-                .fold(0.0, f64::max)
-                < SETTLED_CHANGE
-            {
+                .fold(0.0, f64::max);
+            if largest < settling.change {
                 break;
             }
-            best = self.linear_best(shapes, next);
+            best = self.linear_best(shapes, next, best.is_free);
         }
         best
     }
 
-    /// The best amplitudes where the curve responds so.
-    fn linear_best(&self, shapes: &[&Shape], responses: Vec<Response>) -> LinearBest {
+    /// The best amplitudes where the curve responds so; `near`: those that are perhaps on no bound.
+    fn linear_best(
+        &self,
+        shapes: &[&Shape],
+        responses: Vec<Response>,
+        near: [bool; MOST],
+    ) -> LinearBest {
         let columns: Vec<Column> = shapes
             .iter()
             .map(|shape| self.column(shape, &responses))
             .collect();
         let problem = self.linear_problem(&columns);
-        let mut x = problem.minimise();
+        let mut x = problem.minimise_near(near);
         // An amplitude on a bound does not follow the coordinates, so its column is left out of the
         // projection.
-        let free = |x: &Vector, i: usize| x[i] > problem.lower[i] && x[i] < problem.upper[i];
-        let active: Vec<usize> = (0..columns.len()).filter(|i| free(&x, *i)).collect();
+        let mut is_free = [false; MOST];
+        (0..columns.len())
+            .for_each(|i| is_free[i] = x[i] > problem.lower[i] && x[i] < problem.upper[i]);
         // One refinement with the residuals themselves: the normal equations know only half the digits.
         let mut residuals = self.residuals(&columns, &x);
-        if let Some(change) = project(&columns, &active, &problem.gram, &residuals) {
+        if let Some(change) = project(&columns, &is_free, &problem.gram, &residuals) {
             let mut refined = x;
-            active
-                .iter()
-                .zip(change)
-                .for_each(|(i, d)| refined[*i] += d);
-            if active.iter().all(|i| free(&refined, *i)) {
+            refined.iter_mut().zip(change).for_each(|(x, d)| *x += d);
+            let is_inside = |i: usize| !is_free[i] || refined[i] > 0.0;
+            if (0..columns.len()).all(is_inside) {
                 x = refined;
                 residuals = self.residuals(&columns, &x);
             }
@@ -577,23 +665,23 @@ impl Objective {
             columns,
             gram: problem.gram,
             x,
-            active,
+            is_free,
             residuals,
         }
     }
 
     /// −amplitude × the part of the slope of the i-th column that the active columns cannot follow.
     fn tangent(&self, best: &LinearBest, shape: &Shape, i: usize) -> Vec<f64> {
-        let slopes = self.weighted(i, &shape.slopes, &best.responses);
+        let slopes = self.read(i, &shape.slopes, &best.responses);
         // d(residual)/du with the amplitudes fixed, less its part within the columns, which the amplitudes take
         // up.
         let (amplitude, length) = (best.x[i], best.columns[i].length);
         let mut tangent: Vec<f64> = slopes.iter().map(|s| -amplitude * (s / length)).collect();
-        if let Some(part) = project(&best.columns, &best.active, &best.gram, &tangent) {
-            for (&a, p) in best.active.iter().zip(part) {
+        if let Some(part) = project(&best.columns, &best.is_free, &best.gram, &tangent) {
+            for (column, p) in best.columns.iter().zip(part) {
                 tangent
                     .iter_mut()
-                    .zip(&best.columns[a].values)
+                    .zip(&column.values)
                     .for_each(|(t, v)| *t -= p * v);
             }
         }
@@ -632,30 +720,39 @@ impl Objective {
     }
 }
 
-/// Coefficients of the projection of `vector` on the active columns; none if these depend on one another.
+/// Coefficients of the projection of `vector` on the free columns, 0 of the others; none if these depend on one another.
 fn project(
     columns: &[Column],
-    active: &[usize],
+    is_free: &[bool; MOST],
     gram: &Matrix,
     vector: &[f64],
-) -> Option<Vec<f64>> {
-    let mut right = [0.0; MOST];
-    for (r, &i) in right.iter_mut().zip(active) {
-        *r = dot(&columns[i].values, vector);
+) -> Option<Vector> {
+    let (mut free, mut right, mut n) = ([0; MOST], [0.0; MOST], 0);
+    for (i, column) in columns.iter().enumerate().filter(|(i, _)| is_free[*i]) {
+        (free[n], right[n]) = (i, dot(&column.values, vector));
+        n += 1;
     }
-    let n = active.len();
-    let solution = cholesky_solve(|a, b| gram[active[a]][active[b]], right, n)?;
-    Some(solution[..n].to_vec())
+    let solution = cholesky_solve(|a, b| gram[free[a]][free[b]], right, n)?;
+    let mut part = [0.0; MOST];
+    (0..n).for_each(|k| part[free[k]] = solution[k]);
+    Some(part)
 }
 
+/// In four sums, which do not wait for one another.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
+    let (chunks, others) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest = chunks.remainder().iter().zip(others.remainder());
+    let mut sums = [0.0; 4];
+    for (x, y) in chunks.clone().zip(others.clone()) {
+        (0..4).for_each(|i| sums[i] += x[i] * y[i]);
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest.map(|(x, y)| x * y).sum::<f64>()
 }
 
 // Damped Newton steps on the coordinates, the amplitudes following (variable projection).
 //
-// The gradient is analytic. The curvature is the difference of gradients where that is positive definite,
-// else Gauss and Newton's approximation, which alone would creep where no model fits well.
+// The gradient is analytic. The first steps have Gauss and Newton's approximation of the curvature, which would creep to the
+// minimum where no model fits well; the last ones the difference of gradients where that is positive definite.
 
 /// End of the iterations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -687,21 +784,56 @@ pub(crate) struct End {
     pub(crate) termination: Termination,
 }
 
+/// How near a descent comes to its minimum.
+struct Precision {
+    /// Gain of the last step, in parts of the cost.
+    enough: fn(f64) -> f64,
+    settling: Settling,
+    /// Whether the curvature is the difference of gradients.
+    is_newton: bool,
+}
+
+impl Precision {
+    /// Within a tenth of a standard deviation of most curves.
+    const ROUGH: Self = Self {
+        enough: |cost| 1e-3 * cost,
+        settling: Settling::OF_COST,
+        is_newton: false,
+    };
+    /// Within 1e-4 of a standard deviation.
+    const FINE: Self = Self {
+        enough: |cost| 1e-9 * cost,
+        ..Self::ROUGH
+    };
+    /// To rounding.
+    const EXACT: Self = Self {
+        enough: |cost| 1e-15 * cost,
+        settling: Settling::WHOLE,
+        is_newton: true,
+    };
+}
+
 /// Descends from a start to the local minimum.
-fn descend(objective: &Objective, start: &[f64]) -> End {
+fn descend(objective: &Objective, start: &[f64], precision: &Precision) -> End {
     let ranges: Vec<(f64, f64)> = objective.shaped().map(|(_, r)| (r.low, r.high)).collect();
     let descent = Descent {
         ranges: &ranges,
         damping: 1e-6,
-        enough: |cost| 1e-15 * cost,
+        enough: precision.enough,
     };
+    let last: RefCell<Option<Solution>> = RefCell::new(None);
     let found = descent.minimum(
         start,
-        |u| objective.solve(u),
+        |u| {
+            let solution = objective.solve_to(precision.settling, u, last.borrow().as_ref());
+            last.replace(Some(solution.clone()));
+            solution
+        },
         Solution::cost,
         |u, at| {
             let gradient = (0..u.len()).map(|i| at.gradient(i)).collect();
-            (gradient, curvature(objective, u, at))
+            let newton = precision.is_newton.then(|| curvature(objective, u, at));
+            (gradient, newton.flatten().unwrap_or_else(|| at.curvature()))
         },
     );
     End {
@@ -719,15 +851,15 @@ fn descend(objective: &Objective, start: &[f64]) -> End {
 /// the rounding of the gradients over h are both of the order 1e-10.
 const DIFFERENCE: f64 = 1e-5;
 
-/// Half the second derivatives of the cost.
-fn curvature(objective: &Objective, u: &[f64], at: &Solution) -> Matrix {
+/// Half the second derivatives of the cost; none where they are not positive definite.
+fn curvature(objective: &Objective, u: &[f64], at: &Solution) -> Option<Matrix> {
     let n = u.len();
     let mut hessian = [[0.0; MOST]; MOST];
     for j in 0..n {
         let gradients = |sign: f64| {
             let mut there = u.to_vec();
             there[j] += sign * DIFFERENCE;
-            let solution = objective.solve(&there);
+            let solution = objective.solve(&there, Some(at));
             (0..n).map(|i| solution.gradient(i)).collect::<Vec<_>>()
         };
         let (up, down) = (gradients(1.0), gradients(-1.0));
@@ -740,15 +872,7 @@ fn curvature(objective: &Objective, u: &[f64], at: &Solution) -> Matrix {
         }
     }
     // Away from a minimum the curvature may be indefinite and point uphill; Gauss and Newton's is never.
-    if cholesky_solve(|i, j| hessian[i][j], [0.0; MOST], n).is_some() {
-        return hessian;
-    }
-    for i in 0..n {
-        for j in 0..n {
-            hessian[i][j] = dot(&at.jacobian[i], &at.jacobian[j]);
-        }
-    }
-    hessian
+    cholesky_solve(|i, j| hessian[i][j], [0.0; MOST], n).map(|_| hessian)
 }
 
 #[cfg(test)]
@@ -792,7 +916,7 @@ mod tests {
     fn residuals_and_their_derivatives_are_orthogonal_to_the_columns() {
         let objective = objective();
         let at = [-2.5, -6.5];
-        let solution = objective.solve(&at);
+        let solution = objective.solve(&at, None);
         let plain = objective.plain_responses();
         assert!(
             solution.amplitudes.iter().all(|a| *a > 0.0),
@@ -823,7 +947,7 @@ mod tests {
     fn the_grid_has_the_cost_of_each_point() {
         let objective = objective();
         let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
-        let grid = Grid::new(&objective, &dimensions, 60);
+        let grid = Grid::new(&objective, &dimensions, 60, None);
         let choices = grid.choices();
         assert_eq!((grid.points[0].len(), choices.len()), (11, 55));
         let mut costs = Vec::new();
@@ -833,7 +957,7 @@ mod tests {
                 .zip(&grid.points)
                 .map(|(i, points)| points[*i])
                 .collect();
-            costs.push(objective.solve(&at).cost());
+            costs.push(objective.solve(&at, None).cost());
             let (found, exact) = (grid.cost(choice), costs[costs.len() - 1]);
             // 1 − 2rᵀx + xᵀGx cancels
             assert!(
@@ -854,7 +978,7 @@ mod tests {
         let started: Vec<f64> = grid
             .starts(&choices, 55)
             .iter()
-            .map(|at| objective.solve(at).cost())
+            .map(|at| objective.solve(at, None).cost())
             .collect();
         assert_eq!(started, minima);
     }
@@ -885,7 +1009,7 @@ mod tests {
             };
             let components = model.processes.iter().map(component).collect();
             let objective = Objective::new(&curve, Weighting::Edof, &curve.wv, components);
-            let solution = objective.solve(&[]);
+            let solution = objective.solve(&[], None);
             let [white, quantized] = solution.amplitudes[..] else {
                 panic!("{solution:?}")
             };

@@ -1,7 +1,7 @@
 //! Intervals of parameters from draws around their estimates.
 
 use crate::fit::{Fit, Range, correlated};
-use crate::noise::practical::{AxisParameters, Bias, Curve, Horizon, Minimum, Policy};
+use crate::noise::practical::{Bias, Curve, Horizon, Minimum, Policy};
 use crate::noise::{Composite, Kind, Parameter, ParameterRef, Process};
 use crate::outcome::{Outcome, ParameterInterval, Practical, PracticalIntervals, Undetermined};
 
@@ -305,24 +305,30 @@ fn observed_s(outcome: &Outcome, rate_hz: f64) -> Option<f64> {
 }
 
 impl Outcome {
-    /// N, K, B and T of practitioners, as exports have them; none at a rate without averages of 1 s, nor
+    /// N, K and B of practitioners, as exports have them; none at a rate without averages of 1 s, nor
     /// without noise.
     pub fn practical(&self, rate_hz: f64) -> Option<Practical> {
-        let (horizon, policy) = (Horizon::default(), Policy::Matched);
         let read = self.for_navigation();
         let range_s = observed_s(read, rate_hz)?;
-        let model = &read.fit.composite;
-        let parameters = AxisParameters::of(&[model], rate_hz, horizon, policy, range_s).ok()?;
         let intervals = read.inference.as_ref();
-        let intervals = intervals.map_or(PracticalIntervals::default(), |i| i.practical);
-        let walk_until_s = parameters
-            .walk
-            .departs_s(model, rate_hz, range_s, Practical::BESIDE);
         Some(Practical {
-            parameters,
-            intervals,
+            intervals: intervals.map_or(PracticalIntervals::default(), |i| i.practical),
+            ..Practical::of(&read.fit.composite, rate_hz, range_s)?
+        })
+    }
+}
+
+impl Practical {
+    /// Those of a model, without intervals.
+    fn of(model: &Composite, rate_hz: f64, range_s: f64) -> Option<Self> {
+        let curve = Curve::largest(&[model], rate_hz, Horizon::default()).ok()?;
+        let walk = curve.pair(Policy::Matched, Bias::Walk);
+        Some(Self {
+            walk,
+            minimum: Minimum::of(&[model], rate_hz, range_s),
+            intervals: PracticalIntervals::default(),
             range_s,
-            walk_until_s,
+            walk_until_s: walk.departs_s(model, rate_hz, range_s, Self::BESIDE),
         })
     }
 }
@@ -521,25 +527,7 @@ mod practical_tests {
     use crate::noise::Process;
 
     fn practical(processes: Vec<Process>) -> Practical {
-        let (model, rate_hz, range_s) = (Composite::new(processes), 100.0, 1e4);
-        let parameters = AxisParameters::of(
-            &[&model],
-            rate_hz,
-            Horizon::default(),
-            Policy::Matched,
-            range_s,
-        )
-        .unwrap();
-        let walk_until_s = parameters
-            .walk
-            .departs_s(&model, rate_hz, range_s, Practical::BESIDE);
-        let intervals = PracticalIntervals::default();
-        Practical {
-            parameters,
-            intervals,
-            range_s,
-            walk_until_s,
-        }
+        Practical::of(&Composite::new(processes), 100.0, 1e4).unwrap()
     }
 
     /// White noise of N = 1e-3 with a random walk that takes over at √3·1e-3/1e-5 = 173 s; with a Gauss-Markov process of 30 s,
@@ -561,6 +549,6 @@ mod practical_tests {
         );
         let trace = practical(vec![white, markov(5e-5)]);
         assert!(!trace.walk_is_observed(), "{trace:?}");
-        assert!(trace.parameters.walk.crossover_s().unwrap() < trace.range_s);
+        assert!(trace.walk.crossover_s().unwrap() < trace.range_s);
     }
 }

@@ -243,7 +243,7 @@ fn chart(fitted: &FittedCurve, outcome: &Outcome, diagnoses: &[Diagnosis], rate_
     upper.extend(data(&allan));
     upper.push(Series::line("model", Colour::REAL, line(&fitted.implied)));
     if let Some(practical) = outcome.practical(rate_hz) {
-        let (pair, minimum) = (practical.parameters.walk, practical.parameters.minimum);
+        let (pair, minimum) = (practical.walk, practical.minimum);
         let read = [
             (pair.density > 0.0).then_some(("N", 1.0, pair.density)),
             practical
@@ -819,7 +819,7 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
             figures.insert(key, figure);
         };
     if let Some(practical) = outcome.practical(rate_hz) {
-        let (pair, ends) = (&practical.parameters.walk, &practical.intervals);
+        let (pair, ends) = (&practical.walk, &practical.intervals);
         let [white, walk] = match sensor {
             Sensor::Accel => ["velocity random walk N", "accel. random walk K"],
             Sensor::Gyro => ["angle random walk N", "rate random walk K"],
@@ -830,7 +830,7 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
         let until = practical.walk_until_s;
         let until = until.map_or(String::new(), |t| format!(" to {}", duration(t)));
         let from = crossover.map_or(none.clone(), |t| format!("from {t}{until}"));
-        let minimum = practical.parameters.minimum;
+        let minimum = practical.minimum;
         let floor = minimum.map_or(none, |m| format!("floor at {}", duration(m.tau_s)));
         let b = minimum.map(|m| m.deviation);
         let k = practical.walk_is_observed().then_some(pair.walk);

@@ -9,9 +9,9 @@ use multiversion::multiversion;
 
 /// Elements that advance together. The order of every sum follows from it alone, so that a machine with wider
 /// registers gives the same bytes.
-const WIDTH: usize = 16;
+pub(super) const WIDTH: usize = 16;
 /// Length of the partial sums that are added with compensation (elements).
-const BLOCK: usize = 2048;
+pub(super) const BLOCK: usize = 2048;
 
 /// Classical wavelet variance at levels 1 … `levels` (units²); the entry of level j is at j − 1.
 ///
@@ -42,7 +42,7 @@ pub fn coefficients(signal: &[f64], level: u32) -> Result<Vec<f64>, WaveletError
 /// rounding error grows with log2 of the scale; the first sample is subtracted, so an offset costs no digits.
 pub(super) struct Pyramid {
     /// Sums of `half` consecutive samples.
-    sums: Vec<f64>,
+    pub(super) sums: Vec<f64>,
     /// m of the level that comes next.
     pub(super) half: usize,
 }
@@ -61,21 +61,13 @@ impl Pyramid {
 
     /// The classical variance of the next level.
     fn next_variance(&mut self) -> f64 {
-        self.advance(None)
+        self.advance(step)
     }
 
-    /// The classical variance of the next level; `squares` receives (2m·W_t)².
-    pub(super) fn next_squares(&mut self, squares: &mut Vec<f64>) -> f64 {
-        squares.resize(self.sums.len() - self.half, 0.0);
-        self.advance(Some(squares))
-    }
-
-    fn advance(&mut self, squares: Option<&mut [f64]>) -> f64 {
+    /// The classical variance of the next level; `step` is [`butterflies`].
+    pub(super) fn advance(&mut self, step: impl FnOnce(&mut [f64], usize) -> f64) -> f64 {
         let count = self.sums.len() - self.half;
-        let total = match squares {
-            None => step(&mut self.sums, self.half),
-            Some(squares) => step_keeping(&mut self.sums, self.half, squares),
-        };
+        let total = step(&mut self.sums, self.half);
         // W_t = (b − a)/(2m); the factor is the same for all t and leaves the sum. Divided by M_j, not M_j −
         // 1: E W_t = 0 is known, so no mean is estimated.
         let scale = 0.5 / self.half as f64;
@@ -91,16 +83,13 @@ fn step(sums: &mut [f64], half: usize) -> f64 {
     butterflies(sums, half, |_, _| ())
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn step_keeping(sums: &mut [f64], half: usize, squares: &mut [f64]) -> f64 {
-    butterflies(sums, half, |t, values| {
-        squares[t..t + values.len()].copy_from_slice(values)
-    })
-}
-
 /// Replaces each a = sums\[t\] by a + b, b = sums\[t + half\], and returns Σ (b − a)²; `keep` sees the squares.
 #[inline(always)]
-fn butterflies(sums: &mut [f64], half: usize, mut keep: impl FnMut(usize, &[f64])) -> f64 {
+pub(super) fn butterflies(
+    sums: &mut [f64],
+    half: usize,
+    mut keep: impl FnMut(usize, &[f64]),
+) -> f64 {
     let count = sums.len() - half;
     let mut total = Compensated::default();
     let mut lanes = [0.0; WIDTH];

@@ -9,7 +9,7 @@
 //! (means of 1000 records; the command is in docs/limits.md).
 
 use super::WaveletError;
-use super::haar::{Compensated, Pyramid, array, pairwise};
+use super::haar::{BLOCK, Compensated, Pyramid, WIDTH, array, butterflies, pairwise};
 use super::interval::edof_eta3;
 use crate::minimise::golden_section;
 use multiversion::multiversion;
@@ -86,8 +86,17 @@ pub fn both(
         // The M-estimate is scale-equivariant: it is taken of (2m·W)², and the factor goes on once, at the
         // end. `half` is read before the step doubles it.
         let scale = 0.5 / pyramid.half as f64;
-        let classical = pyramid.next_squares(&mut squares);
-        let found = m_scale(&squares, tuning);
+        let (sums, half) = (&pyramid.sums, pyramid.half);
+        let count = sums.len() - half;
+        let begin = Begin::new(count, |t| (sums[t + half] - sums[t]).powi(2), tuning);
+        squares.resize(count, 0.0);
+        let mut first = [0.0; 3];
+        // The first sums of the equation in the pass that makes the squares: of long records memory costs more than numbers.
+        let classical = pyramid.advance(|sums, half| {
+            let k = 1.0 / (tuning.c() * tuning.c() * begin.start);
+            step_measuring(sums, half, &mut squares, k, &mut first)
+        });
+        let found = begin.solve(&squares, first, tuning);
         let mut robust = RobustVariance {
             value: found.value * scale * scale,
             ..found
@@ -106,23 +115,64 @@ pub fn both(
 
 /// The M-estimate of the mean of the given squares of zero-mean Gaussian numbers.
 pub(crate) fn m_scale(squares: &[f64], tuning: &Tuning) -> RobustVariance {
-    let equation = Equation { squares, tuning };
-    // The start must only be within 25 % of the root: of 4096 independent coefficients the squared MAD is
-    // known to 4 %. Anything unusual goes to the search, which takes all of them.
-    let sample = sample(squares);
-    let start = squared_mad(&sample);
-    let near = if start > 0.0 {
-        equation.newton_near(start)
-    } else {
-        None
-    };
-    let (value, status) = near.map_or_else(|| equation.search(), |value| (value, Status::Ok));
-    // Of 4096 a share of a tenth is known to 0.5 %.
-    let zero = sample.iter().filter(|y| **y <= ZERO * ZERO * value).count();
-    RobustVariance {
-        value,
-        status,
-        zeros: zero as f64 / sample.len() as f64,
+    let begin = Begin::new(squares.len(), |t| squares[t], tuning);
+    let c2 = tuning.c() * tuning.c();
+    let first = biweight_sums(squares, 1.0 / (c2 * begin.start));
+    begin.solve(squares, first, tuning)
+}
+
+/// Where the iteration begins.
+struct Begin {
+    /// At most 4096 evenly spaced squares; all of a short vector.
+    sample: Vec<f64>,
+    /// The M-estimate of more of them, or their squared MAD.
+    start: f64,
+}
+
+impl Begin {
+    fn new(count: usize, square: impl Fn(usize) -> f64, tuning: &Tuning) -> Self {
+        const SIZE: usize = 4096;
+        let spaced = |most: usize| -> Vec<f64> {
+            let step = count.div_ceil(most).max(1);
+            (0..count).step_by(step).map(&square).collect()
+        };
+        // The start must only be within 25 % of the root: of 4096 independent coefficients the squared MAD is
+        // known to 4 %. Anything unusual goes to the search, which takes all of them.
+        let sample = spaced(SIZE);
+        let mad = squared_mad(&sample);
+        // A 64th part knows the root to a hundredth, from which one step leads to 1e-6.
+        let part = if count > 16 * SIZE {
+            spaced((count / 64).max(SIZE))
+        } else {
+            Vec::new()
+        };
+        let equation = Equation {
+            squares: &part,
+            tuning,
+        };
+        let nearer = (mad > 0.0 && !part.is_empty())
+            .then(|| equation.halley_near(mad, equation.at(mad), 1e-3));
+        let start = nearer.flatten().unwrap_or(mad);
+        Self { sample, start }
+    }
+
+    /// `first`: the sums at the start.
+    fn solve(self, squares: &[f64], first: [f64; 3], tuning: &Tuning) -> RobustVariance {
+        let equation = Equation { squares, tuning };
+        let near = if self.start > 0.0 {
+            equation.halley_near(self.start, equation.scaled(first), LAST_OF_HALLEY)
+        } else {
+            None
+        };
+        let (value, status) = near.map_or_else(|| equation.search(), |value| (value, Status::Ok));
+        // Of 4096 a share of a tenth is known to 0.5 %.
+        let is_zero = |y: &&f64| **y <= ZERO * ZERO * value;
+        let zeros = self.sample.iter().filter(is_zero).count() as f64;
+        RobustVariance {
+            value,
+            status,
+            zeros: zeros / self.sample.len() as f64,
+        }
     }
 }
 
@@ -135,6 +185,8 @@ const STEP: f64 = 1.25;
 const DEPTH: f64 = 16.0;
 /// A Newton step this small leaves an error of its square.
 const LAST_STEP: f64 = 1e-7;
+/// A step of Halley's this small leaves an error of its cube.
+const LAST_OF_HALLEY: f64 = 1e-5;
 
 /// g(s) = mean chi(W/√s) − a = 0.
 struct Equation<'a> {
@@ -143,31 +195,37 @@ struct Equation<'a> {
 }
 
 impl Equation<'_> {
-    /// g and dg/d ln s.
-    fn at(&self, s: f64) -> (f64, f64) {
+    /// g and its first two derivatives with respect to ln s.
+    fn at(&self, s: f64) -> [f64; 3] {
         let c2 = self.tuning.c() * self.tuning.c();
         // chi(W/√s) = c² q (1 − q)⁴ with q = W²/(c² s).
-        let (value, slope) = biweight_sums(self.squares, 1.0 / (c2 * s));
-        let scale = c2 / self.squares.len() as f64;
-        (value * scale - self.tuning.a(), slope * scale)
+        self.scaled(biweight_sums(self.squares, 1.0 / (c2 * s)))
     }
 
-    /// Newton's iteration on ln s, kept within one step of the march from the start. `None` when anything
+    fn scaled(&self, sums: [f64; 3]) -> [f64; 3] {
+        let scale = self.tuning.c() * self.tuning.c() / self.squares.len() as f64;
+        let [value, slope, curvature] = sums.map(|sum| sum * scale);
+        [value - self.tuning.a(), slope, curvature]
+    }
+
+    /// Halley's iteration on ln s, kept within one step of the march from the start, where g is `first`. `None` when anything
     /// about it is unusual.
-    fn newton_near(&self, start: f64) -> Option<f64> {
-        let mut u = 0.0_f64;
+    fn halley_near(&self, start: f64, first: [f64; 3], last_step: f64) -> Option<f64> {
+        let (mut u, mut now) = (0.0_f64, first);
         for _ in 0..8 {
-            let (g, slope) = self.at(start * u.exp());
-            let step = -g / slope;
+            let [g, slope, curvature] = now;
+            let newton = -g / slope;
+            let step = newton / (1.0 + 0.5 * newton * curvature / slope);
             u += step;
             // On a rising branch the iteration would go to the spurious root; a far step may have left the
             // branch of the start.
             if slope >= 0.0 || u.abs() > STEP.ln() || !u.is_finite() {
                 return None;
             }
-            if step.abs() < LAST_STEP {
+            if step.abs() < last_step {
                 return Some(start * u.exp());
             }
+            now = self.at(start * u.exp());
         }
         None
     }
@@ -190,9 +248,9 @@ impl Equation<'_> {
             return (0.0, Status::Zero);
         }
         let mut s = start;
-        if self.at(s).0 > 0.0 {
+        if self.at(s)[0] > 0.0 {
             // Ends: chi(r) ≤ r², so g(s) ≤ mean/s − a.
-            while self.at(s * STEP).0 > 0.0 {
+            while self.at(s * STEP)[0] > 0.0 {
                 s *= STEP;
             }
             return (self.falling_edge(s, s * STEP), status);
@@ -200,7 +258,7 @@ impl Equation<'_> {
         let (mut best, mut best_g) = (s, f64::NEG_INFINITY);
         while s > start / DEPTH {
             s /= STEP;
-            let g = self.at(s).0;
+            let g = self.at(s)[0];
             if g > 0.0 {
                 return (self.falling_edge(s, s * STEP), status);
             }
@@ -224,13 +282,13 @@ impl Equation<'_> {
     fn root_above(&self, start: f64, mean: f64) -> Option<f64> {
         // Ends: chi(r) ≤ r², so g(s) ≤ mean/s − a, which is negative beyond mean/a.
         let mut s = start;
-        while self.at(s).0 <= 0.0 {
+        while self.at(s)[0] <= 0.0 {
             s *= STEP;
             if s >= STEP * mean / self.tuning.a() {
                 return None;
             }
         }
-        while self.at(s * STEP).0 > 0.0 {
+        while self.at(s * STEP)[0] > 0.0 {
             s *= STEP;
         }
         Some(self.falling_edge(s, s * STEP))
@@ -242,7 +300,7 @@ impl Equation<'_> {
         let (mut low, mut high) = (low.ln(), high.ln());
         let mut u = 0.5 * (low + high);
         for _ in 0..200 {
-            let (g, slope) = self.at(u.exp());
+            let [g, slope, _] = self.at(u.exp());
             // g > 0 lies on the left of a falling root.
             if g > 0.0 {
                 low = u;
@@ -265,56 +323,77 @@ impl Equation<'_> {
     fn summit(&self, s: f64) -> (f64, f64) {
         // g is flat at its maximum: 1e-7 of ln s is 1e-14 of g, and a comparison of two g tells no more.
         let (u, step) = (s.ln(), STEP.ln());
-        let top = golden_section(u - step, u + step, 1e-7, |u| -self.at(u.exp()).0).exp();
-        (top, self.at(top).0)
+        let top = golden_section(u - step, u + step, 1e-7, |u| -self.at(u.exp())[0]).exp();
+        (top, self.at(top)[0])
     }
 }
 
-/// Σ q(1 − q)₊⁴ with q = k·y over the squares y, and its derivative with respect to −ln k, Σ q(1 − q)₊³(5q −
-/// 1). As k = 1/(c² s), that is the derivative with respect to ln s.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn biweight_sums(squares: &[f64], k: f64) -> (f64, f64) {
-    const WIDTH: usize = 16;
-    const BLOCK: usize = 2048;
+/// Adds Σ q(1 − q)₊⁴ with q = k·y over a block of squares y, and its derivatives with respect to −ln k, Σ q(1 − q)₊³(5q − 1)
+/// and Σ q(1 − q)₊²(25q² − 14q + 1). As k = 1/(c² s), those are the derivatives with respect to ln s.
+#[inline(always)]
+fn add_biweights(sums: &mut [Compensated; 3], block: &[f64], k: f64) {
     #[inline(always)]
-    fn terms(q: f64) -> (f64, f64) {
+    fn terms(q: f64) -> [f64; 3] {
         // A select, not a branch: rejected coefficients add 0, and the loop stays a vector loop.
         let z = if q < 1.0 { 1.0 - q } else { 0.0 };
-        let cube = q * z * z * z;
-        (cube * z, cube * (5.0 * q - 1.0))
+        let square = q * z * z;
+        let [value, slope] = [z * z, z * (5.0 * q - 1.0)];
+        [value, slope, (25.0 * q - 14.0) * q + 1.0].map(|factor| square * factor)
     }
-    let (mut value, mut slope) = (Compensated::default(), Compensated::default());
-    for block in squares.chunks(BLOCK) {
-        let (mut values, mut slopes) = ([0.0; WIDTH], [0.0; WIDTH]);
-        let chunks = block.chunks_exact(WIDTH);
-        let rest = chunks.remainder();
-        for chunk in chunks {
-            let y: [f64; WIDTH] = array(chunk);
-            for i in 0..WIDTH {
-                let (v, s) = terms(k * y[i]);
-                values[i] += v;
-                slopes[i] += s;
-            }
+    let [mut values, mut slopes, mut curvatures] = [[0.0; WIDTH]; 3];
+    let chunks = block.chunks_exact(WIDTH);
+    let rest = chunks.remainder();
+    for chunk in chunks {
+        let y: [f64; WIDTH] = array(chunk);
+        for i in 0..WIDTH {
+            let [value, slope, curvature] = terms(k * y[i]);
+            values[i] += value;
+            slopes[i] += slope;
+            curvatures[i] += curvature;
         }
-        for (i, y) in rest.iter().enumerate() {
-            let (v, s) = terms(k * y);
-            values[i] += v;
-            slopes[i] += s;
-        }
-        value.add(pairwise(&values));
-        slope.add(pairwise(&slopes));
     }
-    (value.value(), slope.value())
+    for (i, y) in rest.iter().enumerate() {
+        let [value, slope, curvature] = terms(k * y);
+        values[i] += value;
+        slopes[i] += slope;
+        curvatures[i] += curvature;
+    }
+    for (sum, lanes) in sums.iter_mut().zip([values, slopes, curvatures]) {
+        sum.add(pairwise(&lanes));
+    }
 }
 
-/// At most 4096 evenly spaced elements, from which the start is taken; all of a short vector.
-fn sample(squares: &[f64]) -> Vec<f64> {
-    const SIZE: usize = 4096;
-    squares
-        .iter()
-        .step_by(squares.len().div_ceil(SIZE).max(1))
-        .copied()
-        .collect()
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn biweight_sums(squares: &[f64], k: f64) -> [f64; 3] {
+    let mut sums: [Compensated; 3] = Default::default();
+    for block in squares.chunks(BLOCK) {
+        add_biweights(&mut sums, block, k);
+    }
+    sums.map(|sum| sum.value())
+}
+
+/// A step of the pyramid, its squares, and their sums while a block of them is in the cache.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn step_measuring(
+    sums: &mut [f64],
+    half: usize,
+    squares: &mut [f64],
+    k: f64,
+    of_squares: &mut [f64; 3],
+) -> f64 {
+    let mut total = Compensated::default();
+    let mut biweights: [Compensated; 3] = Default::default();
+    let mut from = 0;
+    for block in squares.chunks_mut(BLOCK) {
+        let own = &mut sums[from..from + block.len() + half];
+        total.add(butterflies(own, half, |t, values| {
+            block[t..t + values.len()].copy_from_slice(values)
+        }));
+        add_biweights(&mut biweights, block, k);
+        from += block.len();
+    }
+    *of_squares = biweights.map(|sum| sum.value());
+    total.value()
 }
 
 /// (median |W|/0.6745)².
@@ -513,6 +592,7 @@ pub struct Tuning {
     efficiency: f64,
     c: f64,
     a: f64,
+    bias: f64,
     quantization: QuantizationResponse,
 }
 
@@ -557,6 +637,7 @@ impl Tuning {
             efficiency: moments.efficiency(),
             c: high,
             a,
+            bias: moments.bias(),
             quantization: QuantizationResponse::new(high, a),
         })
     }
@@ -575,8 +656,8 @@ impl Tuning {
     /// high): 0.295 at efficiency 0.6, 0 for the classical variance. To second order in the estimating
     /// equation it is 1 + 2 cov(chi, chi')/var chi − E chi''/E chi', derivatives with respect to ln s of
     /// chi(W/√s).
-    pub fn bias(&self) -> f64 {
-        Moments::new(self.c).bias()
+    pub const fn bias(&self) -> f64 {
+        self.bias
     }
 
     /// Response of the robust wavelet variance to quantization noise.
