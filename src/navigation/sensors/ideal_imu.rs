@@ -1,8 +1,8 @@
 //! What a perfect integrating IMU measures along a trajectory.
 
-use crate::earth::{GravityModel, OMEGA_IE, ecef_to_geodetic, gravity_down};
+use crate::earth::{GravityModel, OMEGA_IE, gravity_down, normal};
 use crate::imu::{ImuSample, MAX_RATE_HZ};
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Kinematics, Trajectory};
 use crate::units::Refused;
 use glam::DVec3;
 
@@ -10,15 +10,12 @@ use glam::DVec3;
 /// ([Groves](crate::bibliography::Groves13), eqs. 2.26, 2.125 and 2.147 without inertial frame):
 ///
 /// f_ib_b = C_e_b (a_e + 2 omega_ie_e × v_e − g_e), omega_ib_b = omega_eb_b + C_e_b omega_ie_e.
-fn ideal_imu_at(trajectory: &Trajectory, t_s: f64, gravity: GravityModel) -> ImuSample {
-    let k = trajectory.kinematics(t_s);
+fn ideal_imu_at(k: &Kinematics, gravity: GravityModel) -> ImuSample {
     let omega_ie_e = DVec3::new(0.0, 0.0, OMEGA_IE);
-    let (lat, lon, h) = ecef_to_geodetic(k.r_e);
-    let ((sin_lat, cos_lat), (sin_lon, cos_lon)) = (lat.sin_cos(), lon.sin_cos());
     // Gravity along the normal of the ellipsoid, as the filter has it: its north component is left out on
     // both sides.
-    let down_e = -DVec3::new(cos_lat * cos_lon, cos_lat * sin_lon, sin_lat);
-    let g_e = down_e * gravity_down(gravity, sin_lat, h);
+    let (up_e, h) = normal(k.r_e);
+    let g_e = up_e * -gravity_down(gravity, up_e.z, h);
     let q_e_b = k.q_b_e.conjugate();
     ImuSample {
         omega_ib_b: k.omega_eb_b + q_e_b * omega_ie_e,
@@ -95,10 +92,11 @@ fn add_integral(
     gravity: GravityModel,
 ) {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    let piece = trajectory.piece(middle);
     // Three points are exact for polynomials of degree five within the piece.
     let node = 0.6_f64.sqrt();
     for (x, weight) in [(-node, 5.0 / 9.0), (0.0, 8.0 / 9.0), (node, 5.0 / 9.0)] {
-        let sample = ideal_imu_at(trajectory, middle + half * x, gravity);
+        let sample = ideal_imu_at(&piece.kinematics(middle + half * x), gravity);
         sum.omega_ib_b += sample.omega_ib_b * (weight * half);
         sum.f_ib_b += sample.f_ib_b * (weight * half);
     }
@@ -164,7 +162,7 @@ mod tests {
             let trajectory = through(100, 1.0, |t| {
                 (lat0 + lat_rate * t, lon0 + lon_rate * t, h, DQuat::IDENTITY)
             });
-            let s = ideal_imu_at(&trajectory, 50.25, WGS84);
+            let s = ideal_imu_at(&trajectory.kinematics(50.25), WGS84);
             let lat = lat0 + lat_rate * 50.25;
             let r = radii(lat.sin());
             let v_n = DVec3::new(

@@ -13,7 +13,7 @@ use crate::earth::{MAX_LATITUDE, e_to_n, ecef_to_geodetic, geodetic_to_ecef};
 use crate::frames::{NavState, q_e_n};
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
-use spline::Spline;
+use spline::{Cubic, Spline};
 
 /// The largest rotation between two consecutive samples (rad): 60°. Beyond it the way round is a guess.
 pub const MAX_ROTATION: f64 = 60.0 * DEG;
@@ -182,19 +182,14 @@ impl Trajectory {
 
     /// The motion with respect to the Earth. Outside start and end the first and last pieces continue.
     pub fn kinematics(&self, t_s: f64) -> Kinematics {
-        let ([x, y, z, qx, qy, qz, qw], first, second) = self.curve.at(t_s);
-        let p = DQuat::from_xyzw(qx, qy, qz, qw);
-        let p_dot = DQuat::from_xyzw(first[3], first[4], first[5], first[6]);
-        let norm2 = p.length_squared();
-        // q = p/|p|: the derivative of |p| is along q and has no vector part in q* q̇.
-        // q̇ = ½ q ω (ω in b), hence ω = 2 vec(q* q̇).
-        let rate = p.conjugate() * p_dot;
-        Kinematics {
-            r_e: self.origin_e + DVec3::new(x, y, z),
-            v_e: DVec3::new(first[0], first[1], first[2]),
-            a_e: DVec3::new(second[0], second[1], second[2]),
-            q_b_e: p * norm2.sqrt().recip(),
-            omega_eb_b: rate.xyz() * (2.0 / norm2),
+        self.piece(t_s).kinematics(t_s)
+    }
+
+    /// The part between two knots around `t_s`.
+    pub(crate) fn piece(&self, t_s: f64) -> Piece {
+        Piece {
+            origin_e: self.origin_e,
+            cubic: self.curve.piece(t_s),
         }
     }
 
@@ -209,6 +204,32 @@ impl Trajectory {
             h,
             v_n: e_to_n(lat, lon, k.v_e),
             q_b_n: q_b_n.normalize(),
+        }
+    }
+}
+
+/// A trajectory between two knots, for many instants there.
+pub(crate) struct Piece {
+    origin_e: DVec3,
+    cubic: Cubic<7>,
+}
+
+impl Piece {
+    /// The motion with respect to the Earth.
+    pub(crate) fn kinematics(&self, t_s: f64) -> Kinematics {
+        let [[x, y, z, qx, qy, qz, qw], first, second] = self.cubic.at(t_s);
+        let p = DQuat::from_xyzw(qx, qy, qz, qw);
+        let p_dot = DQuat::from_xyzw(first[3], first[4], first[5], first[6]);
+        let norm2 = p.length_squared();
+        // q = p/|p|: the derivative of |p| is along q and has no vector part in q* q̇.
+        // q̇ = ½ q ω (ω in b), hence ω = 2 vec(q* q̇).
+        let rate = p.conjugate() * p_dot;
+        Kinematics {
+            r_e: self.origin_e + DVec3::new(x, y, z),
+            v_e: DVec3::new(first[0], first[1], first[2]),
+            a_e: DVec3::new(second[0], second[1], second[2]),
+            q_b_e: p * norm2.sqrt().recip(),
+            omega_eb_b: rate.xyz() * (2.0 / norm2),
         }
     }
 }
