@@ -177,7 +177,7 @@ pub(crate) fn normal(r_e: DVec3) -> (DVec3, f64) {
 /// Sine and cosine of the latitude, distance from the axis of the Earth and height (m): two passes of
 /// [Bowring](crate::bibliography::Bowring76), algebraic throughout.
 fn meridian(r_e: DVec3) -> ([f64; 2], f64, f64) {
-    let (p, z) = (r_e.x.hypot(r_e.y), r_e.z);
+    let (p, z) = ((r_e.x * r_e.x + r_e.y * r_e.y).sqrt(), r_e.z);
     let unit = |sine: f64, cosine: f64| {
         let length = (sine * sine + cosine * cosine).sqrt();
         [sine / length, cosine / length]

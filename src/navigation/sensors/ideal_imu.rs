@@ -2,7 +2,7 @@
 
 use crate::earth::{GravityModel, OMEGA_IE, gravity_down, normal};
 use crate::imu::{ImuSample, MAX_RATE_HZ};
-use crate::trajectory::{Kinematics, Trajectory};
+use crate::trajectory::{Kinematics, Piece, Trajectory};
 use crate::units::Refused;
 use glam::DVec3;
 
@@ -37,70 +37,100 @@ pub fn ideal_imu(
     rate_hz: f64,
     gravity: GravityModel,
 ) -> Result<Vec<ImuSample>, Refused> {
-    if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
-        return Err(Refused(format!(
-            "IMU rate {rate_hz} Hz is not a number > 0 and ≤ {MAX_RATE_HZ}"
-        )));
-    }
-    let start_s = trajectory.start_s();
-    let duration_s = trajectory.end_s() - start_s;
-    // A duration of 900 s at 100 Hz is 90000 samples, also when it was written 899.9999999 s.
-    let n = (duration_s * rate_hz + 1e-6).floor() as usize;
-    if n == 0 {
-        return Err(Refused(format!(
-            "the trajectory lasts {duration_s} s: less than one sample at {rate_hz} Hz"
-        )));
-    }
-    let instant = |k: usize| start_s + k as f64 / rate_hz;
-    let mut knots = trajectory.knots();
-    Ok((0..n)
-        .map(|k| mean(trajectory, instant(k), instant(k + 1), &mut knots, gravity))
-        .collect())
+    Ok(IdealSamples::new(trajectory, rate_hz, gravity)?.collect())
 }
 
-/// Mean over (from, to]; `knots` loses those before `to`.
-fn mean(
-    trajectory: &Trajectory,
-    from: f64,
-    to: f64,
-    knots: &mut &[f64],
+/// The samples of [`ideal_imu`] one after the other.
+pub(crate) struct IdealSamples<'a> {
+    trajectory: &'a Trajectory,
+    rate_hz: f64,
     gravity: GravityModel,
-) -> ImuSample {
-    let mut sum = ImuSample::default();
-    let mut left = from;
-    // A cubic spline has a jump of its third derivative at a knot: quadrature across it would lose its order.
-    while let Some((&knot, rest)) = knots.split_first().filter(|(knot, _)| **knot < to) {
-        if knot > left {
-            add_integral(&mut sum, trajectory, left, knot, gravity);
-            left = knot;
+    /// Those that are still to come.
+    knots: &'a [f64],
+    /// The motion up to the first of them.
+    piece: Piece,
+    samples: std::ops::Range<usize>,
+}
+
+impl<'a> IdealSamples<'a> {
+    /// As [`ideal_imu`].
+    pub(crate) fn new(
+        trajectory: &'a Trajectory,
+        rate_hz: f64,
+        gravity: GravityModel,
+    ) -> Result<Self, Refused> {
+        if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
+            return Err(Refused(format!(
+                "IMU rate {rate_hz} Hz is not a number > 0 and ≤ {MAX_RATE_HZ}"
+            )));
         }
-        *knots = rest;
+        let duration_s = trajectory.end_s() - trajectory.start_s();
+        // A duration of 900 s at 100 Hz is 90000 samples, also when it was written 899.9999999 s.
+        let n = (duration_s * rate_hz + 1e-6).floor() as usize;
+        if n == 0 {
+            return Err(Refused(format!(
+                "the trajectory lasts {duration_s} s: less than one sample at {rate_hz} Hz"
+            )));
+        }
+        Ok(Self {
+            trajectory,
+            rate_hz,
+            gravity,
+            knots: &trajectory.knots()[1..],
+            piece: trajectory.piece(trajectory.start_s()),
+            samples: 0..n,
+        })
     }
-    add_integral(&mut sum, trajectory, left, to, gravity);
-    let dt = to - from;
-    ImuSample {
-        omega_ib_b: sum.omega_ib_b / dt,
-        f_ib_b: sum.f_ib_b / dt,
+
+    /// Mean over (from, to].
+    fn mean(&mut self, from: f64, to: f64) -> ImuSample {
+        let mut sum = ImuSample::default();
+        let mut left = from;
+        // A cubic spline has a jump of its third derivative at a knot: quadrature across it would lose its order.
+        while let Some((&knot, rest)) = self.knots.split_first().filter(|(knot, _)| **knot < to) {
+            if knot > left {
+                self.add_integral(&mut sum, left, knot);
+                left = knot;
+            }
+            self.knots = rest;
+            self.piece = self.trajectory.piece(knot);
+        }
+        self.add_integral(&mut sum, left, to);
+        let dt = to - from;
+        ImuSample {
+            omega_ib_b: sum.omega_ib_b / dt,
+            f_ib_b: sum.f_ib_b / dt,
+        }
+    }
+
+    fn add_integral(&self, sum: &mut ImuSample, from: f64, to: f64) {
+        let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+        // Three points are exact for polynomials of degree five within the piece.
+        let node = 0.6_f64.sqrt();
+        for (x, weight) in [(-node, 5.0 / 9.0), (0.0, 8.0 / 9.0), (node, 5.0 / 9.0)] {
+            let sample = ideal_imu_at(&self.piece.kinematics(middle + half * x), self.gravity);
+            sum.omega_ib_b += sample.omega_ib_b * (weight * half);
+            sum.f_ib_b += sample.f_ib_b * (weight * half);
+        }
     }
 }
 
-fn add_integral(
-    sum: &mut ImuSample,
-    trajectory: &Trajectory,
-    from: f64,
-    to: f64,
-    gravity: GravityModel,
-) {
-    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-    let piece = trajectory.piece(middle);
-    // Three points are exact for polynomials of degree five within the piece.
-    let node = 0.6_f64.sqrt();
-    for (x, weight) in [(-node, 5.0 / 9.0), (0.0, 8.0 / 9.0), (node, 5.0 / 9.0)] {
-        let sample = ideal_imu_at(&piece.kinematics(middle + half * x), gravity);
-        sum.omega_ib_b += sample.omega_ib_b * (weight * half);
-        sum.f_ib_b += sample.f_ib_b * (weight * half);
+impl Iterator for IdealSamples<'_> {
+    type Item = ImuSample;
+
+    fn next(&mut self) -> Option<ImuSample> {
+        let k = self.samples.next()?;
+        let start_s = self.trajectory.start_s();
+        let [from, to] = [k, k + 1].map(|k| start_s + k as f64 / self.rate_hz);
+        Some(self.mean(from, to))
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        self.samples.size_hint()
     }
 }
+
+impl ExactSizeIterator for IdealSamples<'_> {}
 
 #[cfg(test)]
 mod tests {
