@@ -191,11 +191,14 @@ pub fn line_minimum(low: f64, high: f64, tolerance: f64, f: impl Fn(f64) -> f64)
         }
     }
     // A relative tolerance of 0: beside 0 it would be none, and the variables here are of the order of 1.
-    let run = Executor::new(Line(f), BrentOpt::new(low, high).set_tolerance(0.0, tolerance))
-        .configure(|state| state.max_iters(MOST_ITERATIONS))
-        .timer(false)
-        .run()
-        .expect("no step fails");
+    let run = Executor::new(
+        Line(f),
+        BrentOpt::new(low, high).set_tolerance(0.0, tolerance),
+    )
+    .configure(|state| state.max_iters(MOST_ITERATIONS))
+    .timer(false)
+    .run()
+    .expect("no step fails");
     let best = run.state.get_best_param();
     best.copied().unwrap_or(0.5 * (low + high))
 }

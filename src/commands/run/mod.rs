@@ -194,7 +194,9 @@ impl Shared {
             ..scenario.clone()
         };
         let mut known = lock(&self.tracks);
-        let found = known.iter().find(|(of, with, _)| of == path && *with == key);
+        let found = known
+            .iter()
+            .find(|(of, with, _)| of == path && *with == key);
         if let Some((_, _, track)) = found {
             return track.clone();
         }
@@ -608,15 +610,7 @@ pub fn navigate(
         merged: track.merged(),
         track,
     };
-    with_runs(
-        inputs,
-        scenario,
-        outages,
-        &filter,
-        seed,
-        None,
-        context,
-    )
+    with_runs(inputs, scenario, outages, &filter, seed, None, context)
 }
 
 /// The same of a filter along its track, with runs that were made already.
@@ -897,7 +891,8 @@ pub(crate) fn reduction_of(
     }
     let quality = ReductionQuality::of(
         &filter.assess(belief, model),
-        full.map(|full| assess(filter.track(), full, model)).as_ref(),
+        full.map(|full| assess(filter.track(), full, model))
+            .as_ref(),
     );
     context.remark(reduction_line(&quality));
     context.warn_each(reduction_doubt(&quality));

@@ -156,12 +156,7 @@ impl<'a> Plan<'a> {
 
     /// What the IMU feels over a sample, as it is in its middle.
     pub(super) fn felt(&self, sample: usize) -> Surroundings {
-        felt(
-            self.experiment,
-            sample,
-            &self.ideal[sample],
-            &self.ideal[0],
-        )
+        felt(self.experiment, sample, &self.ideal[sample], &self.ideal[0])
     }
 
     /// IMU samples of one run.

@@ -5,9 +5,10 @@
 //! step, of 9 × 9 and 9 × signals, meet rows without a gap.
 
 use super::pass::add_scaled;
-use super::track::{NAV, Nav, Row, Sides, Step};
+use super::track::{NAV, Nav, Row, SIGNALS, Sides, Step};
 use crate::lanes::{Kernel, LANES, Lanes, Level, Wide, dispatch};
 use crate::simulation::BIASES;
+use std::ops::Range;
 
 /// Covariance of z = \[x; b\] jointly with states t that no measurement corrects.
 ///
@@ -28,6 +29,7 @@ pub(super) struct Joint<'a> {
     pub elapsed: f64,
     level: Level,
     /// What a step computes on the way, and a measurement.
+    means: Vec<Lanes>,
     scratch: Vec<Lanes>,
     measured: Measured,
 }
@@ -73,6 +75,7 @@ impl<'a> Joint<'a> {
             tt: states[nb..].iter().map(|s| s.initial).collect(),
             elapsed: 0.0,
             level: Level::best(),
+            means: vec![Lanes::ZERO; states.len() * sides.signals.div_ceil(LANES)],
             scratch: vec![Lanes::ZERO; sides.signals * (width + tail) + NAV * tail],
             measured,
         }
@@ -137,7 +140,11 @@ impl<'a> Joint<'a> {
         self.measured.form.clear();
         // Most measurements are of the navigation error alone.
         if row.is_of_states(self.sides) {
-            let coefficients = self.sides.states.iter().map(|s| row.coefficient(s, self.elapsed));
+            let coefficients = self
+                .sides
+                .states
+                .iter()
+                .map(|s| row.coefficient(s, self.elapsed));
             let all = coefficients.enumerate().filter(|(_, h)| *h != 0.0);
             self.measured.form.extend(all);
         }
@@ -146,7 +153,12 @@ impl<'a> Joint<'a> {
     /// A linear form of a mean of x and of the states, at the row that was measured last.
     pub(super) fn value_of_mean(&self, row: &Row, x: &Nav, states: &[f64]) -> f64 {
         let of_x: f64 = x.iter().zip(&row.h).map(|(x, h)| x * h).sum();
-        of_x + self.measured.form.iter().map(|(j, h)| h * states[*j]).sum::<f64>()
+        of_x + self
+            .measured
+            .form
+            .iter()
+            .map(|(j, h)| h * states[*j])
+            .sum::<f64>()
     }
 }
 
@@ -179,9 +191,11 @@ impl Kernel for Propagation<'_, '_> {
             // What is new in the mean of a signal acts as the mean itself: Q = Σ q b bᵀ.
             *at_mut(&mut u_tail[s * tail..], NAV + s) = q_mean[s];
         }
+        let blocks = signals.div_ceil(LANES);
         for j in 0..n {
-            let source = &inputs.sources[j];
-            let (s, mean) = (source.signal, source.mean_after(joint.elapsed));
+            let mean = inputs.sources[j].mean_after(joint.elapsed);
+            let s = inputs.sources[j].signal;
+            *at_mut(&mut joint.means[j * blocks..], s) = mean;
             if mean == 0.0 {
                 continue;
             }
@@ -195,25 +209,25 @@ impl Kernel for Propagation<'_, '_> {
                 // The states t are independent: of column j only its own variance feeds its signal.
                 *at_mut(&mut u[s * width..], j) += mean * joint.tt[j - nb];
             }
-            for k in 0..NAV {
-                *at_mut(&mut tails[k * tail..], NAV + s) +=
-                    mean * at(&joint.xs[k * width..][..width], j);
+        }
+        let means = &joint.means;
+        // In the columns of b the signals' means have a part of t as well.
+        for i in 0..nb {
+            let sums = sums::<W>(means, blocks, &joint.bs[i * width..][..width], nb..n);
+            for s in 0..signals {
+                *at_mut(&mut u[s * width..], i) += at(&sums, s);
             }
         }
-        // The rows of t in the sums above: a state t is in the signals' means with those of b.
-        for i in 0..nb {
-            for j in nb..n {
-                let source = &inputs.sources[j];
-                let covariance = at(&joint.bs[i * width..][..width], j);
-                *at_mut(&mut u[source.signal * width..], i) +=
-                    source.mean_after(joint.elapsed) * covariance;
+        for k in 0..NAV {
+            let sums = sums::<W>(means, blocks, &joint.xs[k * width..][..width], 0..n);
+            for s in 0..signals {
+                *at_mut(&mut tails[k * tail..], NAV + s) = at(&sums, s);
             }
         }
         for s in 0..signals {
-            for j in 0..n {
-                let source = &inputs.sources[j];
-                *at_mut(&mut u_tail[s * tail..], NAV + source.signal) +=
-                    source.mean_after(joint.elapsed) * at(&u[s * width..][..width], j);
+            let sums = sums::<W>(means, blocks, &u[s * width..][..width], 0..n);
+            for other in 0..signals {
+                *at_mut(&mut u_tail[s * tail..], NAV + other) += at(&sums, other);
             }
         }
         for k in 0..NAV {
@@ -263,20 +277,38 @@ impl Kernel for Propagation<'_, '_> {
             let (source, p) = (&inputs.sources[j], &mut joint.tt[j - nb]);
             *p = *p * source.decay * source.decay + source.q_state;
         }
-        // Takes the mean of each pair of covariances that should be equal. Rounding makes them unequal, corrections leave
-        // their difference as it is, and over the steps it would grow as the unaided vertical channel does, by e in
-        // some 400 s: after three hours no digit is left.
-        for i in 0..nb {
-            for j in 0..i {
-                let mean = 0.5
-                    * (at(&joint.bs[i * width..][..width], j)
-                        + at(&joint.bs[j * width..][..width], i));
-                *at_mut(&mut joint.bs[i * width..], j) = mean;
-                *at_mut(&mut joint.bs[j * width..], i) = mean;
-            }
-        }
         joint.elapsed += f64::from(step.samples);
     }
+}
+
+/// For each signal the sum over some of its states of their means over the step times what a row has of them. The mean of a
+/// state stands in the lane of its signal.
+#[inline(always)]
+fn sums<W: Wide>(
+    means: &[Lanes],
+    blocks: usize,
+    row: &[Lanes],
+    states: Range<usize>,
+) -> [Lanes; SIGNALS.div_ceil(LANES)] {
+    let mut sums = [Lanes::ZERO; SIGNALS.div_ceil(LANES)];
+    for block in 0..blocks {
+        // Four sums: each product would wait for the one before.
+        let mut parts = [W::from(0.0); 4];
+        let mut first = states.start;
+        while first + 4 <= states.end {
+            for i in 0..4 {
+                let mean = W::load(&means[(first + i) * blocks + block]);
+                parts[i] = mean.mul_add(W::from(at(row, first + i)), parts[i]);
+            }
+            first += 4;
+        }
+        for j in first..states.end {
+            let mean = W::load(&means[j * blocks + block]);
+            parts[0] = mean.mul_add(W::from(at(row, j)), parts[0]);
+        }
+        ((parts[0] + parts[1]) + (parts[2] + parts[3])).store(&mut sums[block]);
+    }
+    sums
 }
 
 /// M times the rows of x plus B times those of the signals, in the place of x.
@@ -302,26 +334,34 @@ fn map<W: Wide>(step: &Step, x: &mut [Lanes], u: &[Lanes], width: usize, signals
     }
 }
 
-/// (A P) Aᵀ of x, symmetric, from the rows of A P in the columns of x and of the signals' means.
+/// (A P) Aᵀ of x from the rows of A P in the columns of x and of the signals' means.
+///
+/// Of each pair of covariances that should be equal the mean is taken. Rounding makes them unequal, corrections leave their
+/// difference as it is, and over the steps it would grow as the unaided vertical channel does, by e in some 400 s: after
+/// three hours no digit is left.
 #[inline(always)]
 fn square<W: Wide>(step: &Step, rows: &[Lanes], width: usize, signals: usize) -> [Nav; NAV] {
     // Columns 0 to 7 are one register, the last one follows from symmetry.
     const LAST: usize = NAV - 1;
-    let mut first = [Lanes::ZERO; NAV];
+    let mut sums = [W::from(0.0); NAV];
     let mut corner = 0.0;
-    for (i, lanes) in first.iter_mut().enumerate() {
-        let row = &rows[i * width..][..width];
-        let mut sum = W::from(0.0);
-        for k in 0..NAV + signals {
-            let column = if k < NAV { &step.m[k] } else { &step.b[k - NAV] };
-            let mut head = Lanes::ZERO;
-            head.0.copy_from_slice(&column[..LAST]);
-            sum = W::load(&head).mul_add(W::from(at(row, k)), sum);
-            if i == LAST {
-                corner += column[LAST] * at(row, k);
-            }
+    for k in 0..NAV + signals {
+        let column = if k < NAV {
+            &step.m[k]
+        } else {
+            &step.b[k - NAV]
+        };
+        let mut head = Lanes::ZERO;
+        head.0.copy_from_slice(&column[..LAST]);
+        let head = W::load(&head);
+        for i in 0..NAV {
+            sums[i] = head.mul_add(W::from(at(&rows[i * width..][..width], k)), sums[i]);
         }
-        sum.store(lanes);
+        corner += column[LAST] * at(&rows[LAST * width..][..width], k);
+    }
+    let mut first = [Lanes::ZERO; NAV];
+    for i in 0..NAV {
+        sums[i].store(&mut first[i]);
     }
     let mut p = [[0.0; NAV]; NAV];
     for i in 0..LAST {
@@ -380,7 +420,8 @@ impl Kernel for Correction<'_, '_, '_> {
             if *j < nb {
                 for c in 0..width {
                     let row = W::load(&joint.bs[j * width + c]);
-                    row.mul_add(W::from(*h), W::load(&with[c])).store(&mut with[c]);
+                    row.mul_add(W::from(*h), W::load(&with[c]))
+                        .store(&mut with[c]);
                 }
             } else {
                 for i in 0..nb {
@@ -428,6 +469,8 @@ impl Kernel for Correction<'_, '_, '_> {
 fn outer<W: Wide>(row: &mut [Lanes], rest: f64, k: f64, gain: &[Lanes], with: &[Lanes]) {
     for c in 0..gain.len() {
         let sum = W::load(&gain[c]).mul_add(W::from(rest), W::load(&row[c]));
-        W::load(&with[c]).mul_add(W::from(-k), sum).store(&mut row[c]);
+        W::load(&with[c])
+            .mul_add(W::from(-k), sum)
+            .store(&mut row[c]);
     }
 }

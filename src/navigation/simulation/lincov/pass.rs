@@ -157,7 +157,7 @@ impl<'a> FilterPass<'a> {
             mark.outages
                 .iter()
                 .for_each(|outage| ends[*outage] = filter.xx);
-            for row in &mark.rows {
+            for row in mark.rows.iter() {
                 innovations.push(filter.measure(row, &mut gains));
             }
             if mark.report {
@@ -455,7 +455,7 @@ pub(crate) fn errors_in_outages(
             // Without a measurement nobody asks for a gain: of the filter's own covariance nothing is needed then.
             let is_blind = !track.marks[way.clone()]
                 .iter()
-                .flat_map(|mark| &mark.rows)
+                .flat_map(|mark| mark.rows.iter())
                 .any(|row| goes_on(&row));
             for (index, (steps, mark)) in way.clone().zip(track.legs(way.clone())) {
                 if !is_blind {
@@ -589,9 +589,7 @@ impl<'a> Errors<'a> {
         };
         let value = self.joint.value_of_mean(row, x, s);
         let states = x.iter_mut().chain(s);
-        states
-            .zip(gains)
-            .for_each(|(state, k)| *state -= k * value);
+        states.zip(gains).for_each(|(state, k)| *state -= k * value);
         variance + value * value
     }
 

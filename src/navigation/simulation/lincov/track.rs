@@ -149,8 +149,8 @@ pub(super) struct Mark {
     pub t_s: f64,
     /// Whether a fix is used.
     pub fix: bool,
-    /// Scalar measurements, in sequence.
-    pub rows: Vec<Row>,
+    /// Scalar measurements, in sequence: the same in each copy of a track.
+    pub rows: Arc<[Row]>,
     pub report: bool,
     /// Outages that end here, before the measurements.
     pub outages: Vec<usize>,
@@ -203,8 +203,7 @@ impl Track {
         let start = trajectory.state(trajectory.start_s());
         let mut line = Linearisation::new(clear, samples, &start, noise_hz);
         let longest = ((STEP_S * experiment.rate_hz).round() as usize).max(1);
-        let (mut steps, mut marks, mut done) =
-            (Vec::new(), Vec::with_capacity(events.len()), 0);
+        let (mut steps, mut marks, mut done) = (Vec::new(), Vec::with_capacity(events.len()), 0);
         for event in &events {
             let samples = event.sample - done;
             // Parts of equal length: what the noise processes do over a step is computed once for each length
@@ -219,7 +218,7 @@ impl Track {
                 after_s: event.sample as f64 / experiment.rate_hz,
                 t_s: event.t_s,
                 fix: event.fix,
-                rows: line.rows(event),
+                rows: line.rows(event).into(),
                 report: event.report,
                 outages: Vec::new(),
                 jacobian: RollPitchYaw::from_quat(event.reference.q_b_n).jacobian_of_psi_n(),
@@ -244,7 +243,8 @@ impl Track {
         for mark in &mut track.marks {
             if Outage::any_withholds(outages, mark.t_s) {
                 mark.fix = false;
-                mark.rows.retain(|row| !row.of_gnss);
+                let goes_on = |row: &&Row| !row.of_gnss;
+                mark.rows = mark.rows.iter().filter(goes_on).copied().collect();
             }
         }
         for (i, outage) in outages.iter().enumerate() {
@@ -259,9 +259,16 @@ impl Track {
     /// The same where a filter believes the vehicle's own measurements to be so much worse; in truth they are as they were.
     pub fn with_aiding_sigmas(&self, factor: f64) -> Self {
         let mut track = self.clone();
-        let rows = track.marks.iter_mut().flat_map(|mark| &mut mark.rows);
-        let aids = rows.filter(|row| matches!(row.what, Measured::Aid(..)));
-        aids.for_each(|row| row.r *= factor * factor);
+        let believed = |row: &Row| match row.what {
+            Measured::Aid(..) => Row {
+                r: row.r * factor * factor,
+                ..*row
+            },
+            _ => *row,
+        };
+        for mark in &mut track.marks {
+            mark.rows = mark.rows.iter().map(believed).collect();
+        }
         track
     }
 
@@ -1320,7 +1327,7 @@ mod outline_tests {
     use crate::noise::Model;
     use crate::scenario::Scenario;
     use crate::sensors::ideal_imu::IdealSamples;
-use crate::sensors::outage::Outage;
+    use crate::sensors::outage::Outage;
     use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
 
     /// A step covers two seconds or five, and every outage begins and ends where it did.
