@@ -17,6 +17,7 @@ use nalgebra::SMatrix;
 use nav_sim::io::trajectory_file;
 use nav_sim::navigation::ekf::{Belief, FilterStates};
 use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::ideal_imu::ideal_imu;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim_navigation::metrics::Budget;
@@ -84,8 +85,14 @@ fn covariance_analysis(c: &mut Criterion) {
     );
     let mut group = c.benchmark_group("lincov-900-s");
     group.sample_size(10);
+    group.bench_function("ideal-imu", |b| {
+        b.iter(|| ideal_imu(black_box(&path), 100.0, scenario.filter.gravity))
+    });
     group.bench_function("track", |b| {
         b.iter(|| scenario.track(black_box(&path), &model, &outages))
+    });
+    group.bench_function("reduction", |b| {
+        b.iter(|| scenario.belief(black_box(&model), &outages, &track))
     });
     group.bench_function("gains-15", |b| {
         b.iter(|| FilterPass::new(black_box(&track), &beliefs[0]))

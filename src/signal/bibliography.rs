@@ -61,6 +61,8 @@ sources! {
     /// J. A. C. Weideman, L. N. Trefethen: *Parabolic and hyperbolic contours for computing the Bromwich integral*,
     /// Math. Comp. 76, 2007.
     WeidemanTrefethen07;
+    /// B. R. Bowring: *Transformation from spatial to geographical coordinates*, Survey Review 23, 1976.
+    Bowring76;
     /// C. F. van Loan: *Computing integrals involving the matrix exponential*, IEEE TAC 23, 1978.
     VanLoan78;
     /// C. L. Lawson, R. J. Hanson: *Solving Least Squares Problems*, 1974 (NNLS).

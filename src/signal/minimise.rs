@@ -1,7 +1,10 @@
 //! Minimisation within bounds: least squares by active sets, and damped Newton steps
 //! ([Levenberg-Marquardt](crate::bibliography::More78)).
 
-use argmin::core::{Error, Executor, IterState, KV, Problem, Solver, State, TerminationReason};
+use argmin::core::{
+    CostFunction, Error, Executor, IterState, KV, Problem, Solver, State, TerminationReason,
+};
+use argmin::solver::brent::BrentOpt;
 
 /// A step this small (natural logarithms, or numbers of the order of 1) is the last.
 const SMALL_STEP: f64 = 1e-11;
@@ -174,6 +177,30 @@ pub fn golden_section(mut low: f64, mut high: f64, tolerance: f64, f: impl Fn(f6
         }
     }
     0.5 * (low + high)
+}
+
+/// Where a smooth function of one variable is least between two points, by parabolas ([`BrentOpt`]): in a quarter of the
+/// evaluations of golden sections.
+pub fn line_minimum(low: f64, high: f64, tolerance: f64, f: impl Fn(f64) -> f64) -> f64 {
+    struct Line<F>(F);
+    impl<F: Fn(f64) -> f64> CostFunction for Line<F> {
+        type Param = f64;
+        type Output = f64;
+        fn cost(&self, x: &f64) -> Result<f64, Error> {
+            Ok(self.0(*x))
+        }
+    }
+    // A relative tolerance of 0: beside 0 it would be none, and the variables here are of the order of 1.
+    let run = Executor::new(
+        Line(f),
+        BrentOpt::new(low, high).set_tolerance(0.0, tolerance),
+    )
+    .configure(|state| state.max_iters(MOST_ITERATIONS))
+    .timer(false)
+    .run()
+    .expect("no step fails");
+    let best = run.state.get_best_param();
+    best.copied().unwrap_or(0.5 * (low + high))
 }
 
 /// Where a condition on a positive number ends to hold, to a relative tolerance.

@@ -12,7 +12,7 @@ use crate::app::{
     Answer, Asked, Command, Context, Failure, Front, Input, Manifest, Refuse, Result, argument,
     is_path, is_repeated, refused,
 };
-use crate::commands::run::{PreparedRun, Run, block_of, columns};
+use crate::commands::run::{PreparedRun, Run, Shared, block_of, columns};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::toml_file::Source;
 use crate::io::{atomic, input, source};
@@ -301,7 +301,7 @@ fn estimate(
     if let Some(unit) = left.first() {
         let cell = unit.cells[0];
         let quiet = Context::new(&(), Some(cell.seed));
-        let prepared = cell.asked.request.prepare(&quiet)?;
+        let prepared = cell.asked.request.prepare(&Shared::default(), &quiet)?;
         let runs = unit.runs.min(8);
         quiet.begin("runs", runs);
         columns(&[&prepared], 0, runs, &quiet)?;
@@ -942,6 +942,7 @@ type Failures = Vec<(String, Failure)>;
 /// Computes the units that are not there and not in work elsewhere, small ones at once, until the context says stop.
 fn work(place: &Place<'_>, own: &[&Unit<'_>], context: &Context<'_>) -> Result<Failures> {
     let (mut failures, front) = (Failures::new(), OfCells(context, Mutex::default()));
+    let shared = Shared::default();
     let todo: Vec<&&Unit<'_>> = own.iter().filter(|unit| !place.has_unit(unit)).collect();
     context.begin("runs", todo.iter().map(|unit| unit.cost()).sum());
     let at_once = |unit: &Unit<'_>| (128 * context.threads() as u64 / unit.runs.max(8)).max(1);
@@ -950,7 +951,7 @@ fn work(place: &Place<'_>, own: &[&Unit<'_>], context: &Context<'_>) -> Result<F
         let (now, later) = rest.split_at(rest.len().min(at_once(first) as usize));
         let computed = now
             .par_iter()
-            .map(|unit| compute(place, unit, context, &front));
+            .map(|unit| compute(place, unit, &shared, context, &front));
         let computed: Vec<Failures> = computed.collect::<Result<_>>()?;
         failures.extend(computed.into_iter().flatten());
         rest = later;
@@ -963,6 +964,7 @@ fn work(place: &Place<'_>, own: &[&Unit<'_>], context: &Context<'_>) -> Result<F
 fn compute(
     place: &Place<'_>,
     unit: &Unit<'_>,
+    shared: &Shared,
     context: &Context<'_>,
     front: &OfCells<'_>,
 ) -> Result<Failures> {
@@ -976,7 +978,7 @@ fn compute(
     let contexts: Vec<Context<'_>> = missing.iter().map(|cell| context_of(cell, front)).collect();
     let mut prepared = Vec::new();
     for (cell, context) in missing.iter().zip(&contexts) {
-        match cell.asked.request.prepare(context) {
+        match cell.asked.request.prepare(shared, context) {
             Ok(run) => prepared.push((*cell, run, context)),
             Err(failure) => failed(cell, failure),
         }
@@ -1073,7 +1075,7 @@ fn assemble(place: &Place<'_>, cell: &Cell, firsts: &[u64], context: &Context<'_
     }
     let front = OfCells(context, Mutex::default());
     let context = context_of(cell, &front);
-    let run = cell.asked.request.prepare(&context)?;
+    let run = cell.asked.request.prepare(&Shared::default(), &context)?;
     write_cell(place, cell, run, whole, &context)?;
     if let Some(parts) = place.part(cell, 0).parent() {
         drop(fs::remove_dir_all(parts));

@@ -867,7 +867,11 @@ fn belief(
         .ok()
         .map(|full| full.with_initial(&beside(states, initial)));
     let made = (&model, &belief, full.as_ref());
-    let quality = reduction_of(made, &track, &Context::default());
+    let quality = reduction_of(
+        made,
+        &lincov::FilterPass::new(&track, made.1),
+        &Context::default(),
+    );
     Ok((belief, quality))
 }
 

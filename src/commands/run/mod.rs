@@ -19,7 +19,7 @@ use nav_sim_navigation::metrics::{
     Summary, epochs, horizontal_quantiles,
 };
 use nav_sim_navigation::monte_carlo;
-use nav_sim_navigation::scenario::{Method, Scenario};
+use nav_sim_navigation::scenario::{FilterSettings, Method, RunSettings, Scenario};
 use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
@@ -32,7 +32,9 @@ use nav_sim_signal::noise::reduction::is_exact;
 use nav_sim_signal::noise::{Model, continuous};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 pub(crate) mod directory;
 mod document;
@@ -137,7 +139,8 @@ impl Command for Run {
     const JUDGES: &'static [&'static str] = &["require"];
 
     fn run(&self, context: &Context<'_>) -> Result<RunAnswer> {
-        self.prepare(context)?.navigate(None, context)
+        self.prepare(&Shared::default(), context)?
+            .navigate(None, context)
     }
 }
 
@@ -147,13 +150,82 @@ pub(crate) struct PreparedRun<'a> {
     inputs: NavigateInputs,
     origin: RunOrigin,
     seed: u64,
+    /// Without its outages.
+    track: SharedTrack,
+    filter: OnceLock<Filter>,
+}
+
+/// A filter along its track, and the same with one step from mark to mark.
+struct Filter {
+    track: Track,
+    merged: Track,
+    belief: Belief,
+}
+
+/// A track without outages, and the same with one step from mark to mark; made where it is needed first.
+type SharedTrack = Arc<OnceLock<[Track; 2]>>;
+
+/// What many runs have in common and is made once: trajectories, and tracks without outages.
+#[derive(Default)]
+pub(crate) struct Shared {
+    trajectories: Mutex<HashMap<PathBuf, Trajectory>>,
+    tracks: Mutex<Vec<(PathBuf, Scenario, SharedTrack)>>,
+}
+
+/// Tracks that are kept at most: a study may vary what they depend on.
+const TRACKS: usize = 4;
+
+impl Shared {
+    fn trajectory(&self, path: &Path, context: &Context<'_>) -> Result<Trajectory> {
+        let mut known = lock(&self.trajectories);
+        if let Some(trajectory) = known.get(path) {
+            return Ok(trajectory.clone());
+        }
+        let trajectory = inputs::trajectory(path, context)?;
+        known.insert(path.to_owned(), trajectory.clone());
+        Ok(trajectory)
+    }
+
+    fn track(&self, path: &Path, scenario: &Scenario) -> SharedTrack {
+        // Outages only take measurements from it, and a filter or a number of runs changes nothing.
+        let key = Scenario {
+            run: RunSettings::default(),
+            filter: FilterSettings {
+                gravity: scenario.filter.gravity,
+                ..FilterSettings::default()
+            },
+            outage: None,
+            ..scenario.clone()
+        };
+        let mut known = lock(&self.tracks);
+        let found = known
+            .iter()
+            .find(|(of, with, _)| of == path && *with == key);
+        if let Some((_, _, track)) = found {
+            return track.clone();
+        }
+        if known.len() == TRACKS {
+            known.remove(0);
+        }
+        let track = SharedTrack::default();
+        known.push((path.to_owned(), key, track.clone()));
+        track
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Run {
     /// Reads the files and places the outages.
-    pub(crate) fn prepare(&self, context: &Context<'_>) -> Result<PreparedRun<'_>> {
+    pub(crate) fn prepare(
+        &self,
+        shared: &Shared,
+        context: &Context<'_>,
+    ) -> Result<PreparedRun<'_>> {
         let mut scenario = self.scenario()?;
-        let (mut inputs, file, made_by) = self.read(&mut scenario, context)?;
+        let (mut inputs, file, made_by) = self.read(&mut scenario, shared, context)?;
         let is_drawn = scenario.run.method != Method::Lincov || scenario.outage_random.is_some();
         let given = context.given_seed().or(scenario.run.seed);
         scenario.run.seed = if is_drawn {
@@ -195,8 +267,10 @@ impl Run {
         Ok(PreparedRun {
             request: self,
             inputs,
+            track: shared.track(&self.trajectory, &origin.configuration),
             origin,
             seed,
+            filter: OnceLock::new(),
         })
     }
 
@@ -233,6 +307,7 @@ impl Run {
     fn read(
         &self,
         scenario: &mut Scenario,
+        shared: &Shared,
         context: &Context<'_>,
     ) -> Result<(NavigateInputs, ModelFile, ModelFile)> {
         let imu_hz = scenario.imu.rate_hz;
@@ -240,7 +315,7 @@ impl Run {
             let file = inputs::model(path, context)?;
             Ok::<_, Failure>((inputs::at_rate(path, &file.model, imu_hz, context)?, file))
         };
-        let trajectory = inputs::trajectory(&self.trajectory, context)?;
+        let trajectory = shared.trajectory(&self.trajectory, context)?;
         let (model, file) = read_model(&self.model)?;
         inputs::expect_turn_on(&mut scenario.initial, file.turn_on, &self.model, context);
         let truth = self.truth.as_deref().map(read_model).transpose()?;
@@ -314,7 +389,7 @@ pub(crate) fn columns(
         context.advance(count * runs.len() as u64);
         return Ok(Some(runs.iter().map(|_| None).collect()));
     };
-    let beliefs = runs.iter().map(|run| Ok(run.filter()?.1));
+    let beliefs = runs.iter().map(|run| Ok(run.filter()?.belief.clone()));
     let (beliefs, outages) = (beliefs.collect::<Result<Vec<_>>>()?, one.outages());
     let inputs = &one.inputs;
     let experiment = one.origin.configuration.experiment(
@@ -345,12 +420,26 @@ impl PreparedRun<'_> {
         noise(self) == noise(other) && self.seed == other.seed
     }
 
-    /// The track and the filter.
-    fn filter(&self) -> Result<(Track, Belief)> {
+    /// The filter along its track, made once.
+    fn filter(&self) -> Result<&Filter> {
+        if self.filter.get().is_none() {
+            // Another thread makes the same.
+            drop(self.filter.set(self.make_filter()?));
+        }
+        Ok(self.filter.get().expect("it has just been made"))
+    }
+
+    fn make_filter(&self) -> Result<Filter> {
         let (scenario, outages) = (&self.origin.configuration, self.outages());
         let (model, request) = (&self.inputs.model, self.request);
         let file = &request.settings.file;
-        let track = scenario.track(&self.inputs.trajectory, model, &outages)?;
+        if self.track.get().is_none() {
+            let track = scenario.track(&self.inputs.trajectory, model, &[])?;
+            let merged = track.merged();
+            drop(self.track.set([track, merged]));
+        }
+        let [track, merged] = self.track.get().expect("it has just been made");
+        let track = track.with_outages(&outages);
         let belief = scenario.belief(model, &outages, &track).map_err(|e| {
             inputs::no_filter(
                 &e,
@@ -359,7 +448,11 @@ impl PreparedRun<'_> {
                 "raise it, or take the full filter (--filter full), which reduces nothing",
             )
         })?;
-        Ok((track, belief))
+        Ok(Filter {
+            track,
+            merged: merged.with_outages(&outages),
+            belief,
+        })
     }
 
     /// Navigates; `sampled`: runs that were made already.
@@ -368,18 +461,21 @@ impl PreparedRun<'_> {
         sampled: Option<RunResult>,
         context: &Context<'_>,
     ) -> Result<RunAnswer> {
-        let (outages, (track, belief)) = (self.outages(), self.filter()?);
+        let (outages, _) = (self.outages(), self.filter()?);
         let Self {
             request,
             inputs,
             mut origin,
             seed,
+            filter,
+            ..
         } = self;
+        let filter = filter.get().expect("it was made above");
         let mut navigation = with_runs(
             &inputs,
             &origin.configuration,
             &outages,
-            (&track, &belief),
+            filter,
             seed,
             sampled,
             context,
@@ -514,18 +610,12 @@ pub fn navigate(
     context: &Context<'_>,
 ) -> Result<Navigation> {
     let track = scenario.track(&inputs.trajectory, &inputs.model, outages)?;
-    with_runs(
-        inputs,
-        scenario,
-        outages,
-        (
-            &track,
-            &scenario.belief(&inputs.model, outages, &track).refuse()?,
-        ),
-        seed,
-        None,
-        context,
-    )
+    let filter = Filter {
+        belief: scenario.belief(&inputs.model, outages, &track).refuse()?,
+        merged: track.merged(),
+        track,
+    };
+    with_runs(inputs, scenario, outages, &filter, seed, None, context)
 }
 
 /// The same of a filter along its track, with runs that were made already.
@@ -533,7 +623,11 @@ fn with_runs(
     inputs: &NavigateInputs,
     scenario: &Scenario,
     outages: &[Outage],
-    (track, belief): (&Track, &Belief),
+    Filter {
+        track,
+        merged,
+        belief,
+    }: &Filter,
     seed: u64,
     runs: Option<RunResult>,
     context: &Context<'_>,
@@ -545,7 +639,7 @@ fn with_runs(
     }
     doubt(inputs, scenario, context);
     // Within 1e-3 the same in a quarter of the time: for what stands beside the figures.
-    let merged = track.merged();
+    let beside = FilterPass::new(merged, belief);
     let full = |model: &Model| {
         scenario
             .with_full_noise()
@@ -555,16 +649,12 @@ fn with_runs(
     let reduction = scenario.filter.states.is_reduced().then(|| {
         reduction_of(
             (&inputs.model, belief, full(&inputs.model).as_ref()),
-            &merged,
+            &beside,
             context,
         )
     });
     // Where the motion hardly shows the heading, no filter of this kind is to be believed.
-    context.warn_each(weak_heading(
-        FilterPass::new(&merged, belief)
-            .yaw_while_measured()
-            .into_iter(),
-    ));
+    context.warn_each(weak_heading(beside.yaw_while_measured().into_iter()));
     let experiment = scenario.experiment(
         &inputs.trajectory,
         inputs.truth(),
@@ -621,11 +711,7 @@ fn with_runs(
     let over_sigma = strapdown_over_sigma(track, belief);
     navigation.summary.strapdown_over_sigma = over_sigma;
     context.warn_each(integration_line(scenario.imu.rate_hz, over_sigma));
-    Analysis {
-        track: &merged,
-        ..analysis
-    }
-    .add_budgets(&mut navigation.summary.outages);
+    analysis.add_budgets(&beside, &mut navigation.summary.outages);
     analysis.add_intervals(&mut navigation.summary.outages, inputs, &full);
     Ok(navigation)
 }
@@ -744,11 +830,10 @@ impl Analysis<'_> {
     }
 
     /// What the errors at the ends of outages are made of.
-    fn add_budgets(&self, outages: &mut [OutageSummary]) {
+    fn add_budgets(&self, filter: &FilterPass<'_>, outages: &mut [OutageSummary]) {
         let Some(model) = self.model else { return };
-        let filter = FilterPass::new(self.track, self.belief);
         let sources = TruthSide::sources(self.experiment, model);
-        let budgets = Budget::at_outage_ends(&filter, &sources);
+        let budgets = Budget::at_outage_ends(filter, &sources);
         for (outage, budget) in outages.iter_mut().zip(budgets) {
             outage.budget = Some(budget);
         }
@@ -803,15 +888,16 @@ impl NavigateInputs {
 /// reduced and of the full filter, if the model has one. None where nothing was lost.
 pub(crate) fn reduction_of(
     (model, belief, full): (&Model, &Belief, Option<&Belief>),
-    track: &Track,
+    filter: &FilterPass<'_>,
     context: &Context<'_>,
 ) -> Option<ReductionQuality> {
     if model.axes.iter().all(is_exact) {
         return None;
     }
     let quality = ReductionQuality::of(
-        &assess(track, belief, model),
-        full.map(|full| assess(track, full, model)).as_ref(),
+        &filter.assess(belief, model),
+        full.map(|full| assess(filter.track(), full, model))
+            .as_ref(),
     );
     context.remark(reduction_line(&quality));
     context.warn_each(reduction_doubt(&quality));

@@ -299,6 +299,9 @@ pub struct QuadraticForm {
     terms: Vec<(f64, f64)>,
 }
 
+/// A quantile is found to this share of itself.
+const QUANTILE: f64 = 1e-12;
+
 /// Weights below this share of the largest are rounding: what they carry is certain.
 const ROUNDING: f64 = 1e-14;
 
@@ -352,25 +355,32 @@ impl QuadraticForm {
 
     /// P(Q ≤ x): the inversion of [Imhof](crate::bibliography::Imhof61).
     pub(crate) fn cdf(&self, x: f64) -> f64 {
+        self.law(x)[0]
+    }
+
+    /// P(Q ≤ x), and its density at x.
+    fn law(&self, x: f64) -> [f64; 2] {
         let x = x - self.certain;
         if x <= 0.0 || self.terms.is_empty() {
-            return f64::from(u8::from(x >= 0.0 && self.terms.is_empty()));
+            let is_sure = x >= 0.0 && self.terms.is_empty();
+            return [f64::from(u8::from(is_sure)), 0.0];
         }
         let far = self.sum(|_, d| d * d) > FAR;
-        let probability = if far {
+        let [probability, density] = if far {
             self.along_line(x)
         } else {
             self.along_parabola(x)
         };
-        probability.clamp(0.0, 1.0)
+        [probability.clamp(0.0, 1.0), density.max(0.0)]
     }
 
-    /// ∫ e^{px} φ(p)/p dp/(2πi) on a parabola around the singularities, all of them on the negative axis, where the
-    /// integrand falls off and no longer oscillates ([Weideman and
+    /// ∫ e^{px} φ(p)/p dp/(2πi), and without the 1/p, on a parabola around the singularities, all of them on the negative
+    /// axis, where the integrand falls off and no longer oscillates ([Weideman and
     /// Trefethen](crate::bibliography::WeidemanTrefethen07), sec. 2).
-    fn along_parabola(&self, x: f64) -> f64 {
+    fn along_parabola(&self, x: f64) -> [f64; 2] {
         let n = f64::from(NODES);
-        let node = |k: u32| {
+        let mut sums = [0.0; 2];
+        for k in 0..NODES / 2 {
             // Midpoints: the rule is symmetric about the real axis and no node lies on it. The constants of
             // the parabola below are the optimal ones for the plain transform; scaled by the number of nodes
             // it follows x through p/x.
@@ -378,14 +388,16 @@ impl QuadraticForm {
             let p = Complex::new(0.1309 - 0.1194 * theta * theta, 0.25 * theta) * n;
             let slope = Complex::new(-0.2388 * theta, 0.25) * n;
             // twice the imaginary part of half the contour
-            (p.exp() * self.transform(p / x) * slope / p).im
-        };
-        2.0 / n * (0..NODES / 2).map(node).sum::<f64>()
+            let node = p.exp() * self.transform(p / x) * slope;
+            sums[0] += (node / p).im;
+            sums[1] += node.im / x;
+        }
+        sums.map(|sum| 2.0 / n * sum)
     }
 
     /// The same on the vertical line through the saddle point, where the shifts make the integrand fall as a normal
     /// density: by the trapezoidal rule, until nothing is added.
-    fn along_line(&self, x: f64) -> f64 {
+    fn along_line(&self, x: f64) -> [f64; 2] {
         let (saddle, width) = self.saddle(x);
         // On a line through the saddle the integrand is like exp(−y²/2) in widths: the trapezoidal rule
         // converges geometrically, and a quarter of a width is exact to rounding.
@@ -393,19 +405,20 @@ impl QuadraticForm {
         let value = |k: u32| {
             let p = Complex::new(saddle, f64::from(k) * step);
             // the transform by its logarithm: beside e^{px} it would be 0
-            ((self.ln_transform_at(p) + p * x).exp() / p).re
+            let value = (self.ln_transform_at(p) + p * x).exp();
+            [(value / p).re, value.re]
         };
         let first = value(0);
-        let mut sum = 0.5 * first;
+        let mut sums = first.map(|value| 0.5 * value);
         for k in 1..LINE_STEPS {
             let next = value(k);
-            sum += next;
+            sums = [sums[0] + next[0], sums[1] + next[1]];
             // The second condition: the integrand oscillates and may pass through zero before it has fallen.
-            if next.abs() < 1e-17 * first && f64::from(k) * LINE_STEP > 8.0 {
+            if next[0].abs() < 1e-17 * first[0] && f64::from(k) * LINE_STEP > 8.0 {
                 break;
             }
         }
-        sum * step / PI
+        sums.map(|sum| sum * step / PI)
     }
 
     /// The least of e^{px} φ(p)/p for p > 0, and the width of the integrand across it. The logarithm is convex there.
@@ -442,8 +455,32 @@ impl QuadraticForm {
         while self.cdf(high) < probability && high < 1e6 * mean {
             (low, high) = (high, 2.0 * high);
         }
-        // Bisection, since near 0 and 1 the distribution function has only its rounding to give to a secant.
-        bisection(low, high, 1e-12, |x| self.cdf(x) < probability)
+        // Newton's steps on ln P over ln x, or on ln (1 − P) over x: the tails of either side are nearly straight there.
+        // Within the bracket, since at its ends the distribution function has only its rounding to give to a step.
+        let mut x = 0.5 * (low + high);
+        while high - low > QUANTILE * high {
+            let [below, density] = self.law(x);
+            if below < probability {
+                low = x
+            } else {
+                high = x
+            }
+            let next = if probability < 0.5 {
+                x * ((probability / below).ln() * below / (density * x)).exp()
+            } else {
+                let beyond = 1.0 - below;
+                x + (beyond / (1.0 - probability)).ln() * beyond / density
+            };
+            if (next - x).abs() <= QUANTILE * x {
+                return next;
+            }
+            x = if low < next && next < high {
+                next
+            } else {
+                0.5 * (low + high)
+            };
+        }
+        x
     }
 
     /// E √Q = π^(−1/2) ∫ (1 − φ(u²)) du/u², with u = e^y by the trapezoidal rule, whose error is e^(−2π²), 3e-9, at most:
@@ -455,20 +492,24 @@ impl QuadraticForm {
             return scale;
         }
         let node = |k: i32| {
-            let y = f64::from(k) * MEAN_STEP;
-            // 1 − φ by its logarithm: where φ is nearly 1 the difference keeps its digits
-            -self.ln_transform((2.0 * y).exp() / scale).exp_m1() * (-y).exp()
+            let u = (f64::from(k) * MEAN_STEP).exp();
+            self.less_than_one(u * u / scale) / u
         };
         scale.sqrt() * MEAN_STEP * (-MEAN_STEPS..=MEAN_STEPS).map(node).sum::<f64>() / PI.sqrt()
     }
 
-    /// ln E e^(−pQ) for p ≥ 0.
-    fn ln_transform(&self, p: f64) -> f64 {
-        let sum = self.sum(|w, d| {
+    /// 1 − E e^(−pQ) for p ≥ 0, with all its digits where it is small.
+    fn less_than_one(&self, p: f64) -> f64 {
+        // E e^(−pQ) = e^(−shift)/√(1 + product): 1 + product of the factors 1 + 2wp, without taking 1 from it.
+        let (mut product, mut shift) = (0.0, self.certain * p);
+        for (w, d) in &self.terms {
             let q = 2.0 * w * p;
-            -0.5 * (q.ln_1p() + d * d * q / (1.0 + q))
-        });
-        sum - self.certain * p
+            product += q + product * q;
+            shift += 0.5 * d * d * q / (1.0 + q);
+        }
+        let root = (1.0 + product).sqrt();
+        let beyond = if shift > 0.0 { (-shift).exp_m1() } else { 0.0 };
+        (product / (1.0 + root) - beyond) / root
     }
 
     /// ln E e^(−p(Q − c)) for a complex p on the right.

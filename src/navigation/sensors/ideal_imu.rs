@@ -1,8 +1,8 @@
 //! What a perfect integrating IMU measures along a trajectory.
 
-use crate::earth::{GravityModel, OMEGA_IE, ecef_to_geodetic, gravity_down};
+use crate::earth::{GravityModel, OMEGA_IE, gravity_down, normal};
 use crate::imu::{ImuSample, MAX_RATE_HZ};
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Kinematics, Piece, Trajectory};
 use crate::units::Refused;
 use glam::DVec3;
 
@@ -10,15 +10,12 @@ use glam::DVec3;
 /// ([Groves](crate::bibliography::Groves13), eqs. 2.26, 2.125 and 2.147 without inertial frame):
 ///
 /// f_ib_b = C_e_b (a_e + 2 omega_ie_e × v_e − g_e), omega_ib_b = omega_eb_b + C_e_b omega_ie_e.
-fn ideal_imu_at(trajectory: &Trajectory, t_s: f64, gravity: GravityModel) -> ImuSample {
-    let k = trajectory.kinematics(t_s);
+fn ideal_imu_at(k: &Kinematics, gravity: GravityModel) -> ImuSample {
     let omega_ie_e = DVec3::new(0.0, 0.0, OMEGA_IE);
-    let (lat, lon, h) = ecef_to_geodetic(k.r_e);
-    let ((sin_lat, cos_lat), (sin_lon, cos_lon)) = (lat.sin_cos(), lon.sin_cos());
     // Gravity along the normal of the ellipsoid, as the filter has it: its north component is left out on
     // both sides.
-    let down_e = -DVec3::new(cos_lat * cos_lon, cos_lat * sin_lon, sin_lat);
-    let g_e = down_e * gravity_down(gravity, sin_lat, h);
+    let (up_e, h) = normal(k.r_e);
+    let g_e = up_e * -gravity_down(gravity, up_e.z, h);
     let q_e_b = k.q_b_e.conjugate();
     ImuSample {
         omega_ib_b: k.omega_eb_b + q_e_b * omega_ie_e,
@@ -40,69 +37,100 @@ pub fn ideal_imu(
     rate_hz: f64,
     gravity: GravityModel,
 ) -> Result<Vec<ImuSample>, Refused> {
-    if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
-        return Err(Refused(format!(
-            "IMU rate {rate_hz} Hz is not a number > 0 and ≤ {MAX_RATE_HZ}"
-        )));
-    }
-    let start_s = trajectory.start_s();
-    let duration_s = trajectory.end_s() - start_s;
-    // A duration of 900 s at 100 Hz is 90000 samples, also when it was written 899.9999999 s.
-    let n = (duration_s * rate_hz + 1e-6).floor() as usize;
-    if n == 0 {
-        return Err(Refused(format!(
-            "the trajectory lasts {duration_s} s: less than one sample at {rate_hz} Hz"
-        )));
-    }
-    let instant = |k: usize| start_s + k as f64 / rate_hz;
-    let mut knots = trajectory.knots();
-    Ok((0..n)
-        .map(|k| mean(trajectory, instant(k), instant(k + 1), &mut knots, gravity))
-        .collect())
+    Ok(IdealSamples::new(trajectory, rate_hz, gravity)?.collect())
 }
 
-/// Mean over (from, to]; `knots` loses those before `to`.
-fn mean(
-    trajectory: &Trajectory,
-    from: f64,
-    to: f64,
-    knots: &mut &[f64],
+/// The samples of [`ideal_imu`] one after the other.
+pub(crate) struct IdealSamples<'a> {
+    trajectory: &'a Trajectory,
+    rate_hz: f64,
     gravity: GravityModel,
-) -> ImuSample {
-    let mut sum = ImuSample::default();
-    let mut left = from;
-    // A cubic spline has a jump of its third derivative at a knot: quadrature across it would lose its order.
-    while let Some((&knot, rest)) = knots.split_first().filter(|(knot, _)| **knot < to) {
-        if knot > left {
-            add_integral(&mut sum, trajectory, left, knot, gravity);
-            left = knot;
+    /// Those that are still to come.
+    knots: &'a [f64],
+    /// The motion up to the first of them.
+    piece: Piece,
+    samples: std::ops::Range<usize>,
+}
+
+impl<'a> IdealSamples<'a> {
+    /// As [`ideal_imu`].
+    pub(crate) fn new(
+        trajectory: &'a Trajectory,
+        rate_hz: f64,
+        gravity: GravityModel,
+    ) -> Result<Self, Refused> {
+        if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
+            return Err(Refused(format!(
+                "IMU rate {rate_hz} Hz is not a number > 0 and ≤ {MAX_RATE_HZ}"
+            )));
         }
-        *knots = rest;
+        let duration_s = trajectory.end_s() - trajectory.start_s();
+        // A duration of 900 s at 100 Hz is 90000 samples, also when it was written 899.9999999 s.
+        let n = (duration_s * rate_hz + 1e-6).floor() as usize;
+        if n == 0 {
+            return Err(Refused(format!(
+                "the trajectory lasts {duration_s} s: less than one sample at {rate_hz} Hz"
+            )));
+        }
+        Ok(Self {
+            trajectory,
+            rate_hz,
+            gravity,
+            knots: &trajectory.knots()[1..],
+            piece: trajectory.piece(trajectory.start_s()),
+            samples: 0..n,
+        })
     }
-    add_integral(&mut sum, trajectory, left, to, gravity);
-    let dt = to - from;
-    ImuSample {
-        omega_ib_b: sum.omega_ib_b / dt,
-        f_ib_b: sum.f_ib_b / dt,
+
+    /// Mean over (from, to].
+    fn mean(&mut self, from: f64, to: f64) -> ImuSample {
+        let mut sum = ImuSample::default();
+        let mut left = from;
+        // A cubic spline has a jump of its third derivative at a knot: quadrature across it would lose its order.
+        while let Some((&knot, rest)) = self.knots.split_first().filter(|(knot, _)| **knot < to) {
+            if knot > left {
+                self.add_integral(&mut sum, left, knot);
+                left = knot;
+            }
+            self.knots = rest;
+            self.piece = self.trajectory.piece(knot);
+        }
+        self.add_integral(&mut sum, left, to);
+        let dt = to - from;
+        ImuSample {
+            omega_ib_b: sum.omega_ib_b / dt,
+            f_ib_b: sum.f_ib_b / dt,
+        }
+    }
+
+    fn add_integral(&self, sum: &mut ImuSample, from: f64, to: f64) {
+        let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+        // Three points are exact for polynomials of degree five within the piece.
+        let node = 0.6_f64.sqrt();
+        for (x, weight) in [(-node, 5.0 / 9.0), (0.0, 8.0 / 9.0), (node, 5.0 / 9.0)] {
+            let sample = ideal_imu_at(&self.piece.kinematics(middle + half * x), self.gravity);
+            sum.omega_ib_b += sample.omega_ib_b * (weight * half);
+            sum.f_ib_b += sample.f_ib_b * (weight * half);
+        }
     }
 }
 
-fn add_integral(
-    sum: &mut ImuSample,
-    trajectory: &Trajectory,
-    from: f64,
-    to: f64,
-    gravity: GravityModel,
-) {
-    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-    // Three points are exact for polynomials of degree five within the piece.
-    let node = 0.6_f64.sqrt();
-    for (x, weight) in [(-node, 5.0 / 9.0), (0.0, 8.0 / 9.0), (node, 5.0 / 9.0)] {
-        let sample = ideal_imu_at(trajectory, middle + half * x, gravity);
-        sum.omega_ib_b += sample.omega_ib_b * (weight * half);
-        sum.f_ib_b += sample.f_ib_b * (weight * half);
+impl Iterator for IdealSamples<'_> {
+    type Item = ImuSample;
+
+    fn next(&mut self) -> Option<ImuSample> {
+        let k = self.samples.next()?;
+        let start_s = self.trajectory.start_s();
+        let [from, to] = [k, k + 1].map(|k| start_s + k as f64 / self.rate_hz);
+        Some(self.mean(from, to))
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        self.samples.size_hint()
     }
 }
+
+impl ExactSizeIterator for IdealSamples<'_> {}
 
 #[cfg(test)]
 mod tests {
@@ -164,7 +192,7 @@ mod tests {
             let trajectory = through(100, 1.0, |t| {
                 (lat0 + lat_rate * t, lon0 + lon_rate * t, h, DQuat::IDENTITY)
             });
-            let s = ideal_imu_at(&trajectory, 50.25, WGS84);
+            let s = ideal_imu_at(&trajectory.kinematics(50.25), WGS84);
             let lat = lat0 + lat_rate * 50.25;
             let r = radii(lat.sin());
             let v_n = DVec3::new(

@@ -9,7 +9,6 @@ use crate::noise::continuous::same_rate;
 use crate::sensors::aiding::{Aid, AidingSettings};
 use crate::sensors::defects::{ImuSettings, Surroundings};
 use crate::sensors::gnss::{BaroSettings, GnssSettings};
-use crate::sensors::ideal_imu::ideal_imu;
 use crate::sensors::imu::{Truth, TruthError, best_spans};
 use crate::sensors::outage::Outage;
 use crate::strapdown::MAX_ROTATION;
@@ -17,7 +16,7 @@ use crate::trajectory::Trajectory;
 use crate::units::{DEG, Refused};
 use glam::DVec3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// One experiment: a trajectory, what makes the errors, what filters believe, what is measured when.
 #[derive(Debug, Clone)]
@@ -108,7 +107,7 @@ pub(super) struct Event {
 #[derive(Debug)]
 pub struct Plan<'a> {
     pub(crate) experiment: &'a Experiment<'a>,
-    pub(super) ideal: Vec<ImuSample>,
+    pub(super) ideal: Arc<Vec<ImuSample>>,
     /// Averaging times of recordings that make the inertial errors.
     pub(super) spans: Vec<[usize; 6]>,
     pub(super) start: NavState,
@@ -136,41 +135,25 @@ impl<'a> Plan<'a> {
                 ));
             }
         }
-        let plan = Self::reference(experiment)?;
-        experiment.truth.check(rate_hz, plan.samples())?;
-        Ok(Self {
-            spans: best_spans(&experiment.truth),
-            ..plan
-        })
-    }
-
-    /// The same for a covariance analysis, which draws no error: models may belong to another rate.
-    ///
-    /// # Errors
-    /// What does not fit, with values.
-    pub(super) fn reference(experiment: &'a Experiment<'a>) -> Result<Self, ExperimentError> {
         let Experiment {
             trajectory,
-            rate_hz,
             gravity,
             ..
         } = *experiment;
-        let ideal = ideal_imu(trajectory, rate_hz, gravity)?;
-        check_rotation(&ideal, trajectory.start_s(), rate_hz)?;
+        let ideal = trajectory.ideal(rate_hz, gravity)?;
+        for (k, sample) in ideal.iter().enumerate() {
+            check_rotation(experiment, k, sample)?;
+        }
         let events = schedule(experiment, ideal.len())?;
-        let start = trajectory.state(trajectory.start_s());
-        let outages = experiment
-            .outages
-            .iter()
-            .map(|o| effects(o, &events))
-            .collect();
+        experiment.truth.check(rate_hz, ideal.len())?;
+        let outages = experiment.outages.iter();
         Ok(Self {
             experiment,
             ideal,
-            spans: Vec::new(),
-            start,
+            spans: best_spans(&experiment.truth),
+            start: trajectory.state(trajectory.start_s()),
+            outages: outages.map(|o| effects(o, &events)).collect(),
             events,
-            outages,
             coverage_quantile: experiment.coverage_quantile(),
             decision: OnceLock::new(),
         })
@@ -183,14 +166,7 @@ impl<'a> Plan<'a> {
 
     /// What the IMU feels over a sample, as it is in its middle.
     pub(super) fn felt(&self, sample: usize) -> Surroundings {
-        let t_s =
-            self.experiment.trajectory.start_s() + (sample as f64 + 0.5) / self.experiment.rate_hz;
-        Surroundings::at(
-            self.experiment.defects,
-            &self.ideal[sample],
-            t_s,
-            &self.ideal[0],
-        )
+        felt(self.experiment, sample, &self.ideal[sample], &self.ideal[0])
     }
 
     /// IMU samples of one run.
@@ -208,23 +184,40 @@ fn effects(outage: &Outage, events: &[Event]) -> (f64, usize) {
     (reports as f64, first_fix.unwrap_or(events.len() - 1))
 }
 
-fn check_rotation(ideal: &[ImuSample], start_s: f64, rate_hz: f64) -> Result<(), ExperimentError> {
-    let mut angles = ideal
-        .iter()
-        .map(|s| s.omega_ib_b.length() / rate_hz)
-        .enumerate();
-    let too_fast = angles.find(|(_, angle)| *angle > MAX_ROTATION);
-    too_fast.map_or(Ok(()), |(k, angle)| {
-        let (t_s, most) = (start_s + k as f64 / rate_hz, MAX_ROTATION / DEG);
-        let angle = angle / DEG;
-        refused(format!(
-            "the vehicle turns {angle:.1}° within one IMU sample at {t_s} s; at most {most:.1}° can be followed at {rate_hz} Hz"
-        ))
-    })
+/// What the IMU of an experiment feels over a sample, as it is in its middle; `first` is the first sample.
+pub(super) fn felt(
+    experiment: &Experiment<'_>,
+    index: usize,
+    sample: &ImuSample,
+    first: &ImuSample,
+) -> Surroundings {
+    let t_s = experiment.trajectory.start_s() + (index as f64 + 0.5) / experiment.rate_hz;
+    Surroundings::at(experiment.defects, sample, t_s, first)
+}
+
+/// Refuses a sample in which the vehicle turns too fast for the strapdown.
+pub(super) fn check_rotation(
+    experiment: &Experiment<'_>,
+    index: usize,
+    sample: &ImuSample,
+) -> Result<(), ExperimentError> {
+    let rate_hz = experiment.rate_hz;
+    let angle = sample.omega_ib_b.length() / rate_hz;
+    if angle <= MAX_ROTATION {
+        return Ok(());
+    }
+    let t_s = experiment.trajectory.start_s() + index as f64 / rate_hz;
+    let (angle, most) = (angle / DEG, MAX_ROTATION / DEG);
+    refused(format!(
+        "the vehicle turns {angle:.1}° within one IMU sample at {t_s} s; at most {most:.1}° can be followed at {rate_hz} Hz"
+    ))
 }
 
 /// Reports at every second from the start, fixes at every GNSS epoch after it, in time order.
-fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, ExperimentError> {
+pub(super) fn schedule(
+    experiment: &Experiment<'_>,
+    samples: usize,
+) -> Result<Vec<Event>, ExperimentError> {
     let Experiment {
         trajectory,
         rate_hz,

@@ -9,11 +9,14 @@ pub mod profile;
 pub mod reference;
 mod spline;
 
-use crate::earth::{MAX_LATITUDE, e_to_n, ecef_to_geodetic, geodetic_to_ecef};
+use crate::earth::{GravityModel, MAX_LATITUDE, e_to_n, ecef_to_geodetic, geodetic_to_ecef};
 use crate::frames::{NavState, q_e_n};
-use crate::units::DEG;
+use crate::imu::ImuSample;
+use crate::sensors::ideal_imu::ideal_imu;
+use crate::units::{DEG, Refused};
 use glam::{DQuat, DVec3};
-use spline::Spline;
+use spline::{Cubic, Spline};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The largest rotation between two consecutive samples (rad): 60°. Beyond it the way round is a guess.
 pub const MAX_ROTATION: f64 = 60.0 * DEG;
@@ -120,7 +123,9 @@ pub struct Kinematics {
 #[derive(Debug, Clone)]
 pub struct Trajectory {
     origin_e: DVec3,
-    curve: Spline<7>,
+    curve: Arc<Spline<7>>,
+    /// What was asked for last, for all clones: runs along one trajectory have one ideal IMU.
+    ideal: Arc<Mutex<Option<(f64, GravityModel, Arc<Vec<ImuSample>>)>>>,
 }
 
 impl Trajectory {
@@ -151,10 +156,7 @@ impl Trajectory {
             values.push([r.x, r.y, r.z, q.x, q.y, q.z, q.w]);
         }
         let t_s = samples.iter().map(|s| s.t_s).collect();
-        Ok(Self {
-            origin_e,
-            curve: Spline::not_a_knot(t_s, values),
-        })
+        Ok(Self::of(origin_e, Spline::not_a_knot(t_s, values)))
     }
 
     /// Time of the first sample (s).
@@ -174,27 +176,47 @@ impl Trajectory {
 
     /// The same motion as far as its first sample at or after `t_s`.
     pub fn until(&self, t_s: f64) -> Self {
+        Self::of(self.origin_e, self.curve.until(t_s))
+    }
+
+    fn of(origin_e: DVec3, curve: Spline<7>) -> Self {
         Self {
-            origin_e: self.origin_e,
-            curve: self.curve.until(t_s),
+            origin_e,
+            curve: Arc::new(curve),
+            ideal: Arc::default(),
         }
+    }
+
+    /// The samples of [`ideal_imu`], computed once for many runs.
+    ///
+    /// # Errors
+    /// As [`ideal_imu`].
+    pub fn ideal(
+        &self,
+        rate_hz: f64,
+        gravity: GravityModel,
+    ) -> Result<Arc<Vec<ImuSample>>, Refused> {
+        let mut last = self.ideal.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((rate, model, samples)) = &*last
+            && (*rate, *model) == (rate_hz, gravity)
+        {
+            return Ok(samples.clone());
+        }
+        let samples = Arc::new(ideal_imu(self, rate_hz, gravity)?);
+        *last = Some((rate_hz, gravity, samples.clone()));
+        Ok(samples)
     }
 
     /// The motion with respect to the Earth. Outside start and end the first and last pieces continue.
     pub fn kinematics(&self, t_s: f64) -> Kinematics {
-        let ([x, y, z, qx, qy, qz, qw], first, second) = self.curve.at(t_s);
-        let p = DQuat::from_xyzw(qx, qy, qz, qw);
-        let p_dot = DQuat::from_xyzw(first[3], first[4], first[5], first[6]);
-        let norm2 = p.length_squared();
-        // q = p/|p|: the derivative of |p| is along q and has no vector part in q* q̇.
-        // q̇ = ½ q ω (ω in b), hence ω = 2 vec(q* q̇).
-        let rate = p.conjugate() * p_dot;
-        Kinematics {
-            r_e: self.origin_e + DVec3::new(x, y, z),
-            v_e: DVec3::new(first[0], first[1], first[2]),
-            a_e: DVec3::new(second[0], second[1], second[2]),
-            q_b_e: p * norm2.sqrt().recip(),
-            omega_eb_b: rate.xyz() * (2.0 / norm2),
+        self.piece(t_s).kinematics(t_s)
+    }
+
+    /// The part between two knots around `t_s`.
+    pub(crate) fn piece(&self, t_s: f64) -> Piece {
+        Piece {
+            origin_e: self.origin_e,
+            cubic: self.curve.piece(t_s),
         }
     }
 
@@ -209,6 +231,32 @@ impl Trajectory {
             h,
             v_n: e_to_n(lat, lon, k.v_e),
             q_b_n: q_b_n.normalize(),
+        }
+    }
+}
+
+/// A trajectory between two knots, for many instants there.
+pub(crate) struct Piece {
+    origin_e: DVec3,
+    cubic: Cubic<7>,
+}
+
+impl Piece {
+    /// The motion with respect to the Earth.
+    pub(crate) fn kinematics(&self, t_s: f64) -> Kinematics {
+        let [[x, y, z, qx, qy, qz, qw], first, second] = self.cubic.at(t_s);
+        let p = DQuat::from_xyzw(qx, qy, qz, qw);
+        let p_dot = DQuat::from_xyzw(first[3], first[4], first[5], first[6]);
+        let norm2 = p.length_squared();
+        // q = p/|p|: the derivative of |p| is along q and has no vector part in q* q̇.
+        // q̇ = ½ q ω (ω in b), hence ω = 2 vec(q* q̇).
+        let rate = p.conjugate() * p_dot;
+        Kinematics {
+            r_e: self.origin_e + DVec3::new(x, y, z),
+            v_e: DVec3::new(first[0], first[1], first[2]),
+            a_e: DVec3::new(second[0], second[1], second[2]),
+            q_b_e: p * norm2.sqrt().recip(),
+            omega_eb_b: rate.xyz() * (2.0 / norm2),
         }
     }
 }

@@ -72,25 +72,58 @@ impl<const N: usize> Spline<N> {
     }
 
     /// Value, first and second derivative. Outside the knots the first and last pieces continue.
-    pub(super) fn at(&self, t: f64) -> ([f64; N], [f64; N], [f64; N]) {
+    #[cfg(test)]
+    fn at(&self, t: f64) -> [[f64; N]; 3] {
+        self.piece(t).at(t)
+    }
+
+    /// The cubic at `t`; the first and last outside the knots.
+    pub(super) fn piece(&self, t: f64) -> Cubic<N> {
         let i = self
             .t
             .partition_point(|&knot| knot <= t)
             .clamp(1, self.t.len() - 1)
             - 1;
         let h = self.t[i + 1] - self.t[i];
-        let dt = t - self.t[i];
-        let (mut value, mut first, mut second) = ([0.0; N], [0.0; N], [0.0; N]);
+        let mut cubic = Cubic {
+            begin: self.t[i],
+            value: self.y[i],
+            slope: [0.0; N],
+            second: self.m[i],
+            third: [0.0; N],
+        };
         for k in 0..N {
             let (m0, m1) = (self.m[i][k], self.m[i + 1][k]);
-            let third = (m1 - m0) / h;
+            cubic.third[k] = (m1 - m0) / h;
             // First derivative at the left knot of the cubic with these values and second derivatives.
-            let slope = (self.y[i + 1][k] - self.y[i][k]) / h - h * (2.0 * m0 + m1) / 6.0;
-            value[k] = self.y[i][k] + dt * (slope + dt * (m0 / 2.0 + dt * third / 6.0));
-            first[k] = slope + dt * (m0 + dt * third / 2.0);
-            second[k] = m0 + dt * third;
+            cubic.slope[k] = (self.y[i + 1][k] - self.y[i][k]) / h - h * (2.0 * m0 + m1) / 6.0;
         }
-        (value, first, second)
+        cubic
+    }
+}
+
+/// A cubic through N quantities: value and derivatives at its left knot.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cubic<const N: usize> {
+    begin: f64,
+    value: [f64; N],
+    slope: [f64; N],
+    second: [f64; N],
+    third: [f64; N],
+}
+
+impl<const N: usize> Cubic<N> {
+    /// Value, first and second derivative.
+    pub(super) fn at(&self, t: f64) -> [[f64; N]; 3] {
+        let dt = t - self.begin;
+        let mut all = [[0.0; N]; 3];
+        for k in 0..N {
+            let (slope, m, third) = (self.slope[k], self.second[k], self.third[k]);
+            all[0][k] = self.value[k] + dt * (slope + dt * (m / 2.0 + dt * third / 6.0));
+            all[1][k] = slope + dt * (m + dt * third / 2.0);
+            all[2][k] = m + dt * third;
+        }
+        all
     }
 }
 
@@ -110,7 +143,7 @@ mod tests {
             let s = Spline::not_a_knot(t.clone(), t.iter().map(|&t| [f(t), -f(t)]).collect());
             for k in 0..=40 {
                 let x = -1.0 + (t[n - 1] + 1.0) * f64::from(k) / 40.0;
-                let (value, first, second) = s.at(x);
+                let [value, first, second] = s.at(x);
                 assert!((value[0] - f(x)).abs() < 1e-13 && (value[1] + f(x)).abs() < 1e-13);
                 assert!((first[0] - (-1.0 + x - 0.75 * x * x)).abs() < 1e-12);
                 assert!((second[0] - (1.0 - 1.5 * x)).abs() < 1e-11);
@@ -124,9 +157,9 @@ mod tests {
         let s = Spline::not_a_knot(t.clone(), t.iter().map(|&t| [(3.0 * t).sin()]).collect());
         for &knot in &t[1..t.len() - 1] {
             let (left, right) = (s.at(knot.next_down()), s.at(knot));
-            assert!((left.0[0] - right.0[0]).abs() < 1e-13);
-            assert!((left.1[0] - right.1[0]).abs() < 1e-12);
-            assert!((left.2[0] - right.2[0]).abs() < 1e-11);
+            assert!((left[0][0] - right[0][0]).abs() < 1e-13);
+            assert!((left[1][0] - right[1][0]).abs() < 1e-12);
+            assert!((left[2][0] - right[2][0]).abs() < 1e-11);
         }
     }
 
@@ -139,7 +172,7 @@ mod tests {
             let s = Spline::not_a_knot(t.clone(), t.iter().map(|t| [t.sin()]).collect());
             (0..=1000)
                 .map(|k| 2.0 * f64::from(k) / 1000.0)
-                .map(|x| (s.at(x).0[0] - x.sin()).abs())
+                .map(|x| (s.at(x)[0][0] - x.sin()).abs())
                 .fold(0.0, f64::max)
         };
         let (coarse, fine) = (worst(20), worst(40));

@@ -26,7 +26,7 @@
 
 use super::continuous::{walk_density, white_density};
 use super::{Composite, Kind, Process};
-use crate::minimise::golden_section;
+use crate::minimise::line_minimum;
 use crate::units::Refused;
 
 /// Averaging times per octave at which curves are compared.
@@ -399,7 +399,7 @@ fn correlation_time_s(curves: &[&Curve], policy: Policy) -> f64 {
             .map(|curve| Problem::new(curve, policy, Some(ln_t.exp())).solve().misfit)
             .sum()
     };
-    least(low.ln(), high.ln(), 60, misfit).0.exp()
+    least(low.ln(), high.ln(), 30, misfit).0.exp()
 }
 
 /// Squares of N and of K (or sigma_b), and the sum of squares of the logarithms of the Allan deviation ratios.
@@ -453,19 +453,15 @@ impl Problem {
         };
         // Neither end is in reach of a search in the logarithm: no white noise, no bias.
         let ends = [self.with_white(0.0), self.with_white(most)];
-        // The best may lie close to either end: one search is logarithmic in what white noise leaves to the
-        // bias, the other in the white noise.
-        let (ln_rest, _) = least(LEAST_SHARE.ln(), -LEAST_SHARE, 80, |x| {
-            self.with_white(most * -x.exp_m1()).misfit
+        // The best may lie close to either end: the search is logarithmic in the share of the white noise and in what
+        // it leaves to the bias.
+        let share = |logit: f64| 1.0 / (1.0 + (-logit).exp());
+        let furthest = -LEAST_SHARE.ln();
+        let (logit, _) = least(-furthest, furthest, 30, |logit| {
+            self.with_white(most * share(logit)).misfit
         });
-        let (ln_white, _) = least(LEAST_SHARE.ln(), 0.0, 80, |x| {
-            self.with_white(most * x.exp()).misfit
-        });
-        let inner = [
-            self.with_white(most * -ln_rest.exp_m1()),
-            self.with_white(most * ln_white.exp()),
-        ];
-        let all = ends.into_iter().chain(inner);
+        let inner = self.with_white(most * share(logit));
+        let all = ends.into_iter().chain([inner]);
         all.min_by(|a, b| a.misfit.total_cmp(&b.misfit))
             .unwrap_or(ends[1])
     }
@@ -490,7 +486,7 @@ impl Problem {
 }
 
 /// Least point of a function of one variable on an interval, and the value there: the best of a grid, then
-/// golden sections between its neighbours.
+/// parabolas between its neighbours.
 fn least(low: f64, high: f64, steps: u32, f: impl Fn(f64) -> f64) -> (f64, f64) {
     let grid = |i: u32| low + (high - low) * f64::from(i) / f64::from(steps);
     let best = (0..=steps)
@@ -498,8 +494,9 @@ fn least(low: f64, high: f64, steps: u32, f: impl Fn(f64) -> f64) -> (f64, f64) 
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .map_or(0, |(i, _)| i);
     let (low, high) = (grid(best.saturating_sub(1)), grid((best + 1).min(steps)));
-    let middle = golden_section(low, high, 1e-9 * (1.0 + low.abs()), &f);
-    // The end of the interval may be the best and golden sections only come near it.
+    // No closer: at 1e-8 of a variable the function is flat to rounding.
+    let middle = line_minimum(low, high, 1e-8, &f);
+    // The end of the interval may be the best and parabolas only come near it.
     [grid(best), middle]
         .map(|x| (x, f(x)))
         .into_iter()

@@ -29,6 +29,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod joint;
 mod pass;
 mod reduce;
 mod track;

@@ -1,6 +1,7 @@
 //! One filter along a track, and what makes its true errors.
 
-use super::track::{Mark, NAV, Nav, Row, SIGNALS, Sides, Sources, Step, StepOfSource, Track};
+use super::joint::Joint;
+use super::track::{Mark, NAV, Nav, Row, SIGNALS, Sides, Sources, Step, Track};
 use super::truth::{TrueErrors, TruthSide};
 use crate::ekf::Belief;
 use crate::ekf::covariance::PSI;
@@ -10,7 +11,6 @@ use crate::sensors::outage::Outage;
 use crate::simulation::{BIASES, REPORTED};
 use crate::units::DEG;
 use glam::DVec3;
-use multiversion::multiversion;
 use nalgebra::SMatrix;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -68,9 +68,7 @@ impl Assessment {
 /// believes. A drift (DR) is taken as the filter takes it: of that magnitude, either sign, each axis by itself; where
 /// the same drift is in every run, [`super::TruthSide`] adds the errors instead of their variances.
 pub fn assess(track: &Track, belief: &Belief, truth: &Model) -> Assessment {
-    FilterPass::new(track, belief)
-        .errors_as_expected(belief, truth)
-        .assessment()
+    FilterPass::new(track, belief).assess(belief, truth)
 }
 
 /// Largest error of any reported state that the strapdown alone makes at the IMU's rate, over the standard deviation that the
@@ -133,8 +131,10 @@ pub struct ErrorLaw {
 pub struct FilterPass<'a> {
     track: &'a Track,
     believed: Sources,
-    /// The gain of every scalar measurement, in sequence, and the variance that the filter states for its innovation.
-    gains: Vec<(Column, f64)>,
+    /// The gains of every scalar measurement, in sequence: of x, then of its bias states.
+    gains: Vec<f64>,
+    /// The variances that the filter states for their innovations.
+    innovations: Vec<f64>,
     reports: Vec<[Nav; NAV]>,
     /// Standard deviations that the filter states of the sensors' biases (m/s², rad/s), at every report.
     pub biases: Vec<[f64; BIASES]>,
@@ -148,7 +148,8 @@ impl<'a> FilterPass<'a> {
         let believed = Sources::of_belief(belief);
         let own = Sides::of_filter(believed.clone(), track);
         let mut filter = Joint::new(track.start, &own);
-        let (mut gains, mut reports, mut biases) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut gains, mut innovations) = (Vec::new(), Vec::new());
+        let (mut reports, mut biases) = (Vec::new(), Vec::new());
         let mut ends = vec![[[0.0; NAV]; NAV]; track.outages];
         for (steps, mark) in track.legs(0..track.marks.len()) {
             steps.iter().for_each(|step| filter.step(step));
@@ -156,7 +157,9 @@ impl<'a> FilterPass<'a> {
             mark.outages
                 .iter()
                 .for_each(|outage| ends[*outage] = filter.xx);
-            gains.extend(mark.rows.iter().map(|row| filter.measure(row)));
+            for row in mark.rows.iter() {
+                innovations.push(filter.measure(row, &mut gains));
+            }
             if mark.report {
                 reports.push(filter.xx);
                 biases.push(filter.bias_variances().map(f64::sqrt));
@@ -165,6 +168,7 @@ impl<'a> FilterPass<'a> {
         Self {
             track,
             gains,
+            innovations,
             reports,
             biases,
             ends,
@@ -212,7 +216,17 @@ impl<'a> FilterPass<'a> {
         outages.iter().map(of_outage).collect()
     }
 
-    /// As [`assess`], of the filter's own belief, where settings state more of the true errors than a noise model.
+    /// The track.
+    pub const fn track(&self) -> &'a Track {
+        self.track
+    }
+
+    /// As [`assess`], of the filter's own belief.
+    pub fn assess(&self, belief: &Belief, truth: &Model) -> Assessment {
+        self.errors_as_expected(belief, truth).assessment()
+    }
+
+    /// The same where settings state more of the true errors than a noise model.
     pub(super) fn assess_stated(&self, belief: &Belief, truth: &TrueErrors) -> Assessment {
         self.errors(&TruthSide::as_stated(belief, truth, !self.track.perfect))
             .assessment()
@@ -243,7 +257,9 @@ impl<'a> FilterPass<'a> {
     fn errors_until(&self, marks: usize, truth: &TruthSide) -> ErrorLaw {
         let sides = Sides::of_errors(&self.believed, &truth.inertial, self.track);
         let mut errors = Errors::at_start(self.track, &sides, truth);
-        let (mut gains, mut reports) = (self.gains.iter(), self.reports.iter());
+        let gains = self.gains.chunks_exact(NAV + self.believed.states.len());
+        let mut gains = gains.zip(&self.innovations);
+        let mut reports = self.reports.iter();
         let (mut law, mut ends) = (ErrorLaw::default(), vec![None; self.track.outages]);
         for (steps, mark) in self.track.legs(0..marks) {
             errors.follow(steps, mark);
@@ -251,8 +267,8 @@ impl<'a> FilterPass<'a> {
                 .iter()
                 .for_each(|o| ends[*o] = Some(errors.judged(mark, &self.ends[*o])));
             law.nis.1 += u64::from(mark.fix);
-            for (row, (gain, believed)) in mark.rows.iter().zip(&mut gains) {
-                let square = errors.measure(row, gain);
+            for (row, (gains, believed)) in mark.rows.iter().zip(&mut gains) {
+                let square = errors.measure(row, gains);
                 if row.what.is_of_fix() {
                     // The gate and the NIS of runs are of fixes alone.
                     law.nis.0 += square / believed;
@@ -414,7 +430,9 @@ pub(crate) fn errors_in_outages(
     let mut filter = Joint::new(track.start, &own);
     let mut errors = Errors::at_start(track, &sides, truth);
     let measure = |filter: &mut Joint<'_>, errors: &mut Errors<'_>, row: &Row| {
-        errors.measure(row, &filter.measure(row).0);
+        let mut gains = Vec::with_capacity(NAV + sides.estimated);
+        filter.measure(row, &mut gains);
+        errors.measure(row, &gains);
     };
     let goes_on = |row: &&Row| !row.of_gnss;
     let mut found = vec![Vec::new(); ways.len()];
@@ -437,7 +455,7 @@ pub(crate) fn errors_in_outages(
             // Without a measurement nobody asks for a gain: of the filter's own covariance nothing is needed then.
             let is_blind = !track.marks[way.clone()]
                 .iter()
-                .flat_map(|mark| &mark.rows)
+                .flat_map(|mark| mark.rows.iter())
                 .any(|row| goes_on(&row));
             for (index, (steps, mark)) in way.clone().zip(track.legs(way.clone())) {
                 if !is_blind {
@@ -474,254 +492,6 @@ impl Track {
     }
 }
 
-// The covariance of \[navigation error; bias estimates\] and its correlation with the states of the truth.
-
-/// Covariance of z = \[x; b\] jointly with states t that no measurement corrects.
-///
-/// For the filter's own covariance b are its biases' errors and there is no t. For the true one b are its
-/// estimates, which nothing drives but the corrections, and t are the negated states of the true IMU: the
-/// error of a bias is estimate less truth, so both enter the navigation error alike. States t are independent
-/// of one another and stay so.
-#[derive(Clone)]
-struct Joint<'a> {
-    sides: &'a Sides,
-    xx: [Nav; NAV],
-    /// Covariances of x with the states b, then t.
-    xs: Vec<Nav>,
-    /// A row for each b, with b and t.
-    bs: Vec<f64>,
-    tt: Vec<f64>,
-    /// Samples so far.
-    elapsed: f64,
-}
-
-impl<'a> Joint<'a> {
-    fn new(xx: [Nav; NAV], sides: &'a Sides) -> Self {
-        let (states, nb) = (&sides.states, sides.estimated);
-        let mut bs = vec![0.0; nb * states.len()];
-        for (i, source) in states[..nb].iter().enumerate() {
-            bs[i * states.len() + i] = source.initial;
-        }
-        Self {
-            sides,
-            xx,
-            xs: vec![[0.0; NAV]; states.len()],
-            bs,
-            tt: states[nb..].iter().map(|s| s.initial).collect(),
-            elapsed: 0.0,
-        }
-    }
-
-    /// Variances of the biases of the signals: of the sum of the states b of each, drifts at their age.
-    fn bias_variances(&self) -> [f64; BIASES] {
-        let states = &self.sides.states[..self.sides.estimated];
-        let factors: Vec<f64> = states.iter().map(|s| s.share(self.elapsed)).collect();
-        let mut variances = [0.0; BIASES];
-        for (i, a) in states.iter().enumerate().filter(|(_, a)| a.signal < BIASES) {
-            let of_signal = states
-                .iter()
-                .enumerate()
-                .filter(|(_, b)| b.signal == a.signal);
-            variances[a.signal] += of_signal
-                .map(|(j, _)| factors[i] * factors[j] * self.between(i, j))
-                .sum::<f64>();
-        }
-        variances
-    }
-
-    /// Covariance of two of the states b and t.
-    #[inline(always)]
-    fn between(&self, i: usize, j: usize) -> f64 {
-        let nb = self.sides.estimated;
-        match i.min(j) {
-            first if first < nb => self.bs[first * self.xs.len() + i.max(j)],
-            first if i == j => self.tt[first - nb],
-            _ => 0.0,
-        }
-    }
-
-    /// Covariance of everything with a linear form of the states as they are now.
-    fn covariance_with(&self, form: &Column) -> Column {
-        let mut x = [0.0; NAV];
-        for (column, h) in self.xx.iter().zip(&form.x) {
-            add_scaled(&mut x, *h, column);
-        }
-        let product = |x: &Nav| -> f64 { x.iter().zip(&form.x).map(|(a, h)| a * h).sum() };
-        let mut s: Vec<f64> = self.xs.iter().map(product).collect();
-        // Most measurements are of the navigation error alone.
-        for (j, h) in form.s.iter().enumerate().filter(|(_, h)| **h != 0.0) {
-            add_scaled(&mut x, *h, &self.xs[j]);
-            for (i, s) in s.iter_mut().enumerate() {
-                *s += h * self.between(i, j);
-            }
-        }
-        Column { x, s }
-    }
-
-    /// Over one step.
-    pub(super) fn step(&mut self, step: &Step) {
-        over(self, step);
-    }
-
-    /// A P Aᵀ + Q in blocks.
-    #[inline(always)]
-    fn propagate(&mut self, step: &Step) {
-        let (signals, nb) = (self.sides.signals, self.sides.estimated);
-        let inputs = self.sides.over(step);
-        let (sources, elapsed) = (&inputs.sources, self.elapsed);
-        let mean = |s: &StepOfSource| s.mean + s.ramp * elapsed;
-        let of_column = |xs: &[Nav], j: usize| {
-            let mut u = [0.0; SIGNALS];
-            let pairs = sources.iter().zip(xs);
-            pairs.for_each(|(s, x)| u[s.signal] += mean(s) * x[j]);
-            u
-        };
-        // A P, rows of x. Column by column: M times the column's x part, B times the means of its biases. Into a copy: the
-        // cross terms below still need P before the step.
-        let gx: [Nav; NAV] =
-            std::array::from_fn(|j| step.map(&self.xx[j], &of_column(&self.xs, j)[..signals]));
-        let n = sources.len();
-        for j in 0..n {
-            let mut u = [0.0; SIGNALS];
-            if j < nb {
-                let pairs = sources.iter().zip(&self.bs[j * n..]);
-                pairs.for_each(|(s, p)| u[s.signal] += mean(s) * p);
-            } else {
-                let own = sources[..nb].iter().enumerate();
-                own.for_each(|(i, s)| u[s.signal] += mean(s) * self.bs[i * n + j]);
-                // The states t are independent: of column j only its own variance feeds its signal.
-                u[sources[j].signal] += mean(&sources[j]) * self.tt[j - nb];
-            }
-            self.xs[j] = step.map(&self.xs[j], &u[..signals]);
-        }
-        // (A P) Aᵀ: the same map on the rows of A P.
-        for i in 0..NAV {
-            let row: Nav = std::array::from_fn(|j| gx[j][i]);
-            self.xx[i] = step.map(&row, &of_column(&self.xs, i)[..signals]);
-        }
-        // The states themselves last: the maps above are of their values at the beginning of the step.
-        self.step_biases(step, sources);
-        self.elapsed += f64::from(step.samples);
-        for (white, unit) in inputs.white.iter().zip(&step.white) {
-            self.xx
-                .iter_mut()
-                .zip(unit)
-                .for_each(|(column, unit)| add_scaled(column, *white, unit));
-        }
-        let q_mean = &inputs.q_mean[usize::from(!step.white.is_empty())];
-        // What is new in the mean input of a signal acts through one column of B: Q = Σ q b bᵀ.
-        for (q, column) in q_mean.iter().zip(&step.b).filter(|(q, _)| **q != 0.0) {
-            for j in 0..NAV {
-                add_scaled(&mut self.xx[j], q * column[j], column);
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn step_biases(&mut self, step: &Step, sources: &[StepOfSource]) {
-        for (x, s) in self.xs.iter_mut().zip(sources) {
-            x.iter_mut().for_each(|v| *v *= s.decay);
-            // The w of the step moves the mean input and the state together: cov(x, s) = b q_cross.
-            if let Some(b) = step.b.get(s.signal) {
-                add_scaled(x, s.q_cross, b);
-            }
-        }
-        let (own, truth) = sources.split_at(self.sides.estimated);
-        for (i, s) in own.iter().enumerate() {
-            let row = &mut self.bs[i * sources.len()..][..sources.len()];
-            row.iter_mut()
-                .zip(sources)
-                .for_each(|(p, other)| *p *= s.decay * other.decay);
-            row[i] += s.q_state;
-        }
-        for (p, s) in self.tt.iter_mut().zip(truth) {
-            *p = *p * s.decay * s.decay + s.q_state;
-        }
-    }
-
-    /// What a row measures, as a linear form.
-    fn measured(&self, row: &Row) -> Column {
-        let coefficient = |source| row.coefficient(source, self.elapsed);
-        Column {
-            x: std::array::from_fn(|i| row.h[i]),
-            s: self.sides.states.iter().map(coefficient).collect(),
-        }
-    }
-
-    /// Covariances with the innovation of a measurement with white noise of variance `r`, and its variance.
-    fn innovation(&self, measured: &Column, r: f64) -> (Column, f64) {
-        let with = self.covariance_with(measured);
-        // hᵀ P h + r
-        let s = r + measured.dot(&with);
-        (with, s)
-    }
-
-    /// Corrects by a measurement as the filter does whose own covariance this is; returns its gain, and the variance that it
-    /// states for the innovation.
-    fn measure(&mut self, row: &Row) -> (Column, f64) {
-        let (with, s) = self.innovation(&self.measured(row), row.r);
-        // the gain that is best where the covariance is right
-        let own = with.s.iter().take(self.sides.estimated);
-        let gain = Column {
-            x: with.x.map(|c| c / s),
-            s: own.map(|c| c / s).collect(),
-        };
-        corrected(self, (&with, s), &gain);
-        (gain, s)
-    }
-
-    /// z ← z − k y for an innovation y; the gain belongs to a filter that need not be right.
-    #[inline(always)]
-    fn update(&mut self, (with, variance): (&Column, f64), gain: &Column) {
-        let (n, nb) = (self.xs.len(), self.sides.estimated);
-        // P − k cᵀ − c kᵀ + k s kᵀ, by (s k − c) kᵀ − k cᵀ
-        // With the optimal gain s k = c and the first term is zero. Here c is of the truth and k of the
-        // filter.
-        let rest_x: Nav = std::array::from_fn(|i| variance * gain.x[i] - with.x[i]);
-        for j in 0..NAV {
-            add_scaled(&mut self.xx[j], gain.x[j], &rest_x);
-            add_scaled(&mut self.xx[j], -with.x[j], &gain.x);
-        }
-        for (x, k) in self.xs.iter_mut().zip(&gain.s) {
-            add_scaled(x, *k, &rest_x);
-        }
-        for (x, c) in self.xs.iter_mut().zip(&with.s) {
-            add_scaled(x, -c, &gain.x);
-        }
-        for (i, (k, c)) in gain.s.iter().zip(&with.s).enumerate() {
-            let rest = variance * k - c;
-            let (own, truth) = self.bs[i * n..][..n].split_at_mut(nb);
-            for (p, (other, with)) in own.iter_mut().zip(gain.s.iter().zip(&with.s)) {
-                *p += rest * other - k * with;
-            }
-            // t has no gain: a measurement does not change what truly makes the errors, only the
-            // estimate's relation to it.
-            let truth = truth.iter_mut().zip(&with.s[nb..]);
-            truth.for_each(|(p, with)| *p -= k * with);
-        }
-        self.symmetrise();
-    }
-
-    /// Takes the mean of each pair of covariances that should be equal. Rounding makes them unequal, the correction above leaves
-    /// their difference as it is (k cᵀ + c kᵀ is symmetric), and over the steps it would grow as the unaided vertical channel does,
-    /// by e in some 400 s: after three hours no digit is left.
-    fn symmetrise(&mut self) {
-        for i in 0..NAV {
-            for j in 0..i {
-                let mean = 0.5 * (self.xx[i][j] + self.xx[j][i]);
-                (self.xx[i][j], self.xx[j][i]) = (mean, mean);
-            }
-        }
-        let n = self.xs.len();
-        for i in 0..self.sides.estimated {
-            for j in 0..i {
-                let mean = 0.5 * (self.bs[i * n + j] + self.bs[j * n + i]);
-                (self.bs[i * n + j], self.bs[j * n + i]) = (mean, mean);
-            }
-        }
-    }
-}
-
 impl Step {
     #[inline(always)]
     pub(super) fn map(&self, x: &Nav, e: &[f64]) -> Nav {
@@ -736,39 +506,10 @@ impl Step {
     }
 }
 
-// Products and sums of nine, for the widest vectors that the machine has: the same digits on each, since nothing is fused.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2"))]
-fn over(joint: &mut Joint<'_>, step: &Step) {
-    joint.propagate(step);
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2"))]
-fn corrected(joint: &mut Joint<'_>, innovation: (&Column, f64), gain: &Column) {
-    joint.update(innovation, gain);
-}
-
 #[inline(always)]
 pub(super) fn add_scaled(to: &mut Nav, factor: f64, x: &Nav) {
     for (to, x) in to.iter_mut().zip(x) {
         *to += factor * x;
-    }
-}
-
-// One number for each state: a mean, covariances with something, or the coefficients of a linear form.
-
-/// A number for each state of z = \[navigation error `x`; bias states b\] and for each state t of the truth (`s`), as
-/// [`Joint`] has them; a gain is of z alone.
-#[derive(Debug, Clone)]
-struct Column {
-    x: Nav,
-    s: Vec<f64>,
-}
-
-impl Column {
-    /// The value of a linear form.
-    fn dot(&self, other: &Self) -> f64 {
-        let sum = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-        sum(&self.x, &other.x) + sum(&self.s, &other.s)
     }
 }
 
@@ -780,7 +521,14 @@ struct Errors<'a> {
     truth: &'a TruthSide,
     joint: Joint<'a>,
     /// Mean of the true errors, which is the same in every run.
-    mean: Option<Column>,
+    mean: Option<Mean>,
+}
+
+/// A number for each state: of the navigation error, and of the states b, then t.
+#[derive(Clone)]
+struct Mean {
+    x: Nav,
+    s: Vec<f64>,
 }
 
 impl<'a> Errors<'a> {
@@ -795,7 +543,7 @@ impl<'a> Errors<'a> {
         let levels = || sides.states.iter().map(|s| s.level);
         let drifts = levels().any(|level| level != 0.0);
         let is_off = truth.integrates && !track.is_closed();
-        let mean = (drifts || is_off).then(|| Column {
+        let mean = (drifts || is_off).then(|| Mean {
             x: [0.0; NAV],
             s: levels().collect(),
         });
@@ -814,7 +562,7 @@ impl<'a> Errors<'a> {
                 let mut error = [0.0; SIGNALS];
                 for (state, s) in mean.s.iter_mut().zip(&inputs.sources) {
                     // With the state at the beginning of the step, as in the covariance; it decays afterwards.
-                    error[s.signal] += (s.mean + s.ramp * elapsed) * *state;
+                    error[s.signal] += s.mean_after(elapsed) * *state;
                     *state *= s.decay;
                 }
                 mean.x = step.map(&mean.x, &error);
@@ -826,25 +574,23 @@ impl<'a> Errors<'a> {
         }
     }
 
-    /// Corrects by a measurement with the filter's gain; returns the expected square of the innovation.
-    fn measure(&mut self, row: &Row, gain: &Column) -> f64 {
+    /// Corrects by a measurement with the filter's gains; returns the expected square of the innovation.
+    fn measure(&mut self, row: &Row, gains: &[f64]) -> f64 {
         // Without its noise where the source under study is another one: covariances of independent sources
         // add.
-        let measured = self.joint.measured(row);
         let noise = if self.truth.has_noise(row.what) {
             row.noise
         } else {
             0.0
         };
-        let (with, variance) = self.joint.innovation(&measured, noise);
-        let mean = self.mean.as_ref().map_or(0.0, |mean| measured.dot(mean));
-        corrected(&mut self.joint, (&with, variance), gain);
-        if let Some(Column { x, s }) = &mut self.mean {
-            let states = x.iter_mut().chain(s);
-            let gains = gain.x.iter().chain(&gain.s);
-            states.zip(gains).for_each(|(state, k)| *state -= k * mean);
-        }
-        variance + mean * mean
+        let variance = self.joint.correct(row, noise, gains);
+        let Some(Mean { x, s }) = &mut self.mean else {
+            return variance;
+        };
+        let value = self.joint.value_of_mean(row, x, s);
+        let states = x.iter_mut().chain(s);
+        states.zip(gains).for_each(|(state, k)| *state -= k * value);
+        variance + value * value
     }
 
     fn judged(&self, mark: &Mark, believed: &[Nav; NAV]) -> Judged {

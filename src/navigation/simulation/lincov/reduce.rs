@@ -13,8 +13,8 @@ use crate::ekf::{Belief, FixUpdate, InitialSettings};
 use crate::imu::{Axis, Channel};
 use crate::linalg::mean;
 use crate::minimise::{Descent, MOST, Minimum};
-use crate::noise::practical::{Bias, Curve, Horizon, Policy};
-use crate::noise::{Model, Process, reduction};
+use crate::noise::practical::{Bias, Curve, Horizon, Pair, Policy};
+use crate::noise::{Composite, Model, Process, reduction};
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
@@ -131,11 +131,18 @@ impl Search<'_> {
 
     /// Factors to the pair of N and Gauss-Markov bias that is exported.
     fn of_pair(&self) -> Option<Factors> {
-        let mut ln = [0.0; FACTORS];
+        let (mut ln, rate_hz) = ([0.0; FACTORS], self.model.rate_hz);
+        let mut known: Vec<(&Composite, Pair)> = Vec::new();
         for channel in Channel::ALL.into_iter().filter(|c| !self.exact[c.index()]) {
-            let (noise, rate_hz) = (self.model.axis(channel), self.model.rate_hz);
-            let curve = Curve::largest(&[noise], rate_hz, Horizon::default()).ok()?;
-            let pair = curve.pair(Policy::Matched, Bias::Markov);
+            let noise = self.model.axis(channel);
+            let of_alike = known.iter().find(|(axis, _)| *axis == noise);
+            let pair = match of_alike {
+                Some((_, pair)) => *pair,
+                None => Curve::largest(&[noise], rate_hz, Horizon::default())
+                    .ok()?
+                    .pair(Policy::Matched, Bias::Markov),
+            };
+            known.push((noise, pair));
             let (s, i) = (channel.sensor as usize, channel.axis as usize);
             let group = &self.base.groups[s][0];
             let phi = (-1.0 / (pair.markov?.t_corr_s * rate_hz)).exp();

@@ -10,17 +10,23 @@ use crate::ekf::covariance::{
 };
 use crate::ekf::{Belief, UnknownKind, body_velocity_rows, fix_rows, yaw_row};
 use crate::frames::{NavState, RollPitchYaw};
-use crate::imu::{Channel, Sensor};
-use crate::lanes::{Quat, Vec3};
+use crate::imu::{Channel, ImuSample, Sensor};
+use crate::lanes::{Kernel, LANES, Lanes, Level, Mat3, Quat, Vec3, Wide, dispatch};
 use crate::noise::{Kind, Ladder, Model, Process};
 use crate::sensors::aiding::{Aid, AidPart, Law};
 use crate::sensors::defects::{Felt, Surroundings};
+use crate::sensors::ideal_imu::IdealSamples;
+use crate::sensors::outage::Outage;
 use crate::simulation::BIASES;
-use crate::simulation::plan::{Aided, Event, Experiment, ExperimentError, Plan};
-use crate::strapdown::Strapdown;
+use crate::simulation::plan::{
+    Aided, Event, Experiment, ExperimentError, check_rotation, felt, schedule,
+};
+use crate::strapdown::{StepTrace, Strapdown};
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
+use std::iter::Peekable;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Navigation states: R, V, PSI.
 pub(super) const NAV: usize = 9;
@@ -105,6 +111,11 @@ impl Row {
         }
     }
 
+    /// Whether any of the states of these sides may have a coefficient of its own.
+    pub(super) fn is_of_states(&self, sides: &Sides) -> bool {
+        sides.have_outer || self.h[NAV..].iter().any(|h| *h != 0.0)
+    }
+
     /// The coefficient of a source's state in the measurement after `elapsed` samples, beside its part through the
     /// navigation error.
     pub(super) fn coefficient(&self, source: &Source, elapsed: f64) -> f64 {
@@ -138,8 +149,8 @@ pub(super) struct Mark {
     pub t_s: f64,
     /// Whether a fix is used.
     pub fix: bool,
-    /// Scalar measurements, in sequence.
-    pub rows: Vec<Row>,
+    /// Scalar measurements, in sequence: the same in each copy of a track.
+    pub rows: Arc<[Row]>,
     pub report: bool,
     /// Outages that end here, before the measurements.
     pub outages: Vec<usize>,
@@ -152,7 +163,8 @@ pub(super) struct Mark {
 /// A trajectory with its fixes, ready for any number of passes.
 #[derive(Debug, Clone)]
 pub struct Track {
-    steps: Vec<Step>,
+    /// Outages change no step: tracks that differ in them alone share these.
+    steps: Arc<Vec<Step>>,
     pub(super) marks: Vec<Mark>,
     pub(super) outages: usize,
     /// Covariance of the navigation error at the start, as the filter believes.
@@ -176,56 +188,87 @@ impl Track {
         noise_hz: f64,
         experiment: &Experiment<'_>,
     ) -> Result<Self, ExperimentError> {
-        let plan = &Plan::reference(experiment)?;
-        let mut line = Linearisation::new(plan, noise_hz);
+        let clear = &Experiment {
+            outages: &[],
+            ..experiment.clone()
+        };
+        let Experiment {
+            trajectory,
+            rate_hz,
+            gravity,
+            ..
+        } = *experiment;
+        let samples = IdealSamples::new(trajectory, rate_hz, gravity)?;
+        let events = schedule(clear, samples.len())?;
+        let start = trajectory.state(trajectory.start_s());
+        let mut line = Linearisation::new(clear, samples, &start, noise_hz);
         let longest = ((STEP_S * experiment.rate_hz).round() as usize).max(1);
-        let (mut steps, mut marks, mut done) =
-            (Vec::new(), Vec::with_capacity(plan.events.len()), 0);
-        for (index, event) in plan.events.iter().enumerate() {
+        let (mut steps, mut marks, mut done) = (Vec::new(), Vec::with_capacity(events.len()), 0);
+        for event in &events {
             let samples = event.sample - done;
             // Parts of equal length: what the noise processes do over a step is computed once for each length
             // that occurs.
             let part = samples.div_ceil(samples.div_ceil(longest).max(1)).max(1);
             for begin in (done..event.sample).step_by(part) {
-                steps.push(line.step(plan, begin..event.sample.min(begin + part)));
+                steps.push(line.step(begin..event.sample.min(begin + part))?);
             }
             done = event.sample;
-            let ends = |(_, (_, at)): &(usize, &(f64, usize))| *at == index;
             marks.push(Mark {
                 steps: steps.len(),
                 after_s: event.sample as f64 / experiment.rate_hz,
                 t_s: event.t_s,
                 fix: event.fix,
-                rows: line.rows(plan, event),
+                rows: line.rows(event).into(),
                 report: event.report,
-                outages: plan
-                    .outages
-                    .iter()
-                    .enumerate()
-                    .filter(ends)
-                    .map(|(i, _)| i)
-                    .collect(),
+                outages: Vec::new(),
                 jacobian: RollPitchYaw::from_quat(event.reference.q_b_n).jacobian_of_psi_n(),
                 closure: line.close(&event.reference),
             });
         }
         drop_closed(&mut marks);
-        let (outages, perfect) = (plan.outages.len(), experiment.initial.perfect);
-        Ok(Self {
-            steps,
+        let track = Self {
+            steps: Arc::new(steps),
             marks,
-            outages,
-            start: start(plan),
-            perfect,
-        })
+            outages: 0,
+            start: covariance_of_start(experiment, &start),
+            perfect: experiment.initial.perfect,
+        };
+        Ok(track.with_outages(experiment.outages))
+    }
+
+    /// A track without outages, with some.
+    pub fn with_outages(&self, outages: &[Outage]) -> Self {
+        let mut track = self.clone();
+        track.outages = outages.len();
+        for mark in &mut track.marks {
+            if Outage::any_withholds(outages, mark.t_s) {
+                mark.fix = false;
+                let goes_on = |row: &&Row| !row.of_gnss;
+                mark.rows = mark.rows.iter().filter(goes_on).copied().collect();
+            }
+        }
+        for (i, outage) in outages.iter().enumerate() {
+            let first_fix = |mark: &Mark| mark.fix && outage.is_over(mark.t_s);
+            let end = track.marks.iter().position(first_fix);
+            let end = end.unwrap_or(track.marks.len() - 1);
+            track.marks[end].outages.push(i);
+        }
+        track
     }
 
     /// The same where a filter believes the vehicle's own measurements to be so much worse; in truth they are as they were.
     pub fn with_aiding_sigmas(&self, factor: f64) -> Self {
         let mut track = self.clone();
-        let rows = track.marks.iter_mut().flat_map(|mark| &mut mark.rows);
-        let aids = rows.filter(|row| matches!(row.what, Measured::Aid(..)));
-        aids.for_each(|row| row.r *= factor * factor);
+        let believed = |row: &Row| match row.what {
+            Measured::Aid(..) => Row {
+                r: row.r * factor * factor,
+                ..*row
+            },
+            _ => *row,
+        };
+        for mark in &mut track.marks {
+            mark.rows = mark.rows.iter().map(believed).collect();
+        }
         track
     }
 
@@ -250,20 +293,31 @@ impl Track {
 }
 
 /// The reference as the strapdown passes through it.
-struct Linearisation {
+struct Linearisation<'a> {
+    experiment: &'a Experiment<'a>,
+    /// The ideal IMU, and its first sample.
+    samples: Peekable<IdealSamples<'a>>,
+    first: ImuSample,
     ins: Strapdown<f64>,
     /// What the IMU feels over the last sample.
     felt: Surroundings,
     dt: f64,
     noise_hz: f64,
+    level: Level,
     /// Signals that are followed: those behind scale factors only where the true IMU has them.
     signals: usize,
 }
 
-impl Linearisation {
-    fn new(plan: &Plan<'_>, noise_hz: f64) -> Self {
-        let experiment = plan.experiment;
-        let ins = Strapdown::<f64>::new(&plan.start, experiment.gravity);
+impl<'a> Linearisation<'a> {
+    fn new(
+        experiment: &'a Experiment<'a>,
+        samples: IdealSamples<'a>,
+        start: &NavState,
+        noise_hz: f64,
+    ) -> Self {
+        let ins = Strapdown::<f64>::new(start, experiment.gravity);
+        let mut samples = samples.peekable();
+        let first = samples.peek().copied().unwrap_or_default();
         let defects = Sensor::ALL
             .into_iter()
             .flat_map(|sensor| defects(experiment.defects, sensor));
@@ -272,46 +326,57 @@ impl Linearisation {
             .map(|s| s.signal + 1)
             .fold(CROSSED, usize::max);
         Self {
+            experiment,
+            samples,
+            first,
             ins,
             felt: Surroundings::default(),
             dt: 1.0 / experiment.rate_hz,
             noise_hz,
+            level: Level::best(),
             signals,
         }
     }
 
     /// The maps of the samples one after the other, the Earth's as the filter applies them.
-    fn step(&mut self, plan: &Plan<'_>, samples: Range<usize>) -> Step {
-        let unit = |i: usize| std::array::from_fn(|k| if i == k { 1.0 } else { 0.0 });
-        let mut step = Step {
-            // Samples of the noise model's rate, which need not be the rate at which the motion is sampled.
-            samples: (samples.len() as f64 * self.dt * self.noise_hz)
-                .round()
-                .max(1.0) as u32,
-            m: std::array::from_fn(unit),
-            b: vec![[0.0; NAV]; self.signals],
-            white: Vec::new(),
-        };
+    fn step(&mut self, samples: Range<usize>) -> Result<Step, ExperimentError> {
+        // Samples of the noise model's rate, which need not be the rate at which the motion is sampled.
+        let count = samples.len() as f64 * self.dt * self.noise_hz;
+        let mut columns = Columns::new(self.signals);
         let (mut age, last) = (0.0, samples.end - 1);
-        for index in samples {
-            let sample = &plan.ideal[index];
-            self.felt = plan.felt(index);
+        // The range first: `zip` would take a sample before it sees that there is no further index.
+        for (index, sample) in samples.zip(&mut self.samples) {
+            check_rotation(self.experiment, index, &sample)?;
+            self.felt = felt(self.experiment, index, &sample, &self.first);
+            columns.feel(&self.felt);
             let (dtheta, dv) = (sample.omega_ib_b * self.dt, sample.f_ib_b * self.dt);
             let trace = self.ins.step(Vec3::splat(dtheta), Vec3::splat(dv), self.dt);
-            step.apply(&Sample::new(&trace, self.dt), &self.felt);
             age += self.dt;
             // A measurement meets a covariance that has all of the Earth's terms, as `settle` gives it in the
             // filter.
-            if index == last || age + 0.5 * self.dt > EARTH_STEP_S {
-                let earth = EarthStep {
-                    terms: EarthTerms::at(&self.ins),
-                    dt: age,
-                };
-                step.apply(&earth, &self.felt);
+            let is_settled = index == last || age + 0.5 * self.dt > EARTH_STEP_S;
+            let earth = is_settled.then(|| EarthStep {
+                terms: EarthTerms::at(&self.ins),
+                dt: age,
+            });
+            let maps = Maps {
+                columns: &mut columns,
+                trace: &trace,
+                dt: self.dt,
+                earth: earth.as_ref(),
+            };
+            dispatch(self.level, maps);
+            if is_settled {
                 age = 0.0;
             }
         }
-        step
+        let (m, b) = columns.into_maps();
+        Ok(Step {
+            samples: count.round().max(1.0) as u32,
+            m,
+            b,
+            white: Vec::new(),
+        })
     }
 
     /// Error of the strapdown since the reference was met last (m, m/s, rad), estimate less truth; it goes on from the reference.
@@ -330,8 +395,8 @@ impl Linearisation {
         flat(&[r.to_array(), v, psi.to_array()].map(Vec3))
     }
 
-    fn rows(&self, plan: &Plan<'_>, event: &Event) -> Vec<Row> {
-        let experiment = plan.experiment;
+    fn rows(&self, event: &Event) -> Vec<Row> {
+        let experiment = self.experiment;
         let (mut rows, [_, omega_ib_b]) = (Vec::new(), self.felt.sample);
         if event.fix {
             let gnss = experiment.gnss;
@@ -356,13 +421,14 @@ impl Linearisation {
             rows.push(Row::new(h, self.felt, r, Measured::Height));
         }
         for aided in event.aids.iter().filter(|aided| !aided.withheld) {
-            self.aid(experiment, aided, &mut rows);
+            self.aid(aided, &mut rows);
         }
         rows
     }
 
     /// The rows of what the vehicle measures of itself.
-    fn aid(&self, experiment: &Experiment<'_>, aided: &Aided, rows: &mut Vec<Row>) {
+    fn aid(&self, aided: &Aided, rows: &mut Vec<Row>) {
+        let experiment = self.experiment;
         let Aided { aid, v_b, a_b, .. } = *aided;
         let [r, noise] = experiment.aiding.sigmas(aid).map(|sigma| sigma * sigma);
         let row = |h, axis| Row {
@@ -404,24 +470,130 @@ fn drop_closed(marks: &mut [Mark]) {
     }
 }
 
-impl Step {
-    /// The map of a sample after this one, or of the Earth, which feels no sample.
-    fn apply(&mut self, map: &impl ErrorMap<f64>, felt: &Surroundings) {
-        let zero = Vec3([0.0; 3]);
-        for column in &mut self.m {
-            *column = flat(&map.apply(triples(column), zero, zero));
+/// The maps of a step while it is made: columns of M, then of B, eight to a register.
+struct Columns {
+    x: Vec<[Lanes; NAV]>,
+    /// The error of accelerometer and gyroscope in each of them.
+    inputs: Vec<[Vec3; 2]>,
+    signals: usize,
+}
+
+impl Columns {
+    fn new(signals: usize) -> Self {
+        let count = (NAV + signals).div_ceil(LANES);
+        let mut x = vec![[Lanes::ZERO; NAV]; count];
+        for i in 0..NAV {
+            x[i / LANES][i][i % LANES] = 1.0;
         }
-        for (signal, column) in self.b.iter_mut().enumerate() {
-            let (sensor, axis, of) = place(signal);
-            let mut input = [zero, zero];
-            input[sensor].0[axis] = felt.value(of);
-            *column = flat(&map.apply(triples(column), input[0], input[1]));
+        let mut columns = Self {
+            x,
+            inputs: vec![[Vec3::ZERO; 2]; count],
+            signals,
+        };
+        (0..signals).for_each(|signal| columns.set_input(signal, 1.0));
+        columns
+    }
+
+    /// What the signals are multiplied by.
+    fn feel(&mut self, felt: &Surroundings) {
+        for signal in SCALED..self.signals {
+            let (.., of) = place(signal);
+            self.set_input(signal, felt.value(of));
+        }
+    }
+
+    fn set_input(&mut self, signal: usize, value: f64) {
+        let ((sensor, axis, _), column) = (place(signal), NAV + signal);
+        self.inputs[column / LANES][sensor][axis][column % LANES] = value;
+    }
+
+    /// M and B.
+    fn into_maps(self) -> ([Nav; NAV], Vec<Nav>) {
+        let column = |c: usize| self.x[c / LANES].map(|row| row[c % LANES]);
+        (
+            std::array::from_fn(column),
+            (NAV..NAV + self.signals).map(column).collect(),
+        )
+    }
+}
+
+/// The map of a sample after those before, and that of the Earth, which feels no sample.
+struct Maps<'a> {
+    columns: &'a mut Columns,
+    trace: &'a StepTrace<f64>,
+    dt: f64,
+    earth: Option<&'a EarthStep<f64>>,
+}
+
+impl Kernel for Maps<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let trace = StepTrace {
+            c_b_n: wide::<W>(&self.trace.c_b_n),
+            dv_n: Vec3([
+                W::from(self.trace.dv_n[0]),
+                W::from(self.trace.dv_n[1]),
+                W::from(self.trace.dv_n[2]),
+            ]),
+        };
+        let sample = Sample::new(&trace, self.dt);
+        for (x, [accel, gyro]) in self.columns.x.iter_mut().zip(&self.columns.inputs) {
+            let after = sample.apply(loaded(x), accel.load(), gyro.load());
+            stored(x, &after);
+        }
+        let Some(earth) = self.earth else { return };
+        let terms = &earth.terms;
+        let earth = EarthStep {
+            terms: EarthTerms {
+                rr: wide(&terms.rr),
+                vr: wide(&terms.vr),
+                vv: wide(&terms.vv),
+                psi_r: wide(&terms.psi_r),
+                psi_v: wide(&terms.psi_v),
+                psi_psi: wide(&terms.psi_psi),
+            },
+            dt: earth.dt,
+        };
+        let zero = Vec3([W::from(0.0); 3]);
+        for x in &mut self.columns.x {
+            let after = earth.apply(loaded(x), zero, zero);
+            stored(x, &after);
         }
     }
 }
 
-fn triples(x: &Nav) -> NavError<f64> {
-    [R, V, PSI].map(|block| Vec3([x[3 * block], x[3 * block + 1], x[3 * block + 2]]))
+/// The same matrix in every lane.
+#[inline(always)]
+fn wide<W: Wide>(m: &Mat3<f64>) -> Mat3<W> {
+    let mut wide = Mat3([[W::from(0.0); 3]; 3]);
+    for i in 0..3 {
+        for j in 0..3 {
+            wide.0[i][j] = W::from(m.0[i][j]);
+        }
+    }
+    wide
+}
+
+#[inline(always)]
+fn loaded<W: Wide>(x: &[Lanes; NAV]) -> NavError<W> {
+    let mut error = [Vec3([W::from(0.0); 3]); 3];
+    for block in [R, V, PSI] {
+        for axis in 0..3 {
+            error[block][axis] = W::load(&x[3 * block + axis]);
+        }
+    }
+    error
+}
+
+#[inline(always)]
+fn stored<W: Wide>(x: &mut [Lanes; NAV], error: &NavError<W>) {
+    for block in [R, V, PSI] {
+        for axis in 0..3 {
+            error[block][axis].store(&mut x[3 * block + axis]);
+        }
+    }
 }
 
 fn flat(x: &NavError<f64>) -> Nav {
@@ -429,9 +601,9 @@ fn flat(x: &NavError<f64>) -> Nav {
 }
 
 /// Covariance of the navigation error for the standard deviations of the start.
-fn start(plan: &Plan<'_>) -> [Nav; NAV] {
-    let initial = plan.experiment.initial;
-    let psi = psi_of_angles(plan.start.q_b_n);
+fn covariance_of_start(experiment: &Experiment<'_>, start: &NavState) -> [Nav; NAV] {
+    let initial = experiment.initial;
+    let psi = psi_of_angles(start.q_b_n);
     let mut p = [[0.0; NAV]; NAV];
     for i in 0..3 {
         p[3 * R + i][3 * R + i] = initial.pos_sigma_m[i].powi(2);
@@ -457,7 +629,7 @@ impl Track {
     /// As [`Self::merged`], with a report every ten, and white noise through its mean over a step as well: a tenth faster
     /// for the hundreds of passes of a search, and within 1e-3 in every ratio.
     pub fn coarse(&self) -> Self {
-        let mut track = self.with_legs(Step::of_means);
+        let mut track = self.with_legs(Step::joined);
         let mut reports = 0;
         for mark in &mut track.marks {
             reports += usize::from(mark.report);
@@ -470,25 +642,27 @@ impl Track {
     /// The same with one step from mark to mark, at most a second: a few times faster. White noise is exact; a bias is
     /// its mean over the step, which leaves up to 1e-4 of an error after ten seconds without fixes, 1.2e-3 after five.
     pub fn merged(&self) -> Self {
-        self.with_legs(Step::then)
+        self.with_legs(|leg| Step {
+            white: Step::white_noise(leg),
+            ..Step::joined(leg)
+        })
     }
 
-    /// One step from mark to mark, of which each follows another by `joined`.
-    fn with_legs(&self, joined: impl Fn(&Step, &Step) -> Step) -> Self {
+    /// One step from mark to mark.
+    fn with_legs(&self, joined: impl Fn(&[Step]) -> Step) -> Self {
         let (mut steps, mut marks, mut done) = (Vec::new(), self.marks.clone(), 0);
         for mark in &mut marks {
             // Between marks alone: no step may reach over a measurement.
             let leg = &self.steps[done..mark.steps];
-            if let Some((first, rest)) = leg.split_first() {
-                steps.push(
-                    rest.iter()
-                        .fold(first.clone(), |step, next| joined(&step, next)),
-                );
+            match leg {
+                [] => {}
+                [one] => steps.push(one.clone()),
+                leg => steps.push(joined(leg)),
             }
             (done, mark.steps) = (mark.steps, steps.len());
         }
         Self {
-            steps,
+            steps: Arc::new(steps),
             marks,
             ..*self
         }
@@ -545,7 +719,7 @@ impl Track {
             });
         }
         Self {
-            steps,
+            steps: Arc::new(steps),
             marks,
             ..*self
         }
@@ -570,34 +744,40 @@ impl Track {
 const SLACK_S: f64 = 1e-6;
 
 impl Step {
-    /// This step and then another, as one.
-    fn then(&self, next: &Self) -> Self {
-        let none = [0.0; SIGNALS];
-        // White noise of the two parts is independent: through the mean of a second it would move a position by
-        // a quarter of T³ where it is a third.
-        let mut white = self.white_noise();
-        for (sum, more) in white.iter_mut().zip(next.white_noise()) {
-            let carried = sum.map(|column| next.map(&column, &none));
-            for (i, more) in more.iter().enumerate() {
-                // Symmetric: the rows of a carried covariance are its columns.
-                sum[i] = next.map(&carried.map(|column| column[i]), &none);
-                add_scaled(&mut sum[i], 1.0, more);
-            }
-        }
-        Self {
-            white,
-            ..self.of_means(next)
-        }
+    /// Steps one after the other as one, white noise through its mean over it.
+    fn joined(leg: &[Self]) -> Self {
+        let mut steps = leg.iter().cloned();
+        let joined = steps.by_ref().reduce(|step, next| step.of_means(&next));
+        joined.expect("a leg has steps")
     }
 
-    /// Its `white`, whether it is there or follows from the mean over the step.
-    fn white_noise(&self) -> Vec<[Nav; NAV]> {
-        let of_mean = |b: &Nav| b.map(|factor| b.map(|b| b * factor / f64::from(self.samples)));
-        if self.white.is_empty() {
-            self.b[..BIASES].iter().map(of_mean).collect()
-        } else {
-            self.white.clone()
+    /// Covariances for unit white noise in each sample over steps that have none of their own: through the mean of all it
+    /// would move a position by a quarter of T³ where it is a third.
+    fn white_noise(leg: &[Self]) -> Vec<[Nav; NAV]> {
+        let mut white = vec![[[0.0; NAV]; NAV]; BIASES];
+        let none = [0.0; SIGNALS];
+        // From the last step to the first: what comes after a step, as one map.
+        let mut after: Option<Self> = None;
+        for step in leg.iter().rev() {
+            let variance = 1.0 / f64::from(step.samples);
+            for (sum, b) in white.iter_mut().zip(&step.b) {
+                let b = after.as_ref().map_or(*b, |after| after.map(b, &none));
+                for (column, factor) in sum.iter_mut().zip(&b) {
+                    add_scaled(column, factor * variance, &b);
+                }
+            }
+            after = Some(match after {
+                None => Self {
+                    b: Vec::new(),
+                    ..step.clone()
+                },
+                Some(after) => Self {
+                    m: step.m.map(|column| after.map(&column, &none)),
+                    ..after
+                },
+            });
         }
+        white
     }
 
     /// The same with white noise through its mean over the step, as that of a bias.
@@ -723,9 +903,9 @@ const NONE: Source = Source {
 /// What a source does over a step: the mean of its samples' errors is `mean`·s + w₁, and s⁺ = `decay`·s + w₂.
 pub(super) struct StepOfSource {
     pub signal: usize,
-    pub mean: f64,
+    mean: f64,
     /// Growth of `mean` with every sample before the step.
-    pub ramp: f64,
+    ramp: f64,
     pub decay: f64,
     /// Variance of w₁.
     q_mean: f64,
@@ -733,6 +913,14 @@ pub(super) struct StepOfSource {
     pub q_cross: f64,
     /// Variance of w₂.
     pub q_state: f64,
+}
+
+impl StepOfSource {
+    /// `mean` after so many samples.
+    #[inline(always)]
+    pub(super) fn mean_after(&self, elapsed: f64) -> f64 {
+        self.mean + self.ramp * elapsed
+    }
 }
 
 impl Source {
@@ -1026,6 +1214,8 @@ pub(super) struct Sides {
     pub estimated: usize,
     /// Signals that they reach: most have neither scale factors nor what comes after them.
     pub signals: usize,
+    /// Whether some of them are errors of measurements.
+    have_outer: bool,
     /// By the number of samples of a step; few numbers occur.
     inputs: Vec<(u32, Inputs)>,
 }
@@ -1046,22 +1236,35 @@ impl Sides {
     }
 
     fn new(sources: Sources, estimated: usize, track: &Track) -> Self {
+        let of_white = sources.white.iter().rposition(|white| *white != 0.0);
+        let signals = sources.states.iter().map(|s| s.signal).chain(of_white);
+        let signals = signals.map(|last| last + 1).max().unwrap_or(0);
         let mut inputs: Vec<(u32, Inputs)> = Vec::new();
-        for step in &track.steps {
+        for step in track.steps.iter() {
             if inputs.iter().all(|(samples, _)| *samples != step.samples) {
-                inputs.push((step.samples, Inputs::new(&sources, step.samples)));
+                let own = Inputs::new(&sources, step.samples, signals);
+                inputs.push((step.samples, own));
             }
         }
-        let signals = sources.states.iter().map(|s| s.signal + 1);
-        let signals = signals.max().unwrap_or(0);
         // What a track does not follow would be left out in silence.
         debug_assert!(track.steps.iter().all(|step| signals <= step.b.len()));
         Self {
+            have_outer: sources.states.iter().any(|s| s.outer.is_some()),
             states: sources.states,
             estimated,
             signals,
             inputs,
         }
+    }
+
+    /// Lanes of a row with a number for each state.
+    pub(super) const fn width(&self) -> usize {
+        self.states.len().div_ceil(LANES)
+    }
+
+    /// Lanes of a row with a number for each navigation state and each signal.
+    pub(super) const fn tail(&self) -> usize {
+        (NAV + self.signals).div_ceil(LANES)
     }
 
     /// What they do over a step of the track.
@@ -1077,6 +1280,10 @@ impl Sides {
 /// What sources do over steps of one length.
 pub(super) struct Inputs {
     pub sources: Vec<StepOfSource>,
+    /// Their decays.
+    pub decay: Vec<Lanes>,
+    /// A row for each signal: `q_cross` of its states.
+    pub q_cross: Vec<Lanes>,
     /// Variance of the white noise of a sample (units²).
     pub white: [f64; BIASES],
     /// Variance of the part of a signal's mean over the step that is new in it: of white noise and states, of states
@@ -1085,7 +1292,7 @@ pub(super) struct Inputs {
 }
 
 impl Inputs {
-    fn new(all: &Sources, samples: u32) -> Self {
+    fn new(all: &Sources, samples: u32, signals: usize) -> Self {
         let sources: Vec<StepOfSource> = all.states.iter().map(|x| x.over(samples)).collect();
         let white = all.white;
         let mut q_mean = [[0.0; SIGNALS]; 2];
@@ -1098,8 +1305,17 @@ impl Inputs {
                 .iter_mut()
                 .for_each(|q| q[source.signal] += source.q_mean);
         }
+        let width = sources.len().div_ceil(LANES);
+        let mut decay = vec![Lanes::ZERO; width];
+        let mut q_cross = vec![Lanes::ZERO; signals * width];
+        for (j, source) in sources.iter().enumerate() {
+            decay[j / LANES][j % LANES] = source.decay;
+            q_cross[source.signal * width + j / LANES][j % LANES] = source.q_cross;
+        }
         Self {
             sources,
+            decay,
+            q_cross,
             white,
             q_mean,
         }
