@@ -15,8 +15,8 @@ use std::io::{self, ErrorKind};
 use std::num::{ParseFloatError, ParseIntError};
 use std::path::Path;
 
-/// A command without a result: exit code, message, place and help. 1 could not (I/O, numerics); 2 usage or input;
-/// 3 a stated bound was not met; 75 stopped early, resume; 130 interrupted (143 by SIGTERM, 129 by SIGHUP).
+/// A command without a result: exit code, message, place and help. 1 could not (I/O, numerics); 2 usage or input, files that
+/// are not there too; 3 a stated bound was not met; 75 stopped early, resume; 130 interrupted (143 by SIGTERM, 129 by SIGHUP).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Failure {
     code: u8,
@@ -52,6 +52,10 @@ pub(crate) mod help {
     pub(crate) const GAPS_ELSEWHERE: (&str, &str) = (
         "gaps",
         "wv and calibrate read it with --gaps split or --gaps ignore; fuse bridges gaps of up to 5 s",
+    );
+    pub(crate) const GAPS_LOST_ELSEWHERE: (&str, &str) = (
+        "gaps",
+        "wv and calibrate read it with --gaps split; fuse bridges gaps of up to 5 s",
     );
     pub(crate) const WRONG_RATE: (&str, &str) = ("rate-hz", "leave --rate-hz out, or correct it");
     pub(crate) const FIX_SIGMA: (&str, &str) = (
@@ -199,7 +203,7 @@ impl Failure {
         .or_hint("every row needs one value a column; was the file cut off?")
     }
 
-    /// Error of the system on reading a file, with a hint.
+    /// Error of the system on reading a file, with a hint: a wrong path is wrong input.
     pub(crate) fn io(path: &Path, e: io::Error) -> Self {
         use ErrorKind as K;
         let kind = e.kind();
@@ -217,7 +221,8 @@ impl Failure {
             _ => "",
         };
         // what has a number of the system is its own: a file that may not grow, too
-        let is_system = e.raw_os_error().is_some() || !is_damage(kind);
+        let is_path = matches!(kind, K::NotFound | K::IsADirectory | K::NotADirectory);
+        let is_system = !is_path && (e.raw_os_error().is_some() || !is_damage(kind));
         let failure = Self {
             code: if is_system { 1 } else { 2 },
             ..Self::contents(path.display(), Place::Within, system_words(&e))
@@ -235,10 +240,10 @@ impl Failure {
             }
             _ => Self::io(path, e),
         };
-        if failure.help.is_empty() {
-            failure.or_hint("name another path")
-        } else {
-            failure
+        let failure = Self { code: 1, ..failure };
+        match failure.help.is_empty() {
+            true => failure.or_hint("name another path"),
+            false => failure,
         }
     }
 

@@ -115,7 +115,6 @@ for _, end_s in OUTAGES:
 figure, ax = plt.subplots()
 ax.semilogy(own["t_s"], own["asee_horizontal_m"], label="nav-sim")
 ax.semilogy(instants, np.hypot(theirs["north"], theirs["east"]), "--", label="pyins")
-ax.set_xlabel("time (s)")
-ax.set_ylabel("horizontal standard deviation (m)")
+ax.set(xlabel="time (s)", ylabel="horizontal standard deviation (m)")
 ax.legend()
 plt.show()

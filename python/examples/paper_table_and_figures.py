@@ -67,8 +67,7 @@ for ax, scenario in zip(axes, SCENARIOS):
     for estimator in ESTIMATORS:
         ratio = runs[scenario, estimator].epochs["asee_pos_e_m"] / base["asee_pos_e_m"]
         ax.plot(base["t_s"], 100.0 * (ratio - 1.0), label=estimator)
-    ax.set_title(f"scenario {scenario}")
-    ax.set_xlabel("time (s)")
+    ax.set(title=f"scenario {scenario}", xlabel="time (s)")
 axes[0].set_ylabel("(ASEE ratio − 1) · 100, east")
 axes[0].legend()
 

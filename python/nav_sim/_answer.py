@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -161,35 +162,29 @@ class _Line:
         print(file=sys.stderr)
 
 
-class bar:
+@contextmanager
+def bar(progress: Progress) -> Iterator[Callable[[int, int], object] | None]:
     """A progress bar, a function, or nothing."""
+    if progress is not True:
+        if progress and not callable(progress):
+            raise NavSimError(f"progress={progress!r} is neither a function nor True")
+        yield progress or None
+        return
+    try:
+        from tqdm.auto import tqdm
 
-    def __init__(self, progress: Progress) -> None:
-        self._progress = progress
-        self._bar: Any = None
+        shown: Any = tqdm()
+    except ImportError:
+        shown = _Line()
 
-    def __enter__(self) -> Callable[[int, int], object] | None:
-        if self._progress is True:
-            try:
-                from tqdm.auto import tqdm
-            except ImportError:
-                self._bar = _Line()
-            else:
-                self._bar = tqdm()
-            return self._show
-        if self._progress is None or self._progress is False:
-            return None
-        if not callable(self._progress):
-            raise NavSimError(f"progress={self._progress!r} is neither a function nor True")
-        return self._progress
+    def show(done: int, total: int) -> None:
+        shown.total = total
+        shown.update(done - shown.n)
 
-    def _show(self, done: int, total: int) -> None:
-        self._bar.total = total
-        self._bar.update(done - self._bar.n)
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.close()
+    try:
+        yield show
+    finally:
+        shown.close()
 
 
 def windows(outages: Sequence[tuple[float, float]] | str | None) -> list[str] | None:
@@ -234,7 +229,8 @@ def _flat(entry: Mapping[str, Any], before: str = "") -> dict[str, Any]:
 def _column(values: list[Any]) -> npt.NDArray[Any]:
     if any(isinstance(value, str) for value in values):
         return np.asarray(["" if value is None else str(value) for value in values])
-    return np.asarray([np.nan if value is None else value for value in values], dtype=np.float64)
+    # None is NaN
+    return np.asarray(values, dtype=np.float64)
 
 
 def axes_or_new(ax: Axes | None) -> Axes:

@@ -8,13 +8,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from nav_sim._answer import Answer, Columns, Progress, ask, axes_or_new, flattened
 from nav_sim._errors import NavSimError
-from nav_sim._inputs import Staging, StrPath, Table
+from nav_sim._inputs import Staging
 from nav_sim._model import Model
-from nav_sim._wavelet import reading
+from nav_sim._wavelet import Recordings, reading
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -73,8 +72,7 @@ class Calibration(Answer):
             line = ax.loglog(curve["tau_s"], curve["implied"], label=f"{of}: model")[0]
             ax.loglog(curve["tau_s"], curve["wv"], ".", color=line.get_color(), label=of)
             ax.fill_between(curve["tau_s"], curve["ci_low"], curve["ci_high"], alpha=0.2, color=line.get_color(), lw=0)
-        ax.set_xlabel("scale (s)")
-        ax.set_ylabel("wavelet variance")
+        ax.set(xlabel="scale (s)", ylabel="wavelet variance")
         ax.legend()
         return ax
 
@@ -117,7 +115,7 @@ def _array(value: Any) -> Any:
 
 
 def calibrate(
-    recordings: StrPath | Table | npt.ArrayLike | Sequence[StrPath | Table | npt.ArrayLike],
+    recordings: Recordings,
     *,
     rate_hz: float | None = None,
     estimator: str = "dr-awv",
@@ -170,14 +168,8 @@ def calibrate(
         Draws behind the intervals; 0: no intervals.
     seed
         Seed of these draws.
-    threads
-        Threads that compute; by default one a core.
-    progress
-        True shows a bar; a function is told how many recordings are done, of how many.
-
-    Returns
-    -------
-    `.model`, `.parameters`, `.curves`, `.verdict`, `.plot()`, `.summary()`, `.to_html(path)`, `.write(directory)`.
+    threads, progress
+        As of `run`, of recordings.
     """
     with Staging() as staging:
         files = staging.recordings(recordings, "recordings", axes if isinstance(axes, str) else None)

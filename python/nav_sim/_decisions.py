@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
-import numpy.typing as npt
-
 from nav_sim import _model, _trajectory
 from nav_sim._answer import Answer, Progress, ask, window, windows
-from nav_sim._inputs import Staging, StrPath, Table, number, path, settings
+from nav_sim._inputs import Staging, StrPath, number, path, settings
 from nav_sim._model import Model
 from nav_sim._navigation import AnyModel, AnyTrajectory, Outages, Settings
-from nav_sim._wavelet import reading
+from nav_sim._wavelet import Recordings, reading
 
 
 class Choice(Answer):
@@ -152,7 +150,7 @@ def design(
 
 
 def choose(
-    recordings: StrPath | Table | Sequence[StrPath | Table | npt.ArrayLike],
+    recordings: Recordings,
     trajectory: AnyTrajectory,
     *,
     rate_hz: float | None = None,

@@ -8,7 +8,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
-import numpy as np
 
 from nav_sim import _native
 from nav_sim._answer import Answer, Columns, ask, axes_or_new, flattened
@@ -228,8 +227,7 @@ class Model:
         ax = axes_or_new(ax)
         curve = self.wavelet_variance(channel, scales)
         ax.loglog(curve["tau_s"], curve["wv"], label=channel, **line)
-        ax.set_xlabel("scale (s)")
-        ax.set_ylabel("wavelet variance")
+        ax.set(xlabel="scale (s)", ylabel="wavelet variance")
         return ax
 
 

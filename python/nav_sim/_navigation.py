@@ -19,7 +19,7 @@ from nav_sim._trajectory import Trajectory
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Windows without fixes: pairs of start and end (s); [] or "none": none at all; None: 300 to 390 s and 700 to 790 s.
+#: Windows without fixes, as `run` has them.
 Outages = Union[Sequence[tuple[float, float]], str, None]
 #: A trajectory: a file, columns, or a `Trajectory`.
 AnyTrajectory = Union[StrPath, Table, Trajectory]
@@ -32,8 +32,7 @@ Settings = Union[StrPath, Mapping[str, Any]]
 class Run(Answer):
     """Errors of a navigation, by Monte Carlo or covariance analysis: `nav-sim run`.
 
-    `epochs` over time, `runs` run by run, `outages` outage by outage: dicts of columns. ASEE (averaged
-    standard estimation error) is what the filter believes of its error, RMSE how wrong it is.
+    ASEE (averaged standard estimation error) is what the filter believes of its error, RMSE how wrong it is.
     """
 
     @cached_property
@@ -60,8 +59,7 @@ class Run(Answer):
         for name, label in (("rmse", "true (RMSE)"), ("asee", "believed (ASEE)")):
             ax.semilogy(self.epochs["t_s"], self.epochs[f"{name}_horizontal_m"], label=label)
         _shade(ax, self.outages)
-        ax.set_xlabel("time (s)")
-        ax.set_ylabel("horizontal error (m)")
+        ax.set(xlabel="time (s)", ylabel="horizontal error (m)")
         ax.legend()
         return ax
 
@@ -112,7 +110,7 @@ def run(
     static
         Recordings whose windows make them, as to `calibrate`; `rate_hz` (Hz) where there is no time in them.
     outages
-        Windows without fixes: pairs of start and end (s); [] for none; None for 300 to 390 s and 700 to 790 s.
+        Windows without fixes: pairs of start and end (s); [] or "none"; by default 300 to 390 s and 700 to 790 s.
     runs
         Runs of Monte Carlo (100).
     method
@@ -133,10 +131,6 @@ def run(
         Threads that compute; by default one a core.
     progress
         True shows a bar; a function is told how many runs are done, of how many.
-
-    Returns
-    -------
-    `.epochs`, `.outages`, `.verdict`, `.plot()`, `.summary()`, `.to_html(path)`, `.write(directory)`.
     """
     with Staging() as staging:
         recordings = None if static is None else staging.recordings(static, "static", None)
@@ -182,11 +176,7 @@ def lincov(
     """The errors to expect of a navigation, by covariance analysis, without sampling: `nav-sim run --method lincov`.
 
     `trajectory`, `model`, `truth`, `outages`, `filter`, `turn_on_bias`, `scale_ppm`, `require`, `gnss`, `scenario`,
-    `threads` and `progress` as of `run`.
-
-    Returns
-    -------
-    As `run`: RMSE is the error that the truth makes in the mean, ASEE what the filter believes. `.runs` is empty.
+    `threads` and `progress` as of `run`. RMSE is the error that the truth makes in the mean; `.runs` is empty.
     """
     return run(
         trajectory,
@@ -206,7 +196,7 @@ def lincov(
 
 
 class Fusion(Answer):
-    """The filter on recorded data: `nav-sim fuse`. `solution`, `innovations` and `errors` are dicts of columns."""
+    """The filter on recorded data: `nav-sim fuse`."""
 
     @cached_property
     def solution(self) -> Columns:
@@ -230,12 +220,7 @@ class Fusion(Answer):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws the way: longitude and latitude."""
-        ax = axes_or_new(ax)
-        ax.plot(self.solution["lon_deg"], self.solution["lat_deg"])
-        ax.set_aspect(1.0 / np.cos(np.radians(self.solution["lat_deg"][0])))
-        ax.set_xlabel("longitude (°)")
-        ax.set_ylabel("latitude (°)")
-        return ax
+        return _trajectory.way(axes_or_new(ax), self.solution)
 
 
 #: Attitude of the IMU in the vehicle: "flu", "rfu", "auto", angles (°), or angles and standard deviations (°).
@@ -314,10 +299,6 @@ def fuse(
         As of `run`.
     smooth
         Also estimate every row from all fixes.
-
-    Returns
-    -------
-    `.solution`, `.innovations`, `.errors`, `.verdict`, `.plot()`, `.summary()`, `.to_html(path)`, `.write(directory)`.
     """
     with Staging() as staging:
         if heading_deg is not None:
@@ -335,7 +316,7 @@ def fuse(
             initial=staging.settings(initial, "initial"),
             lever_arm_m=numbers(lever_arm_m, "lever_arm_m", 3),
             mounting=_mounting(mounting),
-            reference=None if reference is None else _reference(reference, staging),
+            reference=None if reference is None else _trajectory.staged(reference, staging, "reference"),
             outage=windows(outages or None),
             filter=filter,
             turn_on_bias=turn_on_bias,
@@ -353,7 +334,7 @@ def fuse(
 
 
 class Judgement(Answer):
-    """A solution against a reference: `nav-sim judge`. `.verdict`, `.errors` (columns), `.summary()`, `.to_html(path)`."""
+    """A solution against a reference: `nav-sim judge`."""
 
     @cached_property
     def errors(self) -> Columns:
@@ -390,11 +371,7 @@ def judge(
     origin
         Latitude, longitude (°) and height (m) of local coordinates.
     threads
-        Threads that compute; by default one a core.
-
-    Returns
-    -------
-    `.verdict`, `.errors`, `.summary()`, `.to_html(path)`, `.write(directory)`.
+        As of `run`.
     """
     with Staging() as staging:
         return ask(
@@ -404,7 +381,7 @@ def judge(
             None,
             threads,
             solution=staging.table(solution, "solution"),
-            reference=_reference(reference, staging),
+            reference=_trajectory.staged(reference, staging, "reference"),
             covariance=None if covariance is None else staging.table(covariance, "covariance"),
             outage=windows(outages or None),
             reference_delay=reference_delay_s,
@@ -423,12 +400,6 @@ def _topics(topic: tuple[str | None, str | None] | None) -> Any:
     if not isinstance(topic, (list, tuple)) or len(topic) != 2:
         raise NavSimError(f"topic={topic!r}: not a pair of names, of the IMU and of the fixes")
     return ",".join(name or "" for name in topic)
-
-
-def _reference(reference: AnyTrajectory, staging: Staging) -> str:
-    if isinstance(reference, Trajectory):
-        return reference.staged(staging)
-    return staging.table(reference, "reference")
 
 
 def _mounting(mounting: Mounting | None) -> Any:

@@ -65,20 +65,21 @@ class Trajectory:
 
     def plot(self, ax: Axes | None = None, **line: Any) -> Axes:
         """Draws the way: longitude and latitude, a second a point."""
-        ax = axes_or_new(ax)
-        states = self.states(rate_hz=1.0)
-        ax.plot(states["lon_deg"], states["lat_deg"], **line)
-        ax.set_aspect(1.0 / np.cos(np.radians(states["lat_deg"][0])))
-        ax.set_xlabel("longitude (°)")
-        ax.set_ylabel("latitude (°)")
-        return ax
+        return way(axes_or_new(ax), self.states(rate_hz=1.0), **line)
 
     def __repr__(self) -> str:
         return f"<Trajectory: {self._path or 'columns'}, {self.start_s:g} s to {self.end_s:g} s>"
 
 
-def staged(trajectory: StrPath | Table | Trajectory, staging: Staging) -> str:
+def way(ax: Axes, states: dict[str, FloatArray], **line: Any) -> Axes:
+    """Draws positions, with one scale for both directions."""
+    ax.plot(states["lon_deg"], states["lat_deg"], **line)
+    ax.set(aspect=1.0 / np.cos(np.radians(states["lat_deg"][0])), xlabel="longitude (°)", ylabel="latitude (°)")
+    return ax
+
+
+def staged(trajectory: StrPath | Table | Trajectory, staging: Staging, name: str = "trajectory") -> str:
     """The file of a trajectory."""
     if isinstance(trajectory, Trajectory):
         return trajectory.staged(staging)
-    return staging.table(trajectory, "trajectory")
+    return staging.table(trajectory, name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -19,21 +19,26 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+#: A recording or several, as `calibrate` takes them.
+Recordings = Union[StrPath, Table, npt.ArrayLike, Sequence[Union[StrPath, Table, npt.ArrayLike]]]
+
+
 class Curve(dict[str, FloatArray]):
     """A variance or deviation, scale by scale: a dict of arrays of one length.
 
     `tau_s` are the times (s), `ci_low` and `ci_high` the ends of the 95 % intervals, `edof` the equivalent degrees of
-    freedom; the figure itself is `wv` (units²) or `adev` (units).
+    freedom; the figure itself is `wv` (the unit of x squared) or `adev` (the unit of x).
     """
 
     def plot(self, ax: Axes | None = None, **line: Any) -> Axes:
         """Draws the curve with its intervals, both axes logarithmic; `line` goes to matplotlib."""
         ax = axes_or_new(ax)
-        name = "adev" if "adev" in self else "wv"
+        name, x, y = "wv", "scale (s)", "wavelet variance"
+        if "adev" in self:
+            name, x, y = "adev", "averaging time (s)", "Allan deviation"
         drawn = ax.loglog(self["tau_s"], self[name], marker=".", **line)[0]
         ax.fill_between(self["tau_s"], self["ci_low"], self["ci_high"], alpha=0.2, color=drawn.get_color(), lw=0)
-        ax.set_xlabel("averaging time (s)" if name == "adev" else "scale (s)")
-        ax.set_ylabel("Allan deviation" if name == "adev" else "wavelet variance")
+        ax.set(xlabel=x, ylabel=y)
         return ax
 
 
@@ -59,10 +64,6 @@ def wavelet_variance(
         That of the robust one at the Gaussian model, 0.3 to 0.99.
     scales
         How many; by default one less than the length allows.
-
-    Returns
-    -------
-    `tau_s`, `wv` (the unit of x squared), `edof`, `ci_low`, `ci_high`.
     """
     rate = _rate(rate_hz)
     levels = None if scales is None else whole(scales, "scales", 1)
@@ -87,20 +88,15 @@ def allan_deviation(
     """The overlapping Allan deviation of one signal of rates, at averaging times of 1, 2, 4, … samples.
 
     It is the root of twice the wavelet variance at scales twice as long, with the arguments of `wavelet_variance`.
-
-    Returns
-    -------
-    `tau_s` (averaging times), `adev` (the unit of x), `edof`, `ci_low`, `ci_high`.
     """
     wv = wavelet_variance(x, rate_hz, robust=robust, efficiency=efficiency, scales=scales)
-    low, high = np.sqrt(2.0 * wv["ci_low"]), np.sqrt(2.0 * wv["ci_high"])
-    adev = np.sqrt(2.0 * wv["wv"])
+    adev, low, high = (np.sqrt(2.0 * wv[key]) for key in ("wv", "ci_low", "ci_high"))
     return Curve(tau_s=wv["tau_s"] / 2.0, adev=adev, edof=wv["edof"], ci_low=low, ci_high=high)
 
 
 def _rate(rate_hz: float) -> float:
     rate = number(rate_hz, "rate_hz")
-    if not (math.isfinite(rate) and rate > 0.0):
+    if not 0.0 < rate < math.inf:
         raise NavSimError(f"rate_hz: {rate_hz} is not a rate above 0 Hz")
     return rate
 
@@ -118,16 +114,12 @@ class WaveletVariances(Answer):
         efficiency = float(self.data["efficiency"])
 
         def curve(name: str, share: float) -> Curve:
-            figures = {key: _finite(entry[name][key]) for key in ("wv", "ci_low", "ci_high")}
+            figures = {key: np.asarray(entry[name][key], dtype=np.float64) for key in ("wv", "ci_low", "ci_high")}
             # the engine has no fewer than one
             return Curve(tau_s=tau_s, edof=np.maximum(share * edof, 1.0), **figures)
 
         named = {key: entry[key] for key in ("file", "sensor", "axis", "samples")}
         return {**named, "classical": curve("classical", 1.0), "robust": curve("robust", efficiency)}
-
-
-def _finite(values: list[float | None]) -> FloatArray:
-    return np.asarray([np.nan if value is None else value for value in values], dtype=np.float64)
 
 
 def reading(
@@ -138,7 +130,7 @@ def reading(
 
 
 def wv(
-    recordings: StrPath | Table | npt.ArrayLike | Sequence[StrPath | Table | npt.ArrayLike],
+    recordings: Recordings,
     *,
     rate_hz: float | None = None,
     axes: str | Sequence[str] | None = None,

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import nav_sim
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -26,7 +27,10 @@ def command() -> Command:
     """The command of the wheel, whose exit code is to be the first argument's."""
 
     def call(*words: object, code: int = 0, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-        given = [sys.executable, "-m", "nav_sim", *map(str, words), "--no-progress"]
+        given = [sys.executable, "-m", "nav_sim", "--no-progress"]
+        for word in words:
+            # options may be one text
+            given += word.split() if isinstance(word, str) and word[0] == "-" else [str(word)]
         done = subprocess.run(given, capture_output=True, text=True, cwd=cwd, encoding="utf-8")
         assert done.returncode == code, done.stderr
         return done
@@ -34,11 +38,19 @@ def command() -> Command:
     return call
 
 
+def refused(words: str, call: Callable[..., object], *given: Any, **arguments: Any) -> nav_sim.NavSimError:
+    """The error of a call, whose message begins with these words."""
+    with pytest.raises(nav_sim.NavSimError) as found:
+        call(*given, **arguments)
+    assert found.value.message.startswith(words), found.value.message
+    return found.value
+
+
 @pytest.fixture(scope="session")
 def recordings(tmp_path_factory: pytest.TempPathFactory, command: Command) -> Path:
     """Four static recordings of 4096 samples, 100 Hz."""
     place = tmp_path_factory.mktemp("recordings") / "static"
-    command("synthesize", CONSUMER, "--replicates", 4, "--samples", 4096, "--seed", 1, "-o", place)
+    command("synthesize", CONSUMER, "--replicates 4 --samples 4096 --seed 1 -o", place)
     return place
 
 
@@ -46,7 +58,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory, command: Command) -> Pa
 def drive(tmp_path_factory: pytest.TempPathFactory, command: Command) -> Path:
     """IMU and GNSS recordings of a drive: imu.csv, gnss.csv, reference.csv, initial.toml."""
     place = tmp_path_factory.mktemp("drive") / "drive"
-    command("trajectory", "record", DRIVE, TACTICAL, "--seed", 1, "-o", place)
+    command("trajectory", "record", DRIVE, TACTICAL, "--seed 1 -o", place)
     return place
 
 
@@ -65,11 +77,8 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def table(path: Path) -> dict[str, Any]:
     """A table of numbers as columns."""
-    import numpy as np
-
     lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-    values = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
-    return dict(zip(lines[0].split(","), values.T))
+    return dict(zip(lines[0].split(","), np.loadtxt(lines[1:], delimiter=",", ndmin=2).T))
 
 
 def without_times(text: str) -> dict[str, Any]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Any
 
 import nav_sim
 import numpy as np
 import pytest
-from conftest import CONSUMER, DRIVE, ROOT, TACTICAL, Command, table
+from conftest import CONSUMER, DRIVE, ROOT, TACTICAL, Command, refused, table
 from nav_sim import Model, NavSimError, NavSimWarning, Trajectory
 
 
@@ -37,26 +36,18 @@ def test_a_model_file_comes_back_as_it_was(tmp_path: Path) -> None:
 
 
 def test_what_is_no_model_is_refused() -> None:
-    with pytest.raises(NavSimError, match="no/such"):
-        Model.read("no/such.toml")
-    wrong: list[tuple[Any, ...]] = [
-        (-1.0, [], []),
-        (100.0, [{"type": "XX"}]),
-        (100.0, [{"type": "WN", "sigma2": -1.0}]),
-        (100.0,),
-    ]
-    for arguments in wrong:
-        with pytest.raises(NavSimError):
-            Model(*arguments)
-    with pytest.raises(NavSimError) as refused:
-        Model.from_toml("schema = 1\nrate_hz = 100.0\n[gyro]\nprocesses = 3\n")
-    assert refused.value.line == 4
+    refused("no/such", Model.read, "no/such.toml")
+    for processes in ([{"type": "XX"}], [{"type": "WN", "sigma2": -1.0}], None):
+        refused("", Model, 100.0, processes)
+    refused("", Model, -1.0, [], [])
+    assert refused("", Model.from_toml, "schema = 1\nrate_hz = 100.0\n[gyro]\nprocesses = 3\n").line == 4
 
 
 @pytest.mark.parametrize("contaminate", [None, "section5-III"])
 def test_a_recording_is_that_of_the_command(contaminate: str | None, command: Command, tmp_path: Path) -> None:
-    words = ("--replicates", 2, "--samples", 60000, "--spread", "--seed", 7, "-q", "-o", tmp_path / "static")
-    command("synthesize", CONSUMER, *words, *(("--contaminate", contaminate) if contaminate else ()))
+    corrupts = f"--contaminate {contaminate}" if contaminate else "-q"
+    words = "--replicates 2 --samples 60000 --spread --seed 7 -o"
+    command("synthesize", CONSUMER, corrupts, words, tmp_path / "static")
     own = Model.read(CONSUMER).synthesize(samples=60000, replicate=2, seed=7, spread=True, contaminate=contaminate)
     # the file has ten digits
     for name, values in table(tmp_path / "static" / "replicate_2.csv").items():
@@ -67,8 +58,7 @@ def test_a_recording_is_that_of_the_command(contaminate: str | None, command: Co
 def test_the_length_of_a_recording() -> None:
     assert len(Model.read(TACTICAL).synthesize(duration_s=2.0)["gyro_x_rad_s"]) == 200
     for arguments in ({}, {"samples": 0}, {"samples": 5, "duration_s": 1.0}, {"samples": 5, "seed": -1}):
-        with pytest.raises(NavSimError):
-            white_and_walk().synthesize(**arguments)
+        refused("", white_and_walk().synthesize, **arguments)
 
 
 def test_the_wavelet_variance_of_white_noise_and_a_walk() -> None:
@@ -90,7 +80,7 @@ def test_practical_figures_are_those_of_the_processes() -> None:
 
 def test_an_export_is_that_of_the_command(command: Command, tmp_path: Path) -> None:
     for target in ("kalibr", "px4", "kf-gins"):
-        command("export", TACTICAL, "--target", target, "-o", tmp_path / "out", "-q", "--force")
+        command("export", TACTICAL, "--force -q --target", target, "-o", tmp_path / "out")
         Model.read(TACTICAL).export(target, tmp_path / "own")
         assert (tmp_path / "own").read_bytes() == (tmp_path / "out").read_bytes(), target
     with pytest.raises(NavSimError, match="target"):
@@ -121,19 +111,17 @@ def test_a_trajectory_of_a_file() -> None:
     way.plot()
     pyplot.close("all")
     for wrong in ("no/such.toml", {"t_s": [0.0]}, {}, 5):
-        with pytest.raises(NavSimError):
-            Trajectory(wrong)  # type: ignore[arg-type]
+        refused("", Trajectory, wrong)
     with pytest.raises(NavSimError, match="rate_hz"):
         way.states(-1.0)
 
 
+@pytest.mark.filterwarnings("ignore::nav_sim.NavSimWarning")
 def test_a_data_sheet_is_that_of_the_command(command: Command, tmp_path: Path) -> None:
-    command("datasheet", "--unit", "stim300", "--rate-hz", 200, "--corr-time", "1000 s", "-o", tmp_path / "m.toml")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", nav_sim.NavSimWarning)
-        own = Model.from_datasheet("stim300", rate_hz=200.0, corr_time="1000 s")
-        entry = ROOT / "calib_data" / "catalogue" / "stim300.toml"
-        of_entry = Model.from_datasheet(entry=entry, rate_hz=200.0, corr_time="1000 s")
+    command("datasheet", "--unit stim300 --rate-hz 200 --corr-time", "1000 s", "-o", tmp_path / "m.toml")
+    own = Model.from_datasheet("stim300", rate_hz=200.0, corr_time="1000 s")
+    entry = ROOT / "calib_data" / "catalogue" / "stim300.toml"
+    of_entry = Model.from_datasheet(entry=entry, rate_hz=200.0, corr_time="1000 s")
     assert own.to_toml() == of_entry.to_toml() == (tmp_path / "m.toml").read_text(encoding="utf-8")
     units = nav_sim.catalogue()
     assert "stim300" in units["unit"] and len(units["given"]) == len(units["source"])
@@ -158,9 +146,7 @@ def test_a_density_is_that_of_the_sheet() -> None:
     ],
 )
 def test_what_is_no_data_sheet_is_refused(arguments: dict[str, Any], words: str) -> None:
-    with pytest.raises(NavSimError) as refused:
-        Model.from_datasheet(**arguments)
-    assert refused.value.message.startswith(words), refused.value.message
+    refused(words, Model.from_datasheet, **arguments)
 
 
 @pytest.mark.parametrize(
@@ -172,21 +158,17 @@ def test_what_is_no_data_sheet_is_refused(arguments: dict[str, Any], words: str)
     ],
 )
 def test_what_is_no_process_is_refused(given: Any, words: str) -> None:
-    with pytest.raises(NavSimError) as refused:
-        Model(100.0, gyro=given)
-    assert refused.value.message.startswith(words), refused.value.message
+    refused(words, Model, 100.0, gyro=given)
     assert Model(100.0, gyro={"type": "WN", "sigma2": 1.0}) == Model(100.0, gyro=[{"type": "WN", "sigma2": 1.0}])
 
 
+@pytest.mark.filterwarnings("ignore::nav_sim.NavSimWarning")
 def test_figures_of_imu_utils_need_the_rate_and_are_per_sample(tmp_path: Path) -> None:
     file = tmp_path / "imu.yaml"
     file.write_text('%YAML:1.0\nGyr:\n   unit: " rad/s"\n   avg-axis:\n      gyr_n: 2e-3\n      gyr_w: 3e-5\n')
-    with pytest.raises(NavSimError) as refused:
-        Model.from_datasheet(measured=file)
-    assert refused.value.line == 5 and "rate_hz=" in (refused.value.hint or ""), refused.value
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", nav_sim.NavSimWarning)
-        model = Model.from_datasheet(measured=file, rate_hz=400.0, gyro_rrw="2 deg/h/sqrt(h)")
+    without_rate = refused("", Model.from_datasheet, measured=file)
+    assert without_rate.line == 5 and "rate_hz=" in (without_rate.hint or ""), without_rate
+    model = Model.from_datasheet(measured=file, rate_hz=400.0, gyro_rrw="2 deg/h/sqrt(h)")
     processes = model.processes["gyro.x"]
     assert model.rate_hz == 400.0
     # a sample has the variance that the file states; K²/rate is the variance of an increment

@@ -121,9 +121,9 @@ def test_many_calls_leave_memory_flat() -> None:
 def test_the_command_is_the_program(command: Command, tmp_path: Path) -> None:
     assert command("--version").stdout.startswith("nav-sim ")
     assert "lincov" in command("run", "--help").stdout
-    assert "no/such.csv" in command("wv", "no/such.csv", code=1).stderr
+    assert "no/such.csv" in command("wv", "no/such.csv", code=2).stderr
     assert "--no-such" in command("wv", "--no-such", code=2).stderr
-    done = command("run", DRIVE, TACTICAL, "--method", "lincov", "-q", "-o", tmp_path / "run")
+    done = command("run", DRIVE, TACTICAL, "--method lincov -q -o", tmp_path / "run")
     assert "horizontal" in done.stdout
     assert '"nav-sim"' in (tmp_path / "run" / "manifest.json").read_text(encoding="utf-8")
 

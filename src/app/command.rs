@@ -686,7 +686,7 @@ impl<C: Command> Asked<C> {
                 for file in answer.files() {
                     let path = beside(out, &file.name);
                     let text: String = file.parts.collect();
-                    let bytes = packed(&path, text).map_err(|e| Failure::io(&path, e))?;
+                    let bytes = packed(&path, text).map_err(|e| Failure::unwritable(&path, e))?;
                     filled.push(atomic::filled(&path, &bytes)?);
                     written.push(path);
                 }

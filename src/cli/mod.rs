@@ -5,8 +5,8 @@ use crate::app::{Answer, Asked, Result};
 use crate::commands::batch::Study;
 use crate::commands::trajectory::{TrajectoryArgs, TrajectoryCommand};
 use crate::commands::with_commands;
-use crate::io::{contamination_file, fusion_files, model_file, trajectory_file};
-use clap::error::ErrorKind;
+use crate::io::{contamination_file, file_kind, fusion_files, model_file, trajectory_file};
+use clap::error::{ContextKind, ErrorKind};
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_signal::lanes::Level;
@@ -163,7 +163,14 @@ fn end(e: &clap::Error) -> ! {
         ErrorKind::MissingRequiredArgument | ErrorKind::UnknownArgument
     );
     let help = is_lost.then(|| "--help shows usage and examples".to_owned());
-    let failure = Failure::usage(e).or_hint_if(help);
+    let mut failure = Failure::usage(e).or_hint_if(help);
+    // a file too many: what it holds, and what takes it
+    if let (ErrorKind::UnknownArgument, Some(word)) = (e.kind(), e.get(ContextKind::InvalidArg)) {
+        let path = PathBuf::from(word.to_string());
+        if path.is_file() {
+            failure = file_kind::unless(&[], &path, failure);
+        }
+    }
     Session::default().failure(&failure);
     std::process::exit(failure.code().into())
 }

@@ -156,7 +156,7 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
             return Ok(format!("{} GNSS fixes{unsaid}", fixes.len()));
         }
         FileKind::Imu => return Ok(drive(&read_imu(path, None, None)?, context)),
-        FileKind::Recording => {
+        FileKind::Recording | FileKind::Other => {
             let recordings =
                 match inputs::recordings(&[path.to_owned()], rate_hz, Gaps::Keep, context) {
                     Ok(recordings) => recordings,

@@ -113,10 +113,15 @@ impl Command for Compare {
                 "no run to compare with",
                 "name one of them with --reference DIR; two model files need none",
             ),
-            _ => refused(
-                format!("{} is a file: runs are directories", models[0].display()),
-                "give two model files, or run directories with --reference DIR",
-            ),
+            _ => {
+                for path in &all {
+                    std::fs::metadata(path).map_err(|e| Failure::io(path, e))?;
+                }
+                refused(
+                    format!("{} is a file: runs are directories", models[0].display()),
+                    "give two model files, or run directories with --reference DIR",
+                )
+            }
         }
     }
 }

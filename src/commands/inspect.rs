@@ -2,6 +2,7 @@
 
 use crate::app::reading::LogRequest;
 use crate::app::{Answer, Command, Context, Result};
+use crate::io::file_kind::{self, FileKind};
 use crate::io::logs;
 use nav_sim_document::{Document, Importance, Table, Tone, six_digits};
 use nav_sim_logs::{Channel, Content, Error, Log, Stamp};
@@ -94,7 +95,7 @@ pub struct InspectedChannel {
 /// # Errors
 /// When the file is not a log that is read, or is damaged before its end.
 pub fn inspect(path: &Path, stamp: Stamp) -> Result<Inspection> {
-    let log = logs::open(path)?;
+    let log = logs::open(path).map_err(|e| file_kind::unless(&[FileKind::Log], path, e))?;
     let channels = log
         .channels()
         .iter()

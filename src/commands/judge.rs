@@ -202,13 +202,10 @@ fn doubt(doubt: &Doubt) -> String {
         } => format!(
             "the axes of {axes} are turned by roll {roll:.0}°, pitch {pitch:.0}°, yaw {yaw:.0}° in those of the reference: write both as front, right, down in north, east, down"
         ),
-        Doubt::AngleUnit { times } if *times > 1.0 => format!(
-            "attitudes are {} times as far off as stated: are their standard deviations radians under a name of degrees?",
-            readable(*times)
-        ),
-        Doubt::AngleUnit { times } => format!(
-            "attitudes are {} times as near as stated: are their standard deviations degrees under a name of radians?",
-            readable(1.0 / times)
+        Doubt::Transformed { cause, times, left } => format!(
+            "{cause}? Errors are {} times their standard deviations as it is, {} times after that",
+            readable(*times),
+            readable(*left)
         ),
         Doubt::Offset(found) => {
             let (offset, sigma) = (found.offset, found.sigma);
@@ -260,8 +257,14 @@ fn page(judgement: &Judgement, outages: &[(f64, f64)]) -> Document {
     let ends = judgement.errors.first().zip(judgement.errors.last());
     if let Some((first, last)) = ends {
         document.text(&format!(
-            "{} rows, {:.2}–{:.2} s",
-            judgement.rows, first.t_s, last.t_s
+            "{} rows, {:.2}–{:.2} s{}",
+            judgement.rows,
+            first.t_s,
+            last.t_s,
+            match judgement.is_at_epochs {
+                true => ", those at the reference's own epochs: it is coarser than the solution",
+                false => "",
+            }
         ));
     }
     if let Some(found) = judgement

@@ -14,7 +14,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Synthesise static recordings from a noise model
 ///
@@ -316,7 +316,7 @@ fn reaches(
 
 fn find(name: &str, rate_hz: f64) -> Result<Contamination> {
     contamination_file::find(name, rate_hz).map_err(|e| match contamination_file::meant(name) {
-        _ if e.code() != 1 => e,
+        _ if Path::new(name).exists() => e,
         Some(meant) => e.hint(format!("did you mean \"{meant}\"?")),
         None => {
             let known = contamination_file::names().join(", ");

@@ -185,7 +185,7 @@ pub(crate) fn commit(files: impl IntoIterator<Item = AtomicFile>) -> Result<(), 
         renamed
             .next()
             .unwrap_or(Ok(()))
-            .map_err(|e| Failure::io(&file.destination, e))
+            .map_err(|e| Failure::unwritable(&file.destination, e))
     });
     drop(unfinished);
     renamed
@@ -202,7 +202,7 @@ pub(crate) fn filled(destination: &Path, contents: &[u8]) -> Result<AtomicFile, 
     if file.temporary.is_some() {
         written = written.and_then(|()| file.file.sync_all());
     }
-    written.map_err(|e| Failure::io(destination, e))?;
+    written.map_err(|e| Failure::unwritable(destination, e))?;
     Ok(file)
 }
 
@@ -297,7 +297,7 @@ impl AtomicDir {
             parts.try_for_each(|part| file.write_all(part.as_ref()))?;
             file.into_inner()?.sync_all()
         };
-        write().map_err(|e| Failure::io(&self.destination.join(name), e))?;
+        write().map_err(|e| Failure::unwritable(&self.destination.join(name), e))?;
         self.names.push(name.to_owned());
         Ok(())
     }
@@ -313,7 +313,7 @@ impl AtomicDir {
                 .staging
                 .rename(&self.destination, &mut locked(&UNFINISHED)),
         };
-        moved.map_err(|e| Failure::io(&self.destination, e))
+        moved.map_err(|e| Failure::unwritable(&self.destination, e))
     }
 
     fn replace(&self) -> io::Result<()> {

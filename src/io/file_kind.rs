@@ -33,25 +33,28 @@ pub(crate) enum FileKind {
     Imu,
     /// A log.
     Log,
-    /// A static recording, or a directory of them.
+    /// A recording of an IMU, most likely a static one.
     Recording,
+    /// A table of other columns or none, or a directory: what reads recordings says more.
+    Other,
 }
 
 impl FileKind {
     /// Words for it, with the command that takes it; none for what may be anything.
     const fn described(&self) -> Option<&'static str> {
         Some(match self {
-            Self::Model => "a noise model: run, fuse, synthesize and export take it",
+            Self::Model => "a noise model: run, fuse, tune, synthesize and export take it",
             Self::Study => "a study: batch takes it",
             Self::CatalogueEntry => "data-sheet figures: datasheet makes a model of them",
             Self::Contamination => "a contamination: synthesize --contaminate takes it",
             Self::Curve => "wavelet-variance curves: calibrate --curve takes them",
             Self::Record => "a record beside a result: no command reads it by itself",
-            Self::Trajectory => "a trajectory: run takes it",
+            Self::Trajectory => "a trajectory: run takes it, and so does --trajectory of others",
             Self::Initial => "an initial state: fuse --initial takes it",
             Self::Gnss => "GNSS fixes: fuse takes them as its second file",
             Self::Imu => "a recording under way: fuse takes it as its first file",
-            Self::Recording => "a table: wv, calibrate and fuse take one of a recording",
+            Self::Recording => "a recording of an IMU: wv, calibrate and fuse take it",
+            Self::Other => "a table: wv, calibrate and fuse take one of a recording",
             Self::Log => "a log: nav-sim inspect lists its channels",
             Self::Scenario => return None,
         })
@@ -61,7 +64,7 @@ impl FileKind {
 /// The refusal of a file that was expected to be of other kinds.
 pub(crate) fn unless(expected: &[FileKind], path: &Path, refusal: Failure) -> Failure {
     // of what is known no better, the reader's own advice says more
-    let is_vague = |kind: &FileKind| *kind == FileKind::Recording && refusal.advice().is_some();
+    let is_vague = |kind: &FileKind| *kind == FileKind::Other && refusal.advice().is_some();
     let is_other = |kind: &FileKind| !(expected.contains(kind) || is_vague(kind));
     let other = of(path).ok().filter(is_other);
     match other.and_then(|kind| kind.described()) {
@@ -78,7 +81,10 @@ pub(crate) fn unless(expected: &[FileKind], path: &Path, refusal: Failure) -> Fa
 /// When the system refuses.
 pub(crate) fn of(path: &Path) -> Result<FileKind, Failure> {
     let name = path.to_string_lossy().to_lowercase();
-    if path.is_dir() || name.ends_with(".npy") {
+    if path.is_dir() {
+        return Ok(FileKind::Other);
+    }
+    if name.ends_with(".npy") {
         return Ok(FileKind::Recording);
     }
     match logs::kind_of(path) {
@@ -95,7 +101,7 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, Failure> {
     }
     let text = match source::head(path) {
         // A damaged one: the reader of recordings says how.
-        Err(_) if plain != name => return Ok(FileKind::Recording),
+        Err(_) if plain != name => return Ok(FileKind::Other),
         read => read.map_err(|e| Failure::io(path, e))?,
     };
     if name.ends_with(".json") || text.trim_start().starts_with('{') {
@@ -189,13 +195,17 @@ fn table_kind(text: &str) -> FileKind {
     } else if has(&of(&curve_file::DICTIONARY), "tau_samples") {
         FileKind::Curve
     } else if is_signal {
-        FileKind::Recording
+        // beside positions signals tell nothing of what the file is for
+        match is_position {
+            true => FileKind::Other,
+            false => FileKind::Recording,
+        }
     } else if is_fix && !has(&path, "roll_deg") || is_whole {
         FileKind::Gnss
     } else if is_position {
         FileKind::Trajectory
     } else {
-        FileKind::Recording
+        FileKind::Other
     }
 }
 
@@ -263,7 +273,7 @@ mod tests {
             "0,9.79,0.1,0.2,1e-3,2e-3,1e-3\n",
             "0.007,1.011,0.038,-0.160\n0.01,7,1.011,0.038,-0.1,0.1,33\n",
         ] {
-            assert_eq!(table_kind(text), FileKind::Recording, "{text}");
+            assert_eq!(table_kind(text), FileKind::Other, "{text}");
         }
         assert_eq!(of_toml("= broken"), FileKind::Scenario);
         assert_eq!(

@@ -1,5 +1,5 @@
 //! Facts about recorded columns that no noise explains: copied rows, zeros for lost samples, held and frozen values,
-//! interpolation, motion, samples in two recordings.
+//! interpolation, motion, samples in two recordings, drift, noise that axes share.
 //!
 //! Columns are as a file has them, in any unit. The null hypothesis is a noise with stationary increments that is rounded to
 //! the steps of a quantiser, with axes that are independent of one another within a block of rows: equal neighbours of one
@@ -8,7 +8,7 @@
 use crate::imu::{Recording, Sensor};
 use std::borrow::Cow;
 use std::collections::HashSet;
-use std::f64::consts::SQRT_2;
+use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 use std::ops::Range;
 
 /// Probability of a false alarm.
@@ -21,15 +21,23 @@ const FINE: f64 = 4.0;
 /// Median of |x| of a standard normal.
 const NORMAL: f64 = 0.674_489_75;
 
-/// True if `count` of `trials` is more than a chance of `p` explains: Chernoff's bound on the binomial tail.
+/// True if `count` of `trials` is more than a chance of `p` explains.
 fn is_beyond(count: usize, trials: usize, p: f64) -> bool {
+    log_improbability(count, trials, p) > -LEVEL.ln()
+}
+
+/// Chernoff's bound on the tail of a binomial distribution from `count` up: −ln of it, 0 below the mean.
+fn log_improbability(count: usize, trials: usize, p: f64) -> f64 {
     let (n, q, p) = (
         trials as f64,
         count as f64 / trials.max(1) as f64,
         p.max(1e-15),
     );
     let term = |q: f64, p: f64| if q > 0.0 { q * (q / p).ln() } else { 0.0 };
-    q > p && n * (term(q, p) + term(1.0 - q, 1.0 - p)) > -LEVEL.ln()
+    match q > p {
+        true => n * (term(q, p) + term(1.0 - q, 1.0 - p)),
+        false => 0.0,
+    }
 }
 
 /// The middle of some numbers, the upper one of an even number. They are counted by their first bits and only those about the
@@ -406,6 +414,144 @@ pub fn moving(recording: &Recording) -> (usize, usize) {
         }
     }
     (moves.iter().filter(|moves| **moves).count(), seconds)
+}
+
+/// Means of blocks of a column, and how many samples are in each.
+type Blocks = Vec<(f64, f64)>;
+
+/// The blocks of one sample each.
+fn samples_of(axis: &[f64]) -> Blocks {
+    let block = |x: &f64| if x.is_nan() { (0.0, 0.0) } else { (*x, 1.0) };
+    axis.iter().map(block).collect()
+}
+
+/// Each two blocks as one.
+fn joined(blocks: &[(f64, f64)]) -> Blocks {
+    let join = |pair: &[(f64, f64)]| {
+        let ((a, of_a), (b, of_b)) = (pair[0], pair[1]);
+        let count = of_a + of_b;
+        ((a * of_a + b * of_b) / count.max(1.0), count)
+    };
+    blocks.chunks_exact(2).map(join).collect()
+}
+
+/// Haar wavelet coefficients without overlap, of blocks of `width` samples: NaN where more than half a block is missing. Those of
+/// white noise and of a random walk are independent of one another, those between nearly so.
+fn haar(blocks: &[(f64, f64)], width: f64) -> Vec<f64> {
+    let of = |pair: &[(f64, f64)]| match pair[0].1.min(pair[1].1) < 0.5 * width {
+        true => f64::NAN,
+        false => pair[1].0 - pair[0].0,
+    };
+    blocks.chunks_exact(2).map(of).collect()
+}
+
+/// Slope of a column (units a sample), where it is more than a random walk explains: its Haar coefficients at the longest scale
+/// with 32 of them are independent and without a mean in any noise with stationary increments, so their mean is Student's t
+/// of 31 degrees of freedom and more. It exceeds its limit with 5e-6, which is for six axes.
+#[must_use]
+pub fn drift(axis: &[f64]) -> Option<f64> {
+    const COEFFICIENTS: usize = 32;
+    const LIMIT: f64 = 5.5;
+    let (mut blocks, mut width) = (samples_of(axis), 1.0);
+    while blocks.len() >= 4 * COEFFICIENTS {
+        (blocks, width) = (joined(&blocks), 2.0 * width);
+    }
+    let mut all = haar(&blocks, width);
+    all.retain(|x| x.is_finite());
+    let n = all.len() as f64;
+    let mean = all.iter().sum::<f64>() / n;
+    let square = all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    // what a column of few steps has is no normal distribution
+    let is_drift = all.len() >= COEFFICIENTS && width >= 16.0;
+    (is_drift && mean.abs() > LIMIT * (square / n).sqrt()).then(|| mean / width)
+}
+
+/// Noise that two axes share.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SharedNoise {
+    /// The axes.
+    pub axes: [usize; 2],
+    /// Correlation at the averaging time at which it is largest.
+    pub correlation: f64,
+    /// Averaging times at which they are correlated, the first and the last (samples).
+    pub averages: [f64; 2],
+}
+
+/// Correlation below which intervals of two axes are those of independent ones, to 5 %.
+const LEAST_CORRELATION: f64 = 0.1;
+
+/// Pairs of axes that share noise: their Haar coefficients have the same sign more often, or more rarely, than by chance.
+/// Signs hold for any distribution and any change of its level; of normal ones with correlation ρ a share of 1/2 + asin(ρ)/π
+/// is the same. At each scale as many of them count as there are coefficients, which are independent as [`haar`] says.
+#[must_use]
+pub fn shared_noise(axes: &[&[f64]]) -> Vec<SharedNoise> {
+    let pairs = (1..axes.len()).flat_map(|later| (0..later).map(move |first| [first, later]));
+    let is_copy = |[a, b]: &[usize; 2]| copied(&[axes[*a], axes[*b]]).is_some();
+    let pairs: Vec<[usize; 2]> = pairs.filter(|pair| !is_copy(pair)).collect();
+    let mut found: Vec<Option<SharedNoise>> = vec![None; pairs.len()];
+    let rows = axes.first().map_or(0, |axis| axis.len());
+    let tests = 2.0 * pairs.len() as f64 * (rows.max(2) as f64).log2();
+    let mut blocks: Vec<Blocks> = axes.iter().map(|axis| samples_of(axis)).collect();
+    let mut width = 1.0;
+    while blocks.first().is_some_and(|blocks| blocks.len() >= 4) {
+        let signs: Vec<Vec<i8>> = blocks.iter().map(|own| signs(&haar(own, width))).collect();
+        for (pair, found) in pairs.iter().zip(&mut found) {
+            let correlation = sign_correlation(&signs[pair[0]], &signs[pair[1]], tests);
+            let Some(correlation) = correlation.filter(|x| x.abs() >= LEAST_CORRELATION) else {
+                continue;
+            };
+            let own = found.get_or_insert(SharedNoise {
+                axes: *pair,
+                correlation,
+                averages: [width, width],
+            });
+            own.averages[1] = width;
+            if correlation.abs() > own.correlation.abs() {
+                own.correlation = correlation;
+            }
+        }
+        blocks = blocks.iter().map(|own| joined(own)).collect();
+        width *= 2.0;
+    }
+    found.into_iter().flatten().collect()
+}
+
+/// Sides of the median; 0 on it.
+fn signs(values: &[f64]) -> Vec<i8> {
+    let there: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
+    if there.is_empty() {
+        return vec![0; values.len()];
+    }
+    let middle = median(there);
+    let side = |x: &f64| i8::from(*x > middle) - i8::from(*x < middle);
+    values.iter().map(side).collect()
+}
+
+/// Correlation by signs, where one of so many tests that find none has a share of [`LEVEL`].
+fn sign_correlation(a: &[i8], b: &[i8], tests: f64) -> Option<f64> {
+    let (mut trials, mut same, mut above) = (0_usize, 0_usize, [0_usize; 2]);
+    for (a, b) in a.iter().zip(b) {
+        if *a != 0 && *b != 0 {
+            trials += 1;
+            same += usize::from(a == b);
+            above[0] += usize::from(*a > 0);
+            above[1] += usize::from(*b > 0);
+        }
+    }
+    // steps put more on one side of the median than on the other
+    let [of_a, of_b] = above.map(|count| count as f64 / trials.max(1) as f64);
+    let by_chance = of_a * of_b + (1.0 - of_a) * (1.0 - of_b);
+    let share = same as f64 / trials.max(1) as f64;
+    let beyond = log_improbability(same, trials, by_chance).max(log_improbability(
+        trials - same,
+        trials,
+        1.0 - by_chance,
+    ));
+    (beyond > (tests / LEVEL).ln()).then(|| {
+        (PI * (share - by_chance))
+            .clamp(-FRAC_PI_2, FRAC_PI_2)
+            .sin()
+    })
 }
 
 /// Marks of the samples of a sensor, to be found again in another recording: hashes of some of its windows of 64 rows.

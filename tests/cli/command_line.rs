@@ -185,7 +185,7 @@ fn a_directory_that_is_no_run_is_refused_with_advice() {
         .output()
         .unwrap();
     let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert_eq!(output.status.code(), Some(2), "{said}");
     let expected = format!("error: {path}/manifest.json: No such file or directory");
     assert!(
         said.starts_with(&expected) && said.contains("\n\nhint: not a finished run directory"),

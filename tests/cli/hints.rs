@@ -172,13 +172,18 @@ fn hints_on_recordings_work() {
     }
     let long = gap.replace("\n2.", "\n42.");
     in_file("a.csv", &long, &[gaps]);
+    // where no value of --gaps helps, none is named, by commands without that option too
     fs::write(place.path().join("a.csv"), random(60)).unwrap();
-    let ran = nav_sim(place.path(), "wv a.csv -q");
-    assert!(
-        ran.code == 2 && ran.stderr.contains("record again"),
-        "{}",
-        ran.stderr
-    );
+    for command in ["wv a.csv -q", "check a.csv"] {
+        let ran = nav_sim(place.path(), command);
+        assert!(
+            ran.code == 2
+                && ran.stderr.contains("hint: record again")
+                && !ran.stderr.contains("--gaps"),
+            "{}",
+            ran.stderr
+        );
+    }
 
     // lines before the header that look like rows
     in_file(
@@ -321,17 +326,28 @@ fn files_of_another_kind_are_named() {
     let place = place_with(DRIVE, MODEL);
     let place = place.path();
     fs::write(place.join("a.csv"), sound("t_s,gyro_x_rad_s", 1)).unwrap();
-    let fixes =
-        "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m\n0,46,6,400,1,1,2\n1,46,6,400,1,1,2\n";
+    let six = "t_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s";
+    let rows = table(six, |k, next| {
+        let [x, y, a, b, c] = [0; 5].map(|_| next());
+        format!(
+            "{:.2},{x:.7},{y:.7},-9.8,{a:.7},{b:.7},{c:.7}",
+            0.01 * k as f64
+        )
+    });
+    fs::write(place.join("i.csv"), rows).unwrap();
+    let fixes = "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m\n".to_owned()
+        + &(0..5)
+            .map(|t_s| format!("{t_s},46,6,400,1,1,2\n"))
+            .collect::<String>();
     fs::write(place.join("g.csv"), fixes).unwrap();
     for (command, kind) in [
         ("wv imu.toml", "a noise model: run, fuse"),
         ("calibrate imu.toml", "a noise model"),
         (
             "export a.csv --target kalibr",
-            "a table: wv, calibrate and fuse",
+            "a recording of an IMU: wv, calibrate and fuse",
         ),
-        ("run drive.toml a.csv", "a table: wv, calibrate and fuse"),
+        ("run drive.toml a.csv", "a recording of an IMU: wv"),
         (
             "synthesize drive.toml --samples 99 -o s",
             "a trajectory: run",
@@ -344,11 +360,67 @@ fn files_of_another_kind_are_named() {
             "a noise model",
         ),
         ("calibrate --curve imu.toml", "a noise model"),
+        ("calibrate --curve a.csv", "a recording of an IMU"),
+        (
+            "tune drive.toml --truth imu.toml",
+            "a trajectory: run takes it, and so does --trajectory",
+        ),
+        (
+            "tune imu.toml drive.toml",
+            "a trajectory: run takes it, and so does --trajectory",
+        ),
+        (
+            "tune imu.toml --truth imu.toml --trajectory imu.toml",
+            "a noise model",
+        ),
+        ("run a.csv imu.toml", "a recording of an IMU"),
+        ("fuse i.csv i.csv imu.toml -o f", "a recording of an IMU"),
+        (
+            "fuse i.csv g.csv imu.toml --initial imu.toml -o f",
+            "a noise model",
+        ),
+        (
+            "fuse i.csv g.csv imu.toml --odometer g.csv -o f",
+            "GNSS fixes",
+        ),
+        (
+            "judge g.csv --reference a.csv -o j",
+            "a recording of an IMU",
+        ),
+        (
+            "judge g.csv --reference g.csv --covariance a.csv -o j",
+            "a recording of an IMU",
+        ),
+        (
+            "synthesize imu.toml --contaminate drive.toml -o s",
+            "a trajectory",
+        ),
+        ("datasheet --from imu.toml -o d.toml", "a noise model"),
+        ("inspect imu.toml", "a noise model"),
+        ("design a.csv", "a recording of an IMU"),
     ] {
         let ran = nav_sim(place, command);
         let hint = ran.stderr.split("\nhint: ").nth(1).unwrap_or_default();
         assert!(
             ran.code == 2 && hint.contains(kind),
+            "{command}: {}",
+            ran.stderr
+        );
+    }
+    // a file that is not there is wrong input, whatever reads it
+    for command in [
+        "run none drive.toml",
+        "fuse none g.csv imu.toml",
+        "calibrate none",
+        "compare imu.toml none",
+        "inspect none",
+        "judge g.csv --reference none",
+        "datasheet --from none",
+    ] {
+        let ran = nav_sim(place, command);
+        let expected = "error: none: No such file or directory\n\nhint: check the path";
+        assert!(
+            ran.code == 2 && ran.stderr.starts_with(expected),
             "{command}: {}",
             ran.stderr
         );
@@ -488,6 +560,79 @@ fn conversions_that_hints_name_are_read() {
             "{}",
             ran.stderr
         );
+    }
+}
+
+/// Commands that plan: what their hints name is done by other options.
+#[test]
+fn hints_on_plans_work() {
+    let place = place_with(DRIVE, MODEL);
+    let place = place.path();
+    let write = |file: &str, text: &str| fs::write(place.join(file), text).unwrap();
+    write("truth.toml", &MODEL.replace("2e-6", "4e-6"));
+    // the command, its hint, and the command that follows it
+    let cases = [
+        (
+            "require drive.toml --outage 20",
+            "give one, such as --require 'p95_m<=5'",
+            "require drive.toml --outage 20 --require p95_m<=5",
+        ),
+        (
+            "require drive.toml --outage 900 --require p95_m<=9",
+            "a shorter --outage",
+            "require drive.toml --outage 20 --require p95_m<=9",
+        ),
+        (
+            "require drive.toml --outage 20 --start 55 --require p95_m<=9",
+            "an earlier --start",
+            "require drive.toml --outage 20 --start 30 --require p95_m<=9",
+        ),
+        (
+            "require drive.toml --outage 20 --require p95_m<=1e-4",
+            "a larger limit",
+            "require drive.toml --outage 20 --require p95_m<=20",
+        ),
+        (
+            "require drive.toml --outage 20 --require p95_m<=9 --catalogue none",
+            "without a directory, --catalogue ranks",
+            "require drive.toml --outage 20 --require p95_m<=9 --catalogue",
+        ),
+        (
+            "tune imu.toml --trajectory drive.toml --outage 20:40 -o t.toml",
+            "give models (--truth OTHER.toml",
+            "tune imu.toml --trajectory drive.toml --outage 20:40 --truth truth.toml -o t.toml",
+        ),
+        (
+            "tune imu.toml --trajectory drive.toml --outage 90:99 --truth truth.toml -o t.toml",
+            "begin it between 0 and 60 s",
+            "tune imu.toml --trajectory drive.toml --outage 40:99 --truth truth.toml -o t.toml",
+        ),
+        (
+            "synthesize imu.toml --samples 99 --contaminate section5-IIII -o s",
+            "did you mean \"section5-III\"?",
+            "synthesize imu.toml --samples 99 --contaminate section5-III -o s",
+        ),
+        (
+            "synthesize imu.toml --samples 99 --contaminate none -o s",
+            "give a file or one of section4-I, ",
+            "synthesize imu.toml --samples 99 --contaminate section4-II -o s",
+        ),
+        (
+            "export imu.toml --target kalib -o k.yaml",
+            "a similar value exists: 'kalibr'",
+            "export imu.toml --target kalibr -o k.yaml",
+        ),
+    ];
+    for (command, words, follows) in cases {
+        let ran = nav_sim(place, command);
+        let hint = ran.stderr.split("\nhint: ").nth(1).unwrap_or_default();
+        assert!(
+            ran.code == 2 && hint.contains(words),
+            "{command}: {}",
+            ran.stderr
+        );
+        let ran = nav_sim(place, follows);
+        assert_eq!(ran.code, 0, "{follows}: {}", ran.stderr);
     }
 }
 

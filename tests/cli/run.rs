@@ -292,12 +292,12 @@ fn refusals_name_what_is_wrong_and_leave_nothing() {
     let base = "run drive.toml imu.toml --seed 1 -o out";
     refused(
         "run none.toml imu.toml -o out",
-        1,
+        2,
         "none.toml: No such file",
     );
     refused(
         "run drive.toml none.toml -o out",
-        1,
+        2,
         "none.toml: No such file",
     );
     refused(

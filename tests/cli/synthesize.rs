@@ -295,7 +295,7 @@ fn mistakes_are_refused_and_leave_nothing() {
 fn an_unknown_contamination_is_answered_with_the_nearest() {
     let place = Place::new();
     let (code, said) = place.run(&["model.toml", "--contaminate", "section5-IIII", "-o", "out"]);
-    assert_eq!(code, 1);
+    assert_eq!(code, 2);
     assert!(
         said.contains("section5-IIII: No such file")
             && said.contains("did you mean \"section5-III\"?"),

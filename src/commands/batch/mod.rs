@@ -886,7 +886,7 @@ impl Place<'_> {
         let path = locks.join(format!("{}-{}", &unit.cells[0].noise[..32], unit.first));
         let file = fs::create_dir_all(&locks)
             .and_then(|()| File::create(&path))
-            .map_err(|e| Failure::io(&path, e))?;
+            .map_err(|e| Failure::unwritable(&path, e))?;
         Ok(match file.try_lock() {
             Err(fs::TryLockError::WouldBlock) => None,
             _ => Some(file),

@@ -20,6 +20,7 @@
 //! record's length. What the operations do, and in which order: [`nav_sim_signal::noise::contamination`].
 
 use super::Failure;
+use super::file_kind::{self, FileKind};
 use super::suggest::nearest;
 use super::toml_file::Source;
 use crate::io::toml_file::OneOrEach;
@@ -68,7 +69,11 @@ pub fn names() -> [&'static str; 6] {
 pub fn find(name_or_path: &str, rate_hz: f64) -> Result<Contamination, Failure> {
     match PRESETS.iter().find(|(name, _)| *name == name_or_path) {
         Some((name, text)) => parse(&Source::new(name, text), rate_hz),
-        None => parse(&Source::read(Path::new(name_or_path))?, rate_hz),
+        None => {
+            let path = Path::new(name_or_path);
+            let refused = |e| file_kind::unless(&[FileKind::Contamination], path, e);
+            parse(&Source::read(path)?, rate_hz).map_err(refused)
+        }
     }
 }
 

@@ -18,6 +18,7 @@
 //! Farrell, Silva, Rahman, Wendel: *IMU error modeling tutorial*, IEEE Control Systems 42(6), 2022, is below B at every
 //! other averaging time: errors after an outage come out up to two times too small.)
 
+use super::file_kind;
 use super::model_file::{ModelFile, NOT_STATED, PROGRAM, SCHEMA, TurnOn, known};
 use super::toml_file::Source;
 use super::{Failure, Place, source};
@@ -794,8 +795,9 @@ pub fn measured(path: &Path, rate_hz: Option<f64>) -> Result<(Datasheet, Option<
     if sheet.entries.is_empty() {
         let message =
             "no figure of Kalibr (gyroscope_noise_density, …) or imu_utils (gyr_n, … of avg-axis)";
-        return Err(Failure::contents(&name, Place::Within, message)
-            .hint("give the figures with their units: --arw, --gyro-bias, --gyro-rrw, --vrw, --accel-bias, --accel-rrw"));
+        let refused = Failure::contents(&name, Place::Within, message)
+            .hint("give the figures with their units: --arw, --gyro-bias, --gyro-rrw, --vrw, --accel-bias, --accel-rrw");
+        return Err(file_kind::unless(&[], path, refused));
     }
     Ok((sheet, rate_hz))
 }

@@ -1134,7 +1134,8 @@ pub(crate) fn initial_schema() -> serde_json::Value {
 /// # Errors
 /// File, line, key and value of what is refused.
 pub(crate) fn read_initial(path: &Path) -> Result<Start, Failure> {
-    parse(&Source::read(path)?)
+    let refused = |e| file_kind::unless(&[FileKind::Initial], path, e);
+    parse(&Source::read(path)?).map_err(refused)
 }
 
 fn parse(source: &Source) -> Result<Start, Failure> {
@@ -1243,7 +1244,8 @@ const SPEEDS: Dictionary<'_> = Dictionary::new(
 /// Whatever is wrong with it, with its line.
 pub(crate) fn read_wheel(path: &Path) -> Result<Vec<WheelSpeed>, Error> {
     let table = table::read(path, &SPEEDS)?;
-    let [time, speed] = table.columns(["t_s", "speed"])?;
+    let columns = table.columns(["t_s", "speed"]);
+    let [time, speed] = columns.map_err(|e| file_kind::unless(&[], path, e))?;
     if speed.factor.is_none() {
         return Err(table.no_unit(speed));
     }

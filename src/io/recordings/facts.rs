@@ -355,6 +355,8 @@ pub(super) fn examine(recording: &Recording, report: &mut FileReport) -> Result<
             "moves in {moving} of its {seconds} seconds, or was knocked"
         ));
     }
+    report.warnings.extend(drift(recording));
+    report.warnings.extend(shared_noise(recording));
     let noise = |signal: &Signal| facts::white_noise(&signal.samples, recording.rate_hz);
     let signals = recording.signals.iter();
     let found = signals.filter_map(|signal| Some((signal.channel, noise(signal)?)));
@@ -371,6 +373,49 @@ pub(super) fn examine(recording: &Recording, report: &mut FileReport) -> Result<
         report.warnings.extend(quiet(channel, n));
     }
     Ok(())
+}
+
+/// A warning of the axis that drifts most against its walk.
+fn drift(recording: &Recording) -> Option<String> {
+    let found = recording.signals.iter().filter_map(|signal| {
+        let per_s = facts::drift(&signal.samples)? * recording.rate_hz;
+        Some((signal.channel, per_s))
+    });
+    let found: Vec<(Channel, f64)> = found.collect();
+    let (channel, per_s) = *found.first()?;
+    let slope = match channel.sensor {
+        Sensor::Accel => format!("{} m/s² an hour", readable(3600.0 * per_s)),
+        Sensor::Gyro => format!("{} deg/h an hour", readable(3600.0 * 3600.0 * per_s / DEG)),
+    };
+    let more = and_more(found.len() - 1, ["axis", "axes"]);
+    Some(format!(
+        "{channel} drifts by {slope}{more}, more than a random walk does: add DR, or keep the temperature"
+    ))
+}
+
+/// A warning of the noise that axes share, of the pair with the most.
+fn shared_noise(recording: &Recording) -> Option<String> {
+    let axes: Vec<&[f64]> = recording.signals.iter().map(|s| &s.samples[..]).collect();
+    let found = facts::shared_noise(&axes);
+    let most = found
+        .iter()
+        .max_by(|a, b| a.correlation.abs().total_cmp(&b.correlation.abs()))?;
+    let [a, b] = most.axes.map(|k| recording.signals[k].channel);
+    let [from, to] = most.averages.map(|n| readable(n / recording.rate_hz));
+    let correlation = most.correlation;
+    let more = and_more(found.len() - 1, ["pair", "pairs"]);
+    Some(format!(
+        "{a} and {b}{more} share noise (correlation {correlation:.2}, averages of {from} to {to} s): \
+         a model has independent axes, its intervals are too narrow"
+    ))
+}
+
+fn and_more(count: usize, [one, many]: [&str; 2]) -> String {
+    match count {
+        0 => String::new(),
+        1 => format!(" (and 1 more {one})"),
+        n => format!(" (and {n} more {many})"),
+    }
 }
 
 /// White noise of units (units·√s): from navigation grade, 0.001 deg/√h of ring lasers and 0.001 m/s/√h of quartz

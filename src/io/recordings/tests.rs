@@ -387,7 +387,7 @@ fn a_directory_is_all_its_recordings_in_name_order() {
     assert!(e.to_string().ends_with(": no recordings in it"));
     let e = read(&["/no/such".into()], &ReadOptions::default()).unwrap_err();
     assert_eq!(e.to_string(), "/no/such: No such file or directory");
-    assert!(e.code() == 1);
+    assert!(e.code() == 2);
 }
 
 /// Finite, and yet no measurement: its square overflows.

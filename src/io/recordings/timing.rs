@@ -221,12 +221,17 @@ impl Clock {
             let longest = ends.zip(after).map(|(from, to)| to - from).max();
             let is_lost = self.most_lost == MOST_STRAYED;
             return Err(match longest.is_some_and(|n| n >= STRETCH) {
-                _ if !is_lost => refusal.or_option(help::GAPS),
-                true => refusal.or_option(help::GAPS_LOST),
-                false if self.is_lossy => refusal.or_option(help::GAPS_KEEP),
+                _ if !is_lost => refusal
+                    .or_option(help::GAPS)
+                    .or_without(help::GAPS_ELSEWHERE),
+                true => refusal
+                    .or_option(help::GAPS_LOST)
+                    .or_without(help::GAPS_LOST_ELSEWHERE),
+                false if self.is_lossy => refusal
+                    .or_option(help::GAPS_KEEP)
+                    .or_without(help::GAPS_LOST_ELSEWHERE),
                 false => refusal.or_hint("record again: too many samples are lost"),
-            }
-            .or_without(help::GAPS_ELSEWHERE));
+            });
         }
         if let Some(means) = self.drift().filter(|_| !stands_still) {
             let [first, last] = means.map(|step| six_digits(self.rate_hz(step)));

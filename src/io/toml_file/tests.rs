@@ -272,5 +272,5 @@ fn syntax_errors_have_their_line() {
 fn a_missing_file_is_named() {
     let e = Source::read(Path::new("/no/such.toml")).unwrap_err();
     assert_eq!(e.to_string(), "/no/such.toml: No such file or directory");
-    assert!(e.code() == 1);
+    assert!(e.code() == 2);
 }

@@ -112,8 +112,8 @@ pub(crate) fn load_solution(
         let rows = fixes.iter().map(of_fix).collect();
         return Ok((rows, notes.into_iter().map(|note| note.text).collect()));
     }
-    let Some(mut rows) = read(path, origin, false)? else {
-        let message = "a motion profile is no solution";
+    let Some(mut rows) = read(path, origin, false).map_err(unless_other(path))? else {
+        let message = "a .toml file is no solution";
         let refused = Error::contents(path.display().to_string(), Place::Within, message);
         return Err(unless_other(path)(refused));
     };
@@ -216,8 +216,10 @@ fn add_covariances(path: &Path, rows: &mut [StatedRow]) -> Result<Option<String>
             ..DICTIONARY
         };
         let table = table::parse(&name, &text, &dictionary)?;
-        let [time] = table.columns(["t_s"])?;
-        table.require(SIGMAS.into_iter().take(3))?;
+        let refused = |e| file_kind::unless(&[], path, e);
+        let [time] = table.columns(["t_s"]).map_err(refused)?;
+        let sigmas_of_position = SIGMAS.into_iter().take(3);
+        table.require(sigmas_of_position).map_err(refused)?;
         let all = (0..).zip(sigmas(&table));
         found.extend(all.map(|(row, own)| (time.si(row), table.line(row), of_sigmas(&own))));
     }

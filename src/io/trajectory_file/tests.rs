@@ -363,7 +363,7 @@ fn what_is_written_reads_back_the_same() {
     );
     let e = load(&dir.path().join("none.csv"), None).unwrap_err();
     assert!(
-        e.code() == 1 && e.to_string().contains("none.csv: No such file"),
+        e.code() == 2 && e.to_string().contains("none.csv: No such file"),
         "{e}"
     );
 }

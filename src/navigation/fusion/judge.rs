@@ -99,10 +99,14 @@ pub enum Doubt {
         /// Roll, pitch and yaw of the solution's axes in the reference's (degrees).
         angles_deg: [f64; 3],
     },
-    /// Standard deviations of the attitude are in another unit.
-    AngleUnit {
-        /// Errors over standard deviations, root mean square.
+    /// Three states are as accurate as stated after a simple transformation.
+    Transformed {
+        /// Sentence on what they are.
+        cause: &'static str,
+        /// Errors over standard deviations, root mean square, as they are.
         times: f64,
+        /// The same after the transformation.
+        left: f64,
     },
     /// Another clock or another point of the vehicle.
     Offset(FoundOffset),
@@ -129,6 +133,8 @@ pub struct Judgement {
     pub horizontal_max_m: f64,
     /// Rows that the reference reaches.
     pub rows: usize,
+    /// True if they are those at the epochs of a coarser reference, which is interpolated between.
+    pub is_at_epochs: bool,
     /// Their errors.
     pub errors: Vec<StatedErrors>,
 }
@@ -140,6 +146,9 @@ pub fn judge(
     given: ReferenceOffset,
     outages: &[(f64, f64)],
 ) -> Option<Judgement> {
+    let nearest = at_epochs(rows, reference, given);
+    let is_at_epochs = nearest.is_some();
+    let rows = nearest.as_deref().unwrap_or(rows);
     let errors = errors(rows, reference, given);
     let of_state = |state: usize| errors.iter().map(move |e| e.values[state]);
     let rmse: Nine = std::array::from_fn(|state| {
@@ -150,8 +159,24 @@ pub fn judge(
         return None;
     }
     let stated = Verdict::of_drive(&normalised(&errors), outages);
-    let mut doubts = doubts(rows, reference, given, &errors, stated.as_ref());
-    let found = found_offset(rows, reference, given);
+    let mut doubts = doubts(rows, reference, given, &errors);
+    let transformed = match &stated {
+        Some(stated) => transformed(rows, reference, given, stated, &doubts),
+        None => Vec::new(),
+    };
+    // velocities and attitudes in another unit tell nothing of clock and point
+    let mut known = Vec::new();
+    if transformed.iter().any(|(block, _)| *block > 0) {
+        known = rows.to_vec();
+        for (block, _) in transformed.iter().filter(|(block, _)| *block > 0) {
+            known.iter_mut().for_each(|row| row.has[block - 1] = false);
+        }
+    }
+    let found = match known.is_empty() {
+        true => found_offset(rows, reference, given),
+        false => found_offset(&known, reference, given),
+    };
+    doubts.extend(transformed.into_iter().map(|(_, doubt)| doubt));
     let judged = |found: &FoundOffset| {
         let errors = self::errors(rows, reference, found.offset);
         Verdict::of_drive(&normalised(&errors), outages)
@@ -194,9 +219,38 @@ pub fn judge(
         horizontal_rmse_m: rmse[0].hypot(rmse[1]),
         horizontal_max_m,
         rows: errors.len(),
+        is_at_epochs,
         stated,
         errors,
     })
+}
+
+/// The rows nearest to the epochs of a reference that is coarser than they are; none where it is as fine.
+fn at_epochs(
+    rows: &[StatedRow],
+    reference: &Reference,
+    given: ReferenceOffset,
+) -> Option<Vec<StatedRow>> {
+    const COARSER: f64 = 1.5;
+    let step = |t_s: &[f64]| median(t_s.windows(2).map(|t| t[1] - t[0]));
+    let times: Vec<f64> = rows.iter().map(|row| row.t_s).collect();
+    let epochs: Vec<f64> = reference.epochs().map(|t| t - given.delay_s).collect();
+    let (own, of_reference) = (step(&times)?, step(&epochs)?);
+    if of_reference < COARSER * own {
+        return None;
+    }
+    let nearest = epochs.iter().filter_map(|t| {
+        let next = times.partition_point(|own| own < t);
+        let near = [next.checked_sub(1)?, next.min(times.len() - 1)];
+        let apart = |k: &usize| (times[*k] - t).abs();
+        let nearest = near
+            .into_iter()
+            .min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+        (apart(&nearest) <= 0.5 * own + 1e-6).then_some(nearest)
+    });
+    let mut nearest: Vec<usize> = nearest.collect();
+    nearest.dedup();
+    (!nearest.is_empty()).then(|| nearest.into_iter().map(|k| rows[k].clone()).collect())
 }
 
 /// Errors of the rows that a reference reaches.
@@ -225,10 +279,21 @@ pub fn errors(
 
 /// The errors of a row, without their NEES.
 fn error(row: &StatedRow, reference: &Reference, offset: ReferenceOffset) -> Option<StatedErrors> {
+    error_after(row, reference, offset, |truth| truth, |sigma| sigma)
+}
+
+/// The same with another truth and other standard deviations.
+fn error_after(
+    row: &StatedRow,
+    reference: &Reference,
+    offset: ReferenceOffset,
+    map: fn(NavState) -> NavState,
+    of_sigma: fn(f64) -> f64,
+) -> Option<StatedErrors> {
     let t_s = row.t_s + offset.delay_s;
     let truth = reference.state_of_point(t_s, -offset.lever_arm_m)?;
     let velocity_sigma = reference.velocity_sigma(t_s)?;
-    let (mut values, _) = reported_error(&row.state, &truth);
+    let (mut values, _) = reported_error(&row.state, &map(truth));
     for (block, has) in [1, 2].into_iter().zip(row.has) {
         if !has {
             values[3 * block..3 * block + 3].fill(f64::NAN);
@@ -240,7 +305,7 @@ fn error(row: &StatedRow, reference: &Reference, offset: ReferenceOffset) -> Opt
         } else {
             0.0
         };
-        row.covariance[(i, i)].sqrt().hypot(of_reference)
+        of_sigma(row.covariance[(i, i)].sqrt()).hypot(of_reference)
     });
     Some(StatedErrors {
         t_s: row.t_s,
@@ -268,16 +333,11 @@ const APART_M: f64 = 1000.0;
 const HEIGHT: (f64, f64) = (5.0, 10.0);
 /// Attitudes this near to other axes are in those (degrees).
 const AXES_DEG: f64 = 10.0;
-/// Radians under a name of degrees, or degrees under one of radians, within this factor in each of the three angles while
-/// position is not off by as much.
-const UNIT: f64 = 4.0;
-
 fn doubts(
     rows: &[StatedRow],
     reference: &Reference,
     given: ReferenceOffset,
     errors: &[StatedErrors],
-    stated: Option<&DriveVerdict>,
 ) -> Vec<Doubt> {
     let mut found = Vec::new();
     let metres = median(errors.iter().map(|e| horizontal(&e.values))).unwrap_or(0.0);
@@ -293,21 +353,158 @@ fn doubts(
         found.push(Doubt::Height { metres: -middle });
     }
     found.extend(turned_axes(rows, reference, given));
-    if let Some(stated) = stated {
-        let ratios = stated.error_over_sigma.0;
-        let times = ratios[6..].iter().product::<f64>().cbrt();
-        let is_unit = |unit: f64| {
-            ratios[6..]
-                .iter()
-                .all(|r| (r / unit).ln().abs() < UNIT.ln())
-        };
-        let others = (ratios[..3].iter().product::<f64>().cbrt()).ln().abs();
-        let unit = if times > 1.0 { 1.0 / DEG } else { DEG };
-        if is_unit(unit) && others < UNIT.ln() {
-            found.push(Doubt::AngleUnit { times });
-        }
-    }
     found
+}
+
+/// A simple transformation of a solution that is written otherwise than its names say.
+struct Transformation {
+    /// Its states: position, velocity or attitude.
+    block: usize,
+    /// Sentence on what they are.
+    cause: &'static str,
+    /// True states as such a solution has them.
+    truth: fn(NavState) -> NavState,
+    /// Standard deviations of what is stated.
+    sigma: fn(f64) -> f64,
+    /// True if it changes each state by a factor of its own: one factor is no cause then.
+    is_uneven: bool,
+}
+
+const fn as_it_is(truth: NavState) -> NavState {
+    truth
+}
+
+/// The same with other roll, pitch and yaw (rad).
+fn with_angles(truth: NavState, map: fn([f64; 3]) -> [f64; 3]) -> NavState {
+    let own = RollPitchYaw::from_quat(truth.q_b_n);
+    let [roll, pitch, yaw] = map([own.roll, own.pitch, own.yaw]);
+    NavState {
+        q_b_n: RollPitchYaw { roll, pitch, yaw }.to_quat(),
+        ..truth
+    }
+}
+
+fn with_velocity(truth: NavState, map: fn(DVec3) -> DVec3) -> NavState {
+    NavState {
+        v_n: map(truth.v_n),
+        ..truth
+    }
+}
+
+/// (m/s).
+const KM_H: f64 = 1.0 / 3.6;
+const QUARTER: f64 = 90.0 * DEG;
+
+/// Of what changes values, first with standard deviations of the same unit, then with those of the names.
+#[rustfmt::skip]
+const TRANSFORMATIONS: [Transformation; 16] = {
+    const fn new(block: usize, cause: &'static str, truth: fn(NavState) -> NavState, sigma: fn(f64) -> f64) -> Transformation {
+        Transformation { block, cause, truth, sigma, is_uneven: false }
+    }
+    const fn variance(block: usize, cause: &'static str) -> Transformation {
+        Transformation { block, cause, truth: as_it_is, sigma: f64::sqrt, is_uneven: true }
+    }
+    const RADIANS: &str = "attitudes are radians under a name of degrees";
+    const DEGREES: &str = "attitudes are degrees under a name of radians";
+    const SPEEDS: &str = "velocities are km/h, not m/s";
+    const OF_EAST: &str = "yaw is 90° − ψ, counted from east to north: write it from north to east";
+    const REVERSED: &str = "yaw has the other sign: write it from north to east";
+    [
+        variance(0, "standard deviations of position are variances (m²)"),
+        variance(1, "standard deviations of velocity are variances (m²/s²)"),
+        variance(2, "standard deviations of attitude are variances"),
+        new(1, SPEEDS, |x| with_velocity(x, |v| v / KM_H), |s| s),
+        new(1, SPEEDS, |x| with_velocity(x, |v| v / KM_H), |s| s / KM_H),
+        new(1, "velocities are east, north, up under names of north, east, down",
+            |x| with_velocity(x, |v| DVec3::new(v.y, v.x, -v.z)), |s| s),
+        new(2, "standard deviations of attitude are radians under a name of degrees", as_it_is, |s| s / DEG),
+        new(2, "standard deviations of attitude are degrees under a name of radians", as_it_is, |s| s * DEG),
+        new(2, RADIANS, |x| with_angles(x, |all| all.map(|a| a * DEG)), |s| s),
+        new(2, RADIANS, |x| with_angles(x, |all| all.map(|a| a * DEG)), |s| s * DEG),
+        new(2, DEGREES, |x| with_angles(x, |all| all.map(|a| a / DEG)), |s| s),
+        new(2, DEGREES, |x| with_angles(x, |all| all.map(|a| a / DEG)), |s| s / DEG),
+        new(2, OF_EAST, |x| with_angles(x, |[r, p, y]| [r, p, QUARTER - y]), |s| s),
+        new(2, OF_EAST, |x| with_angles(x, |[r, p, y]| [r, -p, QUARTER - y]), |s| s),
+        new(2, REVERSED, |x| with_angles(x, |[r, p, y]| [r, p, -y]), |s| s),
+        new(2, REVERSED, |x| with_angles(x, |[r, p, y]| [r, -p, -y]), |s| s),
+    ]
+};
+
+/// Errors over standard deviations that are off by more than a factor of 1.5, and by more than the cube of what is left, have the
+/// transformation for a cause; the other states are then off by less than this one.
+const FAR: f64 = 1.5;
+const OTHERS: f64 = 4.0;
+
+/// Largest departure of these ratios from 1, and from one another, as logarithms; none without any.
+fn departures(ratios: &[f64]) -> Option<[f64; 2]> {
+    let known = || {
+        ratios
+            .iter()
+            .filter(|r| r.is_finite() && **r > 0.0)
+            .map(|r| r.ln())
+    };
+    let (least, most) = (known().reduce(f64::min)?, known().reduce(f64::max)?);
+    Some([most.max(-least), most - least])
+}
+
+/// The transformations that explain the errors of a solution which is not consistent, by the block of their states.
+fn transformed(
+    rows: &[StatedRow],
+    reference: &Reference,
+    given: ReferenceOffset,
+    stated: &DriveVerdict,
+    doubts: &[Doubt],
+) -> Vec<(usize, Doubt)> {
+    if stated.verdict.kind <= VerdictKind::Undecided {
+        return Vec::new();
+    }
+    let rms = |ratios: &[f64]| {
+        let known = ratios.iter().filter(|r| r.is_finite());
+        mean(known.map(|r| r * r)).sqrt()
+    };
+    let plain = |block: usize| &stated.error_over_sigma.0[3 * block..3 * block + 3];
+    let are_axes_others = doubts.iter().any(|d| matches!(d, Doubt::Axes { .. }));
+    let looks: Vec<&StatedRow> = rows.iter().step_by(rows.len().div_ceil(FITTED)).collect();
+    let try_one = |t: &Transformation| {
+        let [far, spread] = departures(plain(t.block))?;
+        if far < FAR.ln() || t.block == 2 && are_axes_others {
+            return None;
+        }
+        let errors = looks
+            .par_iter()
+            .filter_map(|row| error_after(row, reference, given, t.truth, t.sigma));
+        let errors: Vec<StatedErrors> = errors.collect();
+        let of_state = |i: usize| {
+            let ratios = errors.iter().map(|e| e.values[i] / e.sigma[i]);
+            rms(&ratios.collect::<Vec<_>>())
+        };
+        let after: [f64; 3] = std::array::from_fn(|i| of_state(3 * t.block + i));
+        let [left, uneven] = departures(&after)?;
+        let is_cause = far > FAR.ln() + 3.0 * left;
+        let is_shape = !t.is_uneven || spread > FAR.ln() / 2.0 + 2.0 * uneven;
+        let doubt = Doubt::Transformed {
+            cause: t.cause,
+            times: rms(plain(t.block)),
+            left: rms(&after),
+        };
+        (is_cause && is_shape).then_some((left, doubt))
+    };
+    let best = |block: usize| {
+        let own = TRANSFORMATIONS.iter().filter(|t| t.block == block);
+        let found = own.filter_map(try_one);
+        found.min_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    let found: Vec<Option<(f64, Doubt)>> = (0..3).map(best).collect();
+    let is_right = |block: usize| {
+        let off = departures(plain(block));
+        found[block].is_some() || off.is_none_or(|[far, _]| far < OTHERS.ln())
+    };
+    if !(0..3).all(is_right) {
+        return Vec::new();
+    }
+    let found = found.into_iter().enumerate();
+    let found = found.filter_map(|(block, found)| Some((block, found?.1)));
+    found.collect()
 }
 
 /// Axes of the body, or of navigation, that are others than the reference's: turned by quarters of a circle about them, all the

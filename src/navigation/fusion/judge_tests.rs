@@ -1,8 +1,8 @@
 use super::*;
 use crate::earth::moved;
 use crate::rng::StreamKey;
-use crate::trajectory::Trajectory;
 use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start, Turning};
+use crate::trajectory::{Trajectory, TrajectorySample};
 use rand_distr::{Distribution, StandardNormal};
 
 /// Figures of eight for 800 s at 12 m/s.
@@ -159,6 +159,136 @@ fn another_clock_and_another_point_are_found() {
     assert!(right[0] >= 11 && right[1] >= 11, "{right:?}");
 }
 
+/// What is done to each row.
+type Change<'a> = &'a dyn Fn(&mut StatedRow);
+
+/// What is written otherwise than its names say is named, and only that; a filter that is wrong by one factor is not.
+#[test]
+fn simple_transformations_are_named() {
+    let drive = drive();
+    let reference = Reference::from(drive.clone());
+    let changed = |scale: f64, change: Change<'_>| {
+        let mut rows = solution(&drive, 7, scale);
+        rows.iter_mut().for_each(change);
+        judged(&rows, &reference)
+    };
+    let angles = |row: &mut StatedRow, map: fn([f64; 3]) -> [f64; 3]| {
+        row.state = with_angles(row.state, map);
+    };
+    let sigmas = |row: &mut StatedRow, block: usize, map: &dyn Fn(f64) -> f64| {
+        for i in 3 * block..3 * block + 3 {
+            row.covariance[(i, i)] = map(row.covariance[(i, i)].sqrt()).powi(2);
+        }
+    };
+    let cases: [(&str, Change<'_>); 12] = [
+        ("deviations of position are variances", &|row| {
+            sigmas(row, 0, &|s| s * s);
+        }),
+        ("deviations of velocity are variances", &|row| {
+            sigmas(row, 1, &|s| s * s);
+        }),
+        ("deviations of attitude are variances", &|row| {
+            sigmas(row, 2, &|s| s * s);
+        }),
+        ("velocities are km/h", &|row| row.state.v_n *= 3.6),
+        ("velocities are km/h", &|row| {
+            row.state.v_n *= 3.6;
+            sigmas(row, 1, &|s| 3.6 * s);
+        }),
+        ("velocities are east, north, up", &|row| {
+            let v = row.state.v_n;
+            row.state.v_n = DVec3::new(v.y, v.x, -v.z);
+        }),
+        ("attitude are radians under", &|row| {
+            sigmas(row, 2, &|s| s * DEG);
+        }),
+        ("attitude are degrees under", &|row| {
+            sigmas(row, 2, &|s| s / DEG);
+        }),
+        ("attitudes are radians", &|row| {
+            angles(row, |all| all.map(|a| a * DEG));
+        }),
+        ("attitudes are radians", &|row| {
+            angles(row, |all| all.map(|a| a * DEG));
+            sigmas(row, 2, &|s| s * DEG);
+        }),
+        ("yaw is 90° − ψ", &|row| {
+            angles(row, |[r, p, y]| [r, -p, QUARTER - y]);
+        }),
+        ("yaw has the other sign", &|row| {
+            angles(row, |[r, p, y]| [r, p, -y]);
+        }),
+    ];
+    for (cause, change) in cases {
+        let judgement = changed(1.0, change);
+        let [
+            Doubt::Transformed {
+                cause: found, left, ..
+            },
+        ] = judgement.doubts[..]
+        else {
+            panic!("{cause}: {:?}", judgement.doubts)
+        };
+        assert!(found.contains(cause), "{cause}: {found}");
+        assert!((left - 1.0).abs() < 0.25, "{cause}: {left}");
+        assert_eq!(judgement.kind, VerdictKind::Doubtful);
+    }
+    // errors of one factor on all states, or of one on three of them
+    for scale in [0.1, 0.5, 2.0, 3.0, 10.0, 20.0] {
+        let judgement = changed(scale, &|_| {});
+        assert!(
+            judgement.doubts.is_empty(),
+            "{scale}: {:?}",
+            judgement.doubts
+        );
+        for block in 0..3 {
+            let judgement = changed(1.0, &|row| sigmas(row, block, &|s| s / scale));
+            let is_named = |d: &Doubt| matches!(d, Doubt::Transformed { .. });
+            assert!(
+                !judgement.doubts.iter().any(is_named),
+                "{scale}, {block}: {:?}",
+                judgement.doubts
+            );
+        }
+    }
+}
+
+/// A reference at 0.2 Hz under a solution at 1 Hz is judged at its own epochs: in turns of 9°/s the attitude between them is that of
+/// an interpolation, off by several standard deviations of the yaw.
+#[test]
+fn a_coarse_reference_is_judged_at_its_epochs() {
+    const STEP_S: u32 = 5;
+    let drive = drive();
+    let sample = |k: u32| {
+        let t_s = f64::from(k);
+        let state = drive.state(t_s);
+        TrajectorySample {
+            t_s,
+            lat: state.lat,
+            lon: state.lon,
+            h: state.h,
+            q_b_n: state.q_b_n,
+        }
+    };
+    let samples: Vec<TrajectorySample> = (0..800).step_by(STEP_S as usize).map(sample).collect();
+    let reference = Reference::from(Trajectory::from_samples(&samples).unwrap());
+    let mut rows = solution(&drive, 3, 1.0);
+    // the velocities of such a reference are those of a spline
+    rows.iter_mut().for_each(|row| row.has[0] = false);
+    let judgement = judged(&rows, &reference);
+    assert!(
+        judgement.is_at_epochs && judgement.rows == 159,
+        "{}",
+        judgement.rows
+    );
+    assert!(judgement.kind < VerdictKind::Overconfident);
+    rows.retain(|row| row.t_s % f64::from(STEP_S) != 0.0);
+    let errors = errors(&rows, &reference, ReferenceOffset::default());
+    let stated = Verdict::of_drive(&normalised(&errors), &[]).unwrap();
+    assert_eq!(stated.verdict.kind, VerdictKind::Overconfident);
+    assert!(stated.error_over_sigma.0[8] > 3.0);
+}
+
 /// Clocks a leap of 18 s apart, and clocks that have nothing in common.
 #[test]
 fn clocks_far_apart_are_found() {
@@ -205,7 +335,7 @@ fn frames_and_units_are_named() {
         radians
             .doubts
             .iter()
-            .any(|d| matches!(d, Doubt::AngleUnit { .. })),
+            .any(|d| matches!(d, Doubt::Transformed { .. })),
         "{:?}",
         radians.doubts
     );

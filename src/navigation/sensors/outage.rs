@@ -162,17 +162,22 @@ impl<'a> FixedData<'a> {
     /// An outage asked for by its times, cut where the data end.
     fn place(&self, asked: Outage) -> Result<Outage, OutageError> {
         let (start_s, end_s) = self.span_s;
-        let refused = |reason: String| {
+        let refused = |reason: String, fixes: String| {
             Err(OutageError::Placed {
                 message: format!("outage {asked} {reason}"),
-                fixes: self.described(),
+                fixes,
             })
         };
         // clocks and people round to a microsecond
         if asked.start_s < start_s - 1e-6 || asked.start_s >= end_s {
-            return refused(format!(
-                "does not lie on the data, which last from {start_s} to {end_s} s"
-            ));
+            let off = "does not lie on the data, which last";
+            return refused(
+                format!("{off} from {start_s} to {end_s} s"),
+                format!(
+                    "{}: begin it between {start_s} and {end_s} s",
+                    self.described()
+                ),
+            );
         }
         let placed = Outage {
             end_s: asked.end_s.min(end_s),
@@ -181,7 +186,7 @@ impl<'a> FixedData<'a> {
         if self.has_fix_in(&placed) {
             return Ok(placed);
         }
-        refused("withholds no fix".to_owned())
+        refused("withholds no fix".to_owned(), self.described())
     }
 }
 
@@ -196,7 +201,7 @@ pub enum OutageError {
     Placed {
         /// The refusal.
         message: String,
-        /// The fixes of the data, in words.
+        /// The fixes of the data, in words, with what helps.
         fixes: String,
     },
 }

@@ -77,8 +77,8 @@ fn an_outage_lies_on_the_data_and_withholds_a_fix() {
             .map(str::to_owned)
     });
     let expected = [
-        "the fixes run from 1 to 4 s",
-        "fixes come every 1 s from 0 s",
+        "the fixes run from 1 to 4 s: begin it between 0 and 5 s",
+        "fixes come every 1 s from 0 s: begin it between 0 and 5 s",
     ];
     assert_eq!(hints, expected.map(|hint| Some(hint.to_owned())));
 }

@@ -121,6 +121,11 @@ impl Reference {
         })
     }
 
+    /// Instants at which it was recorded (s); between them it is interpolated.
+    pub fn epochs(&self) -> impl Iterator<Item = f64> + '_ {
+        self.stretches.iter().flat_map(|s| s.curve.knots()).copied()
+    }
+
     /// First and last instant (s).
     pub fn span_s(&self) -> (f64, f64) {
         let ends = |curve: &Trajectory| (curve.start_s(), curve.end_s());

@@ -50,7 +50,7 @@ fn files_that_are_no_tables_are_refused_as_such() {
             "{stderr}"
         );
     }
-    let stderr = refusal(dir.path(), &["wv", "nowhere.csv"], 1);
+    let stderr = refusal(dir.path(), &["wv", "nowhere.csv"], 2);
     assert!(stderr.contains("hint: check the path"), "{stderr}");
 }
 
@@ -132,7 +132,7 @@ fn bad_requests_are_refused_with_a_hint() {
     );
     check(refusal(dir.path(), &["calibrate"], 2), &["required"]);
     check(
-        refusal(dir.path(), &["calibrate", "nowhere.csv"], 1),
+        refusal(dir.path(), &["calibrate", "nowhere.csv"], 2),
         &["nowhere.csv: No such file"],
     );
     check(
