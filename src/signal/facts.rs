@@ -518,8 +518,8 @@ pub fn shared_noise(axes: &[&[f64]]) -> Vec<SharedNoise> {
 
 /// Sides of the median; 0 on it.
 fn signs(values: &[f64]) -> Vec<i8> {
-    let there: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
-    if there.is_empty() {
+    let there = values.iter().copied().filter(|x| x.is_finite());
+    if there.clone().next().is_none() {
         return vec![0; values.len()];
     }
     let middle = median(there);
