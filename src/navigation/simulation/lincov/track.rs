@@ -1326,7 +1326,6 @@ impl Inputs {
 mod outline_tests {
     use crate::noise::Model;
     use crate::scenario::Scenario;
-    use crate::sensors::ideal_imu::IdealSamples;
     use crate::sensors::outage::Outage;
     use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
 
