@@ -125,8 +125,11 @@ pub struct Trajectory {
     origin_e: DVec3,
     curve: Arc<Spline<7>>,
     /// What was asked for last, for all clones: runs along one trajectory have one ideal IMU.
-    ideal: Arc<Mutex<Option<(f64, GravityModel, Arc<Vec<ImuSample>>)>>>,
+    ideal: Arc<Mutex<Option<IdealImu>>>,
 }
+
+/// Rate (Hz), gravity, samples.
+type IdealImu = (f64, GravityModel, Arc<Vec<ImuSample>>);
 
 impl Trajectory {
     /// The trajectory through samples of increasing time.
