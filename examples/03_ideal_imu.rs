@@ -3,7 +3,7 @@
 
 use nav_sim::io::trajectory_file::load;
 use nav_sim::navigation::earth::GravityModel;
-use nav_sim::navigation::sensors::ideal_imu::ideal_imu;
+use nav_sim::navigation::trajectory::ideal_imu::ideal_imu;
 use std::path::Path;
 
 pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -5,9 +5,9 @@ use crate::earth::{GravityModel, MAX_LATITUDE, ned_difference};
 use crate::frames::NavState;
 use crate::lanes::{Lanes, Vec3};
 use crate::linalg::larger;
-use crate::sensors::ideal_imu::ideal_imu;
 use crate::strapdown::{self, Strapdown};
 use crate::trajectory::Trajectory;
+use crate::trajectory::ideal_imu::ideal_imu;
 use crate::units::Refused;
 
 /// How far the mechanised samples come away from the trajectory.

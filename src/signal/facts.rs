@@ -40,7 +40,7 @@ fn log_improbability(count: usize, trials: usize, p: f64) -> f64 {
     }
 }
 
-/// The middle of some numbers, the upper one of an even number. They are counted by their first bits and only those about the
+/// The middle of some numbers, the upper one of an even number; NaN of none. They are counted by their first bits and only those about the
 /// middle are held: a copy of the column of a day costs more than a second pass.
 fn median(values: impl Iterator<Item = f64> + Clone) -> f64 {
     // sign, exponent and three bits of the mantissa, in the order of the numbers
@@ -53,9 +53,14 @@ fn median(values: impl Iterator<Item = f64> + Clone) -> f64 {
     values.clone().for_each(|x| counts[bin(x)] += 1);
     let mut place = counts.iter().sum::<usize>() / 2;
     let mut of_middle = 0;
-    while place >= counts[of_middle] {
-        place -= counts[of_middle];
+    while let Some(&count) = counts.get(of_middle)
+        && place >= count
+    {
+        place -= count;
         of_middle += 1;
+    }
+    if of_middle == counts.len() {
+        return f64::NAN;
     }
     let mut near: Vec<f64> = Vec::with_capacity(counts[of_middle]);
     near.extend(values.filter(|x| bin(*x) == of_middle));

@@ -87,7 +87,7 @@ fn quantization_is_that_of_increments() {
 fn practitioners_parameters_are_those_of_export() {
     let dir = tempfile::tempdir().unwrap();
     let processes =
-        "processes = [{ type = \"WN\", sigma2 = 4e-6 }, { type = \"RW\", gamma2 = 1e-12 }]";
+        "processes = [{ type = \"WN\", sigma2 = 4e-6 }, { type = \"RW\", gamma2 = 1e-10 }]";
     let model = format!("schema = 1\nrate_hz = 50.0\n[accel]\n{processes}\n[gyro]\n{processes}\n");
     std::fs::write(dir.path().join("imu.toml"), model).unwrap();
     let synthesize =

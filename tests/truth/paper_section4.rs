@@ -582,14 +582,16 @@ mod sensitivity {
     }
 
     /// One replicate with f times the random walk: the mean variance grows by (f − 1)/K of one replicate's,
-    /// and AWV and SR-AWV with it (past some factor the walk drowns the rest, and its scales that are in view
-    /// are taken for an AR1); DR-AWV drops the replicate at every scale.
+    /// and AWV and SR-AWV with it: 19.8 for f = 100, to a factor of two, since one replicate hardly knows its walk (past some
+    /// factor the walk drowns the rest, and its scales that are in view are taken for an AR1); DR-AWV drops the replicate at
+    /// every scale.
     #[test]
     fn an_abnormal_replicate_moves_all_but_dr_awv_without_bound() {
         let design = design(1 << 14);
         let moves = abnormal_curve(&design, 1, &[1e2, 1e4, 1e6, 1e8]).unwrap();
         for e in [AWV, SR] {
-            assert!(moves[1].changes[e][WALK] > 100.0, "{moves:?}");
+            let first = moves[0].changes[e][WALK];
+            assert!((9.9..39.6).contains(&first), "{moves:?}");
             let (third, fourth) = (largest(&moves[2].changes[e]), largest(&moves[3].changes[e]));
             assert!(third > 100.0 && fourth > 50.0 * third, "{moves:?}");
         }

@@ -327,7 +327,11 @@ mod tests {
             let mut x = vec![0.0; n];
             let preset = find("section5-III", 100.0).unwrap();
             preset.apply(&mut x, channel, 5, 100.0, 1).unwrap();
-            assert!(x.iter().all(|v| v.is_finite()) && x[n - 1] > 0.0005);
+            assert!(x.iter().all(|v| v.is_finite()));
+            // The step of 0.0011 stays; the mean of the AR1 over 2048 samples has a deviation of 7e-5.
+            let later = &x[n / 2..];
+            let mean = later.iter().sum::<f64>() / later.len() as f64;
+            assert!(mean > 0.0005, "{mean}");
         }
     }
 

@@ -3,7 +3,6 @@
 pub mod aiding;
 pub mod defects;
 pub mod gnss;
-pub mod ideal_imu;
 pub mod imu;
 pub mod outage;
 

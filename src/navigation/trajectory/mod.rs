@@ -4,6 +4,7 @@
 //! Everything a sensor could measure follows from it by differentiation, so the ideal IMU and the
 //! reference agree to rounding, whatever the samples were.
 
+pub mod ideal_imu;
 pub mod plausibility;
 pub mod profile;
 pub mod reference;
@@ -12,9 +13,9 @@ mod spline;
 use crate::earth::{GravityModel, MAX_LATITUDE, e_to_n, ecef_to_geodetic, geodetic_to_ecef};
 use crate::frames::{NavState, q_e_n};
 use crate::imu::ImuSample;
-use crate::sensors::ideal_imu::ideal_imu;
 use crate::units::{DEG, Refused};
 use glam::{DQuat, DVec3};
+use ideal_imu::ideal_imu;
 use spline::{Cubic, Spline};
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -180,7 +180,7 @@ fn the_iterated_update_is_named_where_it_helps() {
         )
         .unwrap();
         let command = format!(
-            "run {root}/trajectories/land_vehicle.toml loud.toml --filter full --outage 300:600 --runs 40 --seed 1 \
+            "run {root}/trajectories/land_vehicle.toml loud.toml --filter full --outage 300:600 --runs 40 --seed 12 \
              --scenario update.toml -o out"
         );
         let ran = nav_sim(place.path(), &command);

@@ -15,13 +15,13 @@ use crate::lanes::{Kernel, LANES, Lanes, Level, Mat3, Quat, Vec3, Wide, dispatch
 use crate::noise::{Kind, Ladder, Model, Process};
 use crate::sensors::aiding::{Aid, AidPart, Law};
 use crate::sensors::defects::{Felt, Surroundings};
-use crate::sensors::ideal_imu::IdealSamples;
 use crate::sensors::outage::Outage;
 use crate::simulation::BIASES;
 use crate::simulation::plan::{
     Aided, Event, Experiment, ExperimentError, check_rotation, felt, schedule,
 };
 use crate::strapdown::{StepTrace, Strapdown};
+use crate::trajectory::ideal_imu::IdealSamples;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
 use std::iter::Peekable;
