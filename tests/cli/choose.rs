@@ -91,7 +91,10 @@ fn the_model_that_made_the_recordings_is_chosen_and_written() {
     // four recordings hold some nine windows side by side: 9 ± √(18/9), of which three are allowed
     assert!((nees("awv WN+RW, 15") - 9.0).abs() < 4.3, "{found}");
     assert_eq!(
-        (&of("awv WN, 15")["tied"], &of("gmwm WN+RW, 15")["eligible"]),
+        (
+            &of("awv WN+RW, 15, x10")["tied"],
+            &of("gmwm WN+RW, 15")["eligible"]
+        ),
         (&false.into(), &false.into())
     );
     let folds = of("awv WN+RW, 15")["folds"].as_array().unwrap();

@@ -104,17 +104,17 @@ fn notes(summary: &Summary, answer: &RunAnswer, page: &mut Document) {
     }
 }
 
-/// `gains shared by all runs; their standard deviations are within 0.4 %`
+/// `gains shared by all runs; eight runs with their own differ by up to 0.4 %`
 fn gains_line(gains: GainsUsed) -> String {
     let [kind, compared] = if gains.is_shared {
         [
             "gains shared by all runs",
-            "their standard deviations are within",
+            "eight runs with their own differ by up to",
         ]
     } else {
         [
             "gains of each run's own covariance",
-            "shared ones would be off by",
+            "eight runs with shared ones differ by up to",
         ]
     };
     let compared = |difference: f64| format!("; {compared} {:.1} %", 100.0 * difference);

@@ -81,8 +81,8 @@ pub struct Run {
     /// both (runs, compared with their expected values)
     #[arg(long, value_name = "METHOD", value_parser = parse::one_of::<Method>(&Method::NAMES))]
     method: Option<Method>,
-    /// Covariance that the gains of sampled runs come from: own (of each run), shared (one along the reference) or
-    /// auto (shared where its standard deviations agree within 3 % with those of runs 0 to 7) [default: auto]
+    /// Gains of sampled runs: own (of each run), shared (those along the reference) or auto (shared where runs 0 to 7,
+    /// made both ways, agree within 3 %) [default: auto]
     #[arg(long, value_name = "GAINS", value_parser = parse::one_of::<Gains>(&Gains::NAMES))]
     gains: Option<Gains>,
     /// Limit on an error at the end of every outage, as NAME<=LIMIT (repeatable): p50_m, p95_m (horizontal),

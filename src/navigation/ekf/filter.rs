@@ -5,7 +5,7 @@ use super::covariance::{
     BIAS, Covariance, EARTH_STEP_S, EarthStep, EarthTerms, PSI, R, Sample, Sources, Transition, V,
     load_triple,
 };
-use super::update::FixUpdate;
+use super::update::{FixUpdate, GainSource};
 use crate::frames::NavState;
 use crate::imu::{ImuSample, Sensor};
 use crate::lanes::{Kernel, Lanes, Level, Mat3, Real, Vec3, Wide, dispatch};
@@ -44,8 +44,7 @@ pub struct Ekf {
     pub(super) scratch: Scratch,
     pub(super) level: Level,
     pub(super) fix_update: FixUpdate,
-    /// The covariance is set before every measurement and not propagated here.
-    pub(crate) covariance_is_given: bool,
+    pub(crate) gains: GainSource,
 }
 
 /// Working vectors of the measurement update, one entry a state.
@@ -134,7 +133,7 @@ impl Ekf {
             },
             level: Level::best(),
             fix_update: FixUpdate::default(),
-            covariance_is_given: false,
+            gains: GainSource::Own,
         }
     }
 
@@ -249,7 +248,7 @@ impl Ekf {
         let seconds = W::from(dt);
         // The nominal state first: the map is linearised about the interval it has just passed through.
         let passed = ins.step(omega_ib_b * seconds, f_ib_b * seconds, dt);
-        if self.covariance_is_given {
+        if matches!(self.gains, GainSource::Given(..)) {
             return;
         }
         let sample = Sample::new(&passed, dt);

@@ -15,8 +15,8 @@ pub use covariance::Covariance;
 pub(crate) use filter::Snapshot;
 pub use filter::{Ekf, Unknown, UnknownKind, advance, settle};
 pub(crate) use update::{
-    BodyVelocity, body_velocity_rows, fix_rows, update_body_velocity, update_height, update_yaw,
-    yaw_row,
+    BodyVelocity, GainSource, SharedUpdate, body_velocity_rows, fix_rows, update_body_velocity,
+    update_height, update_yaw, yaw_row,
 };
 pub use update::{Fix, FixUpdate, update};
 

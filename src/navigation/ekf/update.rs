@@ -13,6 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use smallvec::{SmallVec, smallvec};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// A fix for each of eight runs; the standard deviations are the filter's belief and the same for all.
 #[derive(Debug, Clone, Copy)]
@@ -94,7 +95,33 @@ impl Ekf {
                 .mul_add(innovation, W::load(error))
                 .store(error);
         }
+        if let GainSource::Kept(updates) = &mut self.gains {
+            let mut variance = Lanes::ZERO;
+            s.store(&mut variance);
+            updates.push(Arc::new(SharedUpdate {
+                row: h.iter().map(|(state, c)| (*state, c[0])).collect(),
+                gain: scratch.gain.iter().map(|gain| gain[0]).collect(),
+                variance: variance[0],
+            }));
+        }
         (innovation, s)
+    }
+
+    /// One scalar by the row and the gain along the reference. A row about the run's own estimate does not go with that
+    /// covariance: it would turn what is well known along the reference into directions in which nothing is known.
+    #[inline(always)]
+    fn take_shared<W: Wide>(&mut self, scalar: &Scalar, shared: &SharedUpdate) -> (W, W) {
+        let error = &mut self.scratch.error;
+        let mut innovation = W::load(&scalar.z);
+        for (i, c) in &shared.row {
+            innovation -= W::load(&error[*i]) * *c;
+        }
+        for (error, gain) in error.iter_mut().zip(&shared.gain) {
+            innovation
+                .mul_add(W::from(*gain), W::load(error))
+                .store(error);
+        }
+        (innovation, W::from(shared.variance))
     }
 
     /// Takes the estimated error out of the nominal state and the biases.
@@ -120,6 +147,40 @@ impl Ekf {
         for (g, estimate) in self.estimates.iter_mut().enumerate() {
             estimate.store(estimate.load::<W>() - self.scratch.of(BIAS + g));
         }
+    }
+}
+
+/// A scalar update of the reference, for all runs.
+#[derive(Debug)]
+pub(crate) struct SharedUpdate {
+    /// States that the measurement depends on, and their coefficients.
+    row: Vec<(usize, f64)>,
+    /// One entry a state.
+    gain: Box<[f64]>,
+    /// Of the innovation.
+    variance: f64,
+}
+
+/// Covariance and gains of a filter.
+#[derive(Debug, Clone, Default)]
+pub(crate) enum GainSource {
+    /// Its own.
+    #[default]
+    Own,
+    /// Its own, whose updates are kept.
+    Kept(Vec<Arc<SharedUpdate>>),
+    /// Given for the next scalars; no covariance is propagated.
+    Given(Arc<[Arc<SharedUpdate>]>, usize),
+}
+
+impl GainSource {
+    /// The next update, where they are given.
+    fn next(&mut self) -> Option<Arc<SharedUpdate>> {
+        let Self::Given(updates, used) = self else {
+            return None;
+        };
+        *used += 1;
+        Some(updates[*used - 1].clone())
     }
 }
 
@@ -193,7 +254,10 @@ impl Kernel for UseScalars<'_> {
     fn run<W: Wide>(self) -> Innovations {
         let mut found = Innovations::from_elem([Lanes::ZERO; 2], self.scalars.len());
         for (scalar, [z, s]) in self.scalars.iter().zip(&mut found) {
-            let (innovation, variance) = self.ekf.take::<W>(scalar);
+            let (innovation, variance) = match self.ekf.gains.next() {
+                Some(shared) => self.ekf.take_shared::<W>(scalar, &shared),
+                None => self.ekf.take::<W>(scalar),
+            };
             innovation.store(z);
             variance.store(s);
         }

@@ -1,14 +1,14 @@
 //! Eight runs through the schedule: noise, prediction, fixes, and what is kept of them.
 
-use super::gains::{Covariances, GainsUsed};
+use super::gains::{GainsUsed, SharedFilter};
 use super::plan::{Event, Plan};
 use super::source::{Measured, Source};
 use super::{BIASES, COVERAGE_DOF, EpochSums, NEES_DOF, OutageRecord, REPORTED, RunRecord};
 use crate::earth::ned_difference;
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::{
-    Belief, BodyVelocity, Ekf, advance, settle, update, update_body_velocity, update_height,
-    update_yaw,
+    Belief, BodyVelocity, Ekf, GainSource, advance, settle, update, update_body_velocity,
+    update_height, update_yaw,
 };
 use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::Sensor;
@@ -18,6 +18,7 @@ use crate::sensors::aiding::Aid;
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
+use std::sync::Arc;
 
 /// The errors of one candidate in up to eight runs.
 #[derive(Debug, Clone)]
@@ -30,8 +31,8 @@ pub struct Batch {
     pub gains: GainsUsed,
 }
 
-/// A filter, and its covariances along the reference where runs share them.
-pub(super) type BatchFilter<'a> = (&'a Belief, Option<&'a Covariances>);
+/// A filter, and the same along the reference where runs share its gains.
+pub(super) type BatchFilter<'a> = (&'a Belief, Option<&'a SharedFilter>);
 
 /// Runs `first..first + live` (at most [`LANES`]) through filters: the noise is drawn once.
 pub(super) fn run_candidates(
@@ -95,8 +96,8 @@ fn use_aid(ekf: &mut Ekf, plan: &Plan<'_>, aid: Aid, value: &Vec3) {
 /// One filter on eight runs, and what is kept of it.
 struct Candidate<'a> {
     ekf: Ekf,
-    /// Before the measurements of each event, where runs share them.
-    covariances: Option<&'a Covariances>,
+    /// The same along the reference, where runs share its gains.
+    shared: Option<&'a SharedFilter>,
     live: usize,
     trace: Vec<EpochLanes>,
     /// A record for each outage and run.
@@ -108,7 +109,7 @@ struct Candidate<'a> {
 impl<'a> Candidate<'a> {
     fn new(
         plan: &Plan<'_>,
-        (belief, covariances): BatchFilter<'a>,
+        (belief, shared): BatchFilter<'a>,
         starts: &[NavState],
         live: usize,
     ) -> Self {
@@ -124,10 +125,12 @@ impl<'a> Candidate<'a> {
         };
         let mut ekf = Ekf::new(nominal, belief, &plan.start, plan.experiment.initial)
             .with_update(plan.experiment.update);
-        ekf.covariance_is_given = covariances.is_some();
+        if shared.is_some() {
+            ekf.gains = GainSource::Given(Arc::default(), 0);
+        }
         Self {
             ekf,
-            covariances,
+            shared,
             live,
             trace: Vec::with_capacity(plan.events.len()),
             outages: plan.experiment.outages.iter().map(|_| outage()).collect(),
@@ -137,14 +140,19 @@ impl<'a> Candidate<'a> {
 
     /// Outage ends, the fix if one is used, the report if one is due.
     fn at_event(&mut self, plan: &Plan<'_>, index: usize, event: &Event, measured: &Measured) {
-        if let Some(covariances) = self.covariances {
-            self.ekf.p.set_shared(&covariances[index]);
+        let shared = self.shared.map(|shared| &shared[index]);
+        if let Some(shared) = shared {
+            shared.before.iter().for_each(|p| self.ekf.p.set_shared(p));
+            self.ekf.gains = GainSource::Given(shared.updates.clone(), 0);
         }
         // Before the fix of the same instant: the end of an outage is where the error is largest.
         self.end_outages(plan, index, event);
         if let Some(nis) = measure(&mut self.ekf, plan, measured) {
             self.nis.0 += nis;
             self.nis.1 += 1;
+        }
+        if let Some(after) = shared.and_then(|shared| shared.after.as_ref()) {
+            self.ekf.p.set_shared(after);
         }
         if event.report {
             settle(&mut self.ekf);
@@ -156,7 +164,7 @@ impl<'a> Candidate<'a> {
 
     /// Error and belief just before the first fix after an outage, or at the trajectory's end.
     fn end_outages(&mut self, plan: &Plan<'_>, index: usize, event: &Event) {
-        if plan.outages.iter().all(|(_, end)| *end != index) {
+        if !plan.ends_outage(index) {
             return;
         }
         settle(&mut self.ekf);
@@ -238,7 +246,7 @@ impl<'a> Candidate<'a> {
             epochs,
             runs: (0..self.live).map(record).collect(),
             gains: GainsUsed {
-                is_shared: self.covariances.is_some(),
+                is_shared: self.shared.is_some(),
                 largest_difference: None,
             },
         }

@@ -4,22 +4,23 @@
 //! along the reference therefore serves every run, and runs need strapdown and corrections alone. That holds while
 //! errors are small: runs are made both ways in the first batch and in one of [`CHECKED`], and compared.
 
-use super::EpochSums;
+use super::REPORTED;
 use super::batch::{Batch, BatchFilter, measure, run_candidates};
 use super::plan::{Event, Plan};
 use super::source::Measured;
 use crate::ekf::covariance::SharedCovariance;
-use crate::ekf::{Belief, Ekf, FixUpdate, advance, settle};
+use crate::ekf::{Belief, Ekf, FixUpdate, GainSource, SharedUpdate, advance, settle};
 use crate::lanes::{LANES, Vec3};
 use crate::strapdown::Strapdown;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Covariance from which the runs of a filter take their gains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Gains {
-    /// Shared where its standard deviations agree within 3 % with those of runs 0 to 7, else their own.
+    /// Shared where standard deviations and errors of runs 0 to 7 agree within 3 % with those of their own gains.
     #[default]
     Auto,
     /// Of each run, about its own estimate.
@@ -35,8 +36,7 @@ nav_sim_signal::named!(Gains { Auto = "auto", Own = "own", Shared = "shared" });
 pub struct GainsUsed {
     /// Whether they shared those along the reference.
     pub is_shared: bool,
-    /// Largest relative difference between the standard deviations of shared and own gains, in the mean of eight runs,
-    /// wherever runs were made both ways.
+    /// Largest relative difference between eight runs with shared and with own gains, wherever they were made both ways.
     pub largest_difference: Option<f64>,
 }
 
@@ -56,20 +56,29 @@ impl GainsUsed {
     }
 }
 
-/// Standard deviations may differ by this share: the mean of eight runs scatters by 1 % while a filter aligns, and
-/// errors at outage ends then differ by less than 0.5 % (docs/validation.md).
+/// Figures of eight runs made both ways may differ by this share; those of many then differ by less (docs/validation.md).
 const AGREEMENT: f64 = 0.03;
 /// One batch in so many is made both ways.
 const CHECKED: u64 = 64;
 
-/// Covariances of a filter along the reference, before the measurements of each event.
-pub(super) type Covariances = Vec<SharedCovariance>;
+/// A filter along the reference, event by event.
+pub(super) type SharedFilter = Vec<SharedEvent>;
+
+/// Covariances and updates of a filter at an event of the reference.
+#[derive(Debug)]
+pub(super) struct SharedEvent {
+    /// Before the measurements, where an outage ends.
+    pub before: Option<SharedCovariance>,
+    pub updates: Arc<[Arc<SharedUpdate>]>,
+    /// After them, where it is reported.
+    pub after: Option<SharedCovariance>,
+}
 
 /// The gains of all candidates, decided once a plan.
 #[derive(Debug)]
 pub(super) struct Decision {
-    /// For each candidate its covariances, or none where runs have their own.
-    shared: Vec<Option<Covariances>>,
+    /// For each candidate its filter along the reference, or none where runs have their own.
+    shared: Vec<Option<SharedFilter>>,
     /// Runs 0 to 7, where they were made to decide it.
     first: Option<Vec<Batch>>,
 }
@@ -126,7 +135,7 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
     run_candidates(plan, first, live, &filters(plan, &decision.shared))
 }
 
-fn filters<'a>(plan: &'a Plan<'_>, shared: &'a [Option<Covariances>]) -> Vec<BatchFilter<'a>> {
+fn filters<'a>(plan: &'a Plan<'_>, shared: &'a [Option<SharedFilter>]) -> Vec<BatchFilter<'a>> {
     let shared = shared.iter().map(Option::as_ref);
     plan.experiment.beliefs.iter().zip(shared).collect()
 }
@@ -136,17 +145,17 @@ fn both_ways(
     plan: &Plan<'_>,
     first: u64,
     live: usize,
-    shared: &[Option<Covariances>],
+    shared: &[Option<SharedFilter>],
 ) -> Vec<(Batch, Option<Batch>)> {
     let mut candidates = filters(plan, shared);
     let sharing = candidates
         .clone()
         .into_iter()
-        .filter(|(_, covariances)| covariances.is_some());
+        .filter(|(_, shared)| shared.is_some());
     candidates.extend(sharing.map(|(belief, _)| (belief, None)));
     let mut batches = run_candidates(plan, first, live, &candidates);
     let mut owns = batches.split_off(shared.len()).into_iter();
-    let compared = |(mut batch, shared): (Batch, &Option<Covariances>)| {
+    let compared = |(mut batch, shared): (Batch, &Option<SharedFilter>)| {
         let own = shared.as_ref().and_then(|_| owns.next());
         batch.gains.largest_difference = own.as_ref().map(|own| largest_difference(&batch, own));
         (batch, own)
@@ -154,35 +163,60 @@ fn both_ways(
     batches.into_iter().zip(shared).map(compared).collect()
 }
 
-/// Largest relative difference of the mean standard deviations of two batches; infinite where a run diverged.
+/// Largest relative difference of two batches on the same noise: of mean standard deviations at any report, and of root
+/// mean squares of errors over the run and at the ends of outages, which a persistent error that no filter knows moves while
+/// standard deviations stay. Infinite where a run diverged.
 fn largest_difference(shared: &Batch, own: &Batch) -> f64 {
-    let mut runs = shared.runs.iter().chain(&own.runs);
-    if runs.any(|run| run.diverged) {
+    if shared.runs.iter().chain(&own.runs).any(|run| run.diverged) {
         return f64::INFINITY;
     }
-    let of_epoch = |(a, b): (&EpochSums, &EpochSums)| {
-        let states = a.see.iter().zip(&b.see);
-        let all = states.chain(a.bias_see.iter().zip(&b.bias_see));
-        all.map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max)
-    };
-    let epochs = shared.epochs.iter().zip(&own.epochs);
-    epochs.map(of_epoch).fold(0.0, f64::max)
+    let [shared, own] = [shared, own].map(|batch| {
+        let deviations = batch
+            .epochs
+            .iter()
+            .flat_map(|e| e.see.iter().chain(&e.bias_see));
+        let squares = |i: usize| batch.epochs.iter().map(|e| e.error_sq[i]).sum::<f64>();
+        let ends = |k: usize, i: usize| {
+            let squares = batch
+                .runs
+                .iter()
+                .map(|run| run.outages[k].error_end[i].powi(2));
+            squares.sum::<f64>().sqrt()
+        };
+        let mut figures: Vec<f64> = deviations.copied().collect();
+        figures.extend((0..REPORTED).map(|i| squares(i).sqrt()));
+        for k in 0..batch.runs[0].outages.len() {
+            figures.extend((0..REPORTED).map(|i| ends(k, i)));
+        }
+        figures
+    });
+    let differences = shared.iter().zip(&own).map(|(a, b)| (a / b - 1.0).abs());
+    // of a perfect start both are zero
+    differences.filter(|d| !d.is_nan()).fold(0.0, f64::max)
 }
 
-/// The covariance of a filter whose errors are zero, as are those of its measurements.
-fn along_reference(plan: &Plan<'_>, belief: &Belief) -> Covariances {
+/// A filter whose errors are zero, as are those of its measurements.
+fn along_reference(plan: &Plan<'_>, belief: &Belief) -> SharedFilter {
     let nominal = Strapdown::new(&plan.start, plan.experiment.gravity);
     let mut ekf = Ekf::new(nominal, belief, &plan.start, plan.experiment.initial);
     let (mut done, mut none) = (0, Vec::new());
-    let at = |event: &Event| {
+    let at = |(index, event): (usize, &Event)| {
         let samples = &plan.ideal[done..event.sample];
         none.resize(samples.len(), [Vec3::ZERO; 2]);
         advance(&mut ekf, samples, &none);
         done = event.sample;
         settle(&mut ekf);
-        let covariance = ekf.p.shared();
+        let before = plan.ends_outage(index).then(|| ekf.p.shared());
+        ekf.gains = GainSource::Kept(Vec::new());
         let _ = measure(&mut ekf, plan, &Measured::exact(plan, event));
-        covariance
+        let GainSource::Kept(updates) = std::mem::take(&mut ekf.gains) else {
+            unreachable!("they were kept")
+        };
+        SharedEvent {
+            before,
+            updates: updates.into(),
+            after: event.report.then(|| ekf.p.shared()),
+        }
     };
-    plan.events.iter().map(at).collect()
+    plan.events.iter().enumerate().map(at).collect()
 }

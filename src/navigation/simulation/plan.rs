@@ -159,6 +159,11 @@ impl<'a> Plan<'a> {
         })
     }
 
+    /// Whether the first fix after an outage, or the last event, is this one.
+    pub(super) fn ends_outage(&self, event: usize) -> bool {
+        self.outages.iter().any(|(_, end)| *end == event)
+    }
+
     /// The gains of the candidates, decided when a run first needs them.
     pub(super) fn decision(&self) -> &Decision {
         self.decision.get_or_init(|| Decision::new(self))
