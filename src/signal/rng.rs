@@ -117,7 +117,7 @@ pub struct Xoshiro<B>([B; 4]);
 impl<B: Bits> Xoshiro<B> {
     /// The next number of each.
     #[inline(always)]
-    pub fn next(&mut self) -> B {
+    pub fn draw(&mut self) -> B {
         let rotate = |x: B, count: u64| x.shl(count).or(x.shr(64 - count));
         let s = &mut self.0;
         let next = rotate(s[0].add(s[3]), 23).add(s[0]);
@@ -179,9 +179,9 @@ mod tests {
         let keys = [KEY, StreamKey { run: 1, ..KEY }];
         let mut lanes = LaneGenerator::new(&keys);
         let mut registers = lanes.load::<[u64; LANES]>();
-        let first = [registers.next(), registers.next()];
+        let first = [registers.draw(), registers.draw()];
         lanes.store(registers);
-        let third = lanes.load::<[u64; LANES]>().next();
+        let third = lanes.load::<[u64; LANES]>().draw();
         for (lane, key) in keys.iter().enumerate() {
             let mut alone = key.generator();
             let drawn = [(); 3].map(|()| alone.next_u64());

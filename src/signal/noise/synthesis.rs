@@ -261,7 +261,7 @@ fn add_recursive<W: Wide, S: Streams, const N: usize>(
             last[i] = phi[i] * last[i] + sigma[i] * S::load(&fresh[i][k]);
             // In the order of the list, however it is grouped: the rounding of the sum does not depend on
             // TOGETHER.
-            sum = sum + last[i];
+            sum += last[i];
         }
         S::store(sum, &mut block[k]);
     }
@@ -345,12 +345,12 @@ impl Streams for LaneGenerator {
         match law {
             Law::Uniform => {
                 for x in out {
-                    uniform::<W>(generators.next()).store(x);
+                    uniform::<W>(generators.draw()).store(x);
                 }
             }
             Law::Normal => {
                 for [a, b] in out.as_chunks_mut::<2>().0 {
-                    let [x, y] = normals::<W>(generators.next(), generators.next());
+                    let [x, y] = normals::<W>(generators.draw(), generators.draw());
                     x.store(a);
                     y.store(b);
                 }
