@@ -309,14 +309,14 @@ fn negative_values_are_refused_in_the_words_of_their_option() {
 /// Advice on an unknown option that cannot be followed is left out.
 #[test]
 fn an_unknown_option_is_refused() {
-    let words = ["run", "a.toml", "b.toml", "--lanes", "8"];
+    let words = ["run", "a.toml", "b.toml", "--zigzag", "8"];
     let output = nav_sim().args(words).output().unwrap();
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2), "{said}");
     let hint = "hint: --help shows usage and examples\n";
     assert_eq!(
         said,
-        format!("error: unexpected argument --lanes found\n\n{hint}")
+        format!("error: unexpected argument --zigzag found\n\n{hint}")
     );
 }
 

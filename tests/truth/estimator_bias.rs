@@ -90,7 +90,8 @@ fn estimates_are_unbiased_however_much_quantization_noise_there_is() {
 /// White noise and random walk, single recordings of a power of two of samples, so that the last scale has one degree of
 /// freedom. Weighted by the observed variance its low values rule: of 200 recordings random walks were 19 % low in the mean
 /// and 37 times too low at worst. Scales count by their logarithm, which is centred: the median of 100 estimates is the truth to
-/// four of its standard errors (1.2533 of those of a mean, for nearly normal logarithms), and none is 20 times too low.
+/// four of its standard errors (1.2533 of those of a mean, for nearly normal logarithms), and none is 20 times too low, of robust
+/// variances at most two: of 1000 recordings it was two (binomial, more of 100 in 1.1e-3).
 #[test]
 fn a_scale_that_is_low_by_chance_does_not_rule() {
     let truth = Composite::new(vec![
@@ -98,7 +99,7 @@ fn a_scale_that_is_low_by_chance_does_not_rule() {
         Process::random_walk(1e-5).unwrap(),
     ]);
     let spec: ModelSpec = "WN+RW".parse().unwrap();
-    for estimator in [Estimator::Gmwm, Estimator::Rgmwm] {
+    for (estimator, most) in [(Estimator::Gmwm, 0), (Estimator::Rgmwm, 2)] {
         let ratio = |run: u64| {
             let key = StreamKey {
                 seed: 5,
@@ -124,7 +125,7 @@ fn a_scale_that_is_low_by_chance_does_not_rule() {
             estimator.name()
         );
         let low = ratios.iter().filter(|r| **r < 0.05).count();
-        assert_eq!(low, 0, "{}: {ratios:?}", estimator.name());
+        assert!(low <= most, "{}: {ratios:?}", estimator.name());
     }
 }
 

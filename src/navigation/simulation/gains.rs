@@ -164,8 +164,8 @@ fn both_ways(
 }
 
 /// Largest relative difference of two batches on the same noise: of mean standard deviations at any report, and of root
-/// mean squares of errors over the run and at the ends of outages, which a persistent error that no filter knows moves while
-/// standard deviations stay. Infinite where a run diverged.
+/// mean squares of errors at the ends of outages, which a persistent error that no filter knows moves while standard
+/// deviations stay. Infinite where a run diverged.
 fn largest_difference(shared: &Batch, own: &Batch) -> f64 {
     if shared.runs.iter().chain(&own.runs).any(|run| run.diverged) {
         return f64::INFINITY;
@@ -175,18 +175,11 @@ fn largest_difference(shared: &Batch, own: &Batch) -> f64 {
             .epochs
             .iter()
             .flat_map(|e| e.see.iter().chain(&e.bias_see));
-        let squares = |i: usize| batch.epochs.iter().map(|e| e.error_sq[i]).sum::<f64>();
-        let ends = |k: usize, i: usize| {
-            let squares = batch
-                .runs
-                .iter()
-                .map(|run| run.outages[k].error_end[i].powi(2));
-            squares.sum::<f64>().sqrt()
-        };
         let mut figures: Vec<f64> = deviations.copied().collect();
-        figures.extend((0..REPORTED).map(|i| squares(i).sqrt()));
         for k in 0..batch.runs[0].outages.len() {
-            figures.extend((0..REPORTED).map(|i| ends(k, i)));
+            let ends = || batch.runs.iter().map(|run| run.outages[k].error_end);
+            let rms = |i: usize| ends().map(|e| e[i] * e[i]).sum::<f64>().sqrt();
+            figures.extend((0..REPORTED).map(rms));
         }
         figures
     });
