@@ -487,7 +487,7 @@ const LEAST_CORRELATION: f64 = 0.1;
 
 /// Pairs of axes that share noise: their Haar coefficients have the same sign more often, or more rarely, than by chance.
 /// Signs hold for any distribution and any change of its level; of normal ones with correlation ρ a share of 1/2 + asin(ρ)/π
-/// is the same. At each scale as many of them count as there are coefficients, which are independent as [`haar`] says.
+/// is the same. At each scale as many of them count as there are coefficients, which are independent as `haar` says.
 #[must_use]
 pub fn shared_noise(axes: &[&[f64]]) -> Vec<SharedNoise> {
     let pairs = (1..axes.len()).flat_map(|later| (0..later).map(move |first| [first, later]));

@@ -191,10 +191,10 @@ impl Trajectory {
         }
     }
 
-    /// The samples of [`ideal_imu`], computed once for many runs.
+    /// The samples of [`ideal_imu()`], computed once for many runs.
     ///
     /// # Errors
-    /// As [`ideal_imu`].
+    /// As [`ideal_imu()`].
     pub fn ideal(
         &self,
         rate_hz: f64,
