@@ -602,13 +602,13 @@ mod sensitivity {
     }
 
     /// The breakdown point of DR-AWV between replicates is its trim: a abnormal ones of K are borne,
-    /// a + 1 are not.
+    /// a + 1 are not. Of 2^13 samples some designs show no walk, which has no relative change.
     #[test]
     fn dr_awv_withstands_as_many_abnormal_replicates_as_it_trims() {
         for trim in [1, 2] {
             let design = Design {
                 trim: Trim::Count(trim),
-                ..design(1 << 13)
+                ..design(1 << 14)
             };
             let change =
                 |count| largest(&abnormal_curve(&design, count, &[1e8]).unwrap()[0].changes[DR]);
