@@ -165,22 +165,7 @@ impl Descent<'_> {
     }
 }
 
-/// Where a function of one variable is least between two points, by golden sections.
-pub fn golden_section(mut low: f64, mut high: f64, tolerance: f64, f: impl Fn(f64) -> f64) -> f64 {
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    while high - low > tolerance {
-        let by = golden * (high - low);
-        if f(high - by) <= f(low + by) {
-            high = low + by
-        } else {
-            low = high - by
-        }
-    }
-    0.5 * (low + high)
-}
-
-/// Where a smooth function of one variable is least between two points, by parabolas ([`BrentOpt`]): in a quarter of the
-/// evaluations of golden sections.
+/// The minimum of a smooth function of one variable between two points, by parabolas ([`BrentOpt`]).
 pub fn line_minimum(low: f64, high: f64, tolerance: f64, f: impl Fn(f64) -> f64) -> f64 {
     struct Line<F>(F);
     impl<F: Fn(f64) -> f64> CostFunction for Line<F> {

@@ -23,7 +23,7 @@ pub(crate) struct Effort {
     combinations: usize,
     /// Largest number of local minima of the grid from which a descent starts.
     starts: usize,
-    /// Whether all ends are minima to rounding; if not, the best of them, to a small part of its standard deviations.
+    /// True if all ends are minima to rounding; else the best is one, to a small part of its standard deviations.
     is_exact: bool,
 }
 
@@ -115,7 +115,7 @@ struct Grid<'a> {
     repeats: Vec<bool>,
     /// Shapes of the components without a coordinate, then those of the points of each dimension.
     shapes: Vec<Shape>,
-    /// Whether the columns serve for every combination.
+    /// True if the columns serve for every combination.
     is_linear: bool,
     /// Inner products of the columns of all shapes, and with the target.
     gram: Vec<f64>,
@@ -364,7 +364,7 @@ struct LinearBest {
     residuals: Vec<f64>,
 }
 
-/// How far the shares of quantization noise settle.
+/// Tolerance of the shares of quantization noise.
 #[derive(Clone, Copy)]
 struct Settling {
     /// Rounds at most; each takes off two digits or so.
@@ -512,7 +512,7 @@ impl Objective {
         Column { values, length }
     }
 
-    /// What the curve reads of a component at each level.
+    /// The variance that the curve shows of a component at each level.
     fn read(&self, component: usize, levels: &[f64], responses: &[Response]) -> Vec<f64> {
         let pairs = levels.iter().zip(responses);
         match self.components[component].kind {
@@ -784,12 +784,12 @@ pub(crate) struct End {
     pub(crate) termination: Termination,
 }
 
-/// How near a descent comes to its minimum.
+/// Tolerance of a descent.
 struct Precision {
     /// Gain of the last step, in parts of the cost.
     enough: fn(f64) -> f64,
     settling: Settling,
-    /// Whether the curvature is the difference of gradients.
+    /// True if the curvature is the difference of gradients.
     is_newton: bool,
 }
 

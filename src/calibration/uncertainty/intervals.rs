@@ -319,7 +319,7 @@ impl Outcome {
 }
 
 impl Practical {
-    /// Those of a model, without intervals.
+    /// The parameters of a model, without intervals.
     fn of(model: &Composite, rate_hz: f64, range_s: f64) -> Option<Self> {
         let curve = Curve::largest(&[model], rate_hz, Horizon::default()).ok()?;
         let walk = curve.pair(Policy::Matched, Bias::Walk);

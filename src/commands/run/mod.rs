@@ -165,7 +165,7 @@ struct Filter {
 /// A track without outages, and the same with one step from mark to mark; made where it is needed first.
 type SharedTrack = Arc<OnceLock<[Track; 2]>>;
 
-/// What many runs have in common and is made once: trajectories, and tracks without outages.
+/// Trajectories and tracks without outages, made once for many runs.
 #[derive(Default)]
 pub(crate) struct Shared {
     trajectories: Mutex<HashMap<PathBuf, Trajectory>>,

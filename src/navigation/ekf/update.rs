@@ -98,11 +98,11 @@ impl Ekf {
         if let GainSource::Kept(updates) = &mut self.gains {
             let mut variance = Lanes::ZERO;
             s.store(&mut variance);
-            updates.push(Arc::new(SharedUpdate {
+            updates.push(SharedUpdate {
                 row: h.iter().map(|(state, c)| (*state, c[0])).collect(),
                 gain: scratch.gain.iter().map(|gain| gain[0]).collect(),
                 variance: variance[0],
-            }));
+            });
         }
         (innovation, s)
     }
@@ -150,38 +150,27 @@ impl Ekf {
     }
 }
 
-/// A scalar update of the reference, for all runs.
-#[derive(Debug)]
+/// A scalar update along the reference, for all runs.
+#[derive(Debug, Clone)]
 pub(crate) struct SharedUpdate {
     /// States that the measurement depends on, and their coefficients.
     row: Vec<(usize, f64)>,
     /// One entry a state.
     gain: Box<[f64]>,
-    /// Of the innovation.
+    /// The variance of the innovation.
     variance: f64,
 }
 
-/// Covariance and gains of a filter.
+/// Source of a filter's gains.
 #[derive(Debug, Clone, Default)]
 pub(crate) enum GainSource {
-    /// Its own.
+    /// Its own covariance.
     #[default]
     Own,
-    /// Its own, whose updates are kept.
-    Kept(Vec<Arc<SharedUpdate>>),
-    /// Given for the next scalars; no covariance is propagated.
-    Given(Arc<[Arc<SharedUpdate>]>, usize),
-}
-
-impl GainSource {
-    /// The next update, where they are given.
-    fn next(&mut self) -> Option<Arc<SharedUpdate>> {
-        let Self::Given(updates, used) = self else {
-            return None;
-        };
-        *used += 1;
-        Some(updates[*used - 1].clone())
-    }
+    /// Its own covariance; its updates are kept.
+    Kept(Vec<SharedUpdate>),
+    /// Updates for the next scalars, of which so many are used; no covariance is propagated.
+    Given(Arc<[SharedUpdate]>, usize),
 }
 
 /// How a fix is used.
@@ -253,9 +242,17 @@ impl Kernel for UseScalars<'_> {
     #[inline(always)]
     fn run<W: Wide>(self) -> Innovations {
         let mut found = Innovations::from_elem([Lanes::ZERO; 2], self.scalars.len());
-        for (scalar, [z, s]) in self.scalars.iter().zip(&mut found) {
-            let (innovation, variance) = match self.ekf.gains.next() {
-                Some(shared) => self.ekf.take_shared::<W>(scalar, &shared),
+        let given = match &mut self.ekf.gains {
+            GainSource::Given(updates, used) => {
+                let first = *used;
+                *used += self.scalars.len();
+                Some((updates.clone(), first))
+            }
+            _ => None,
+        };
+        for (i, (scalar, [z, s])) in self.scalars.iter().zip(&mut found).enumerate() {
+            let (innovation, variance) = match &given {
+                Some((updates, first)) => self.ekf.take_shared::<W>(scalar, &updates[first + i]),
                 None => self.ekf.take::<W>(scalar),
             };
             innovation.store(z);

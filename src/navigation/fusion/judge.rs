@@ -395,7 +395,7 @@ fn with_velocity(truth: NavState, map: fn(DVec3) -> DVec3) -> NavState {
 const KM_H: f64 = 1.0 / 3.6;
 const QUARTER: f64 = 90.0 * DEG;
 
-/// Of what changes values, first with standard deviations of the same unit, then with those of the names.
+/// A transformation of values comes first with standard deviations in the same unit, then in that of their names.
 #[rustfmt::skip]
 const TRANSFORMATIONS: [Transformation; 16] = {
     const fn new(block: usize, cause: &'static str, truth: fn(NavState) -> NavState, sigma: fn(f64) -> f64) -> Transformation {

@@ -159,10 +159,10 @@ fn another_clock_and_another_point_are_found() {
     assert!(right[0] >= 11 && right[1] >= 11, "{right:?}");
 }
 
-/// What is done to each row.
+/// A change of each row.
 type Change<'a> = &'a dyn Fn(&mut StatedRow);
 
-/// What is written otherwise than its names say is named, and only that; a filter that is wrong by one factor is not.
+/// A solution in other units or axes than its names say is named as that; a filter that is wrong by one factor is not.
 #[test]
 fn simple_transformations_are_named() {
     let drive = drive();

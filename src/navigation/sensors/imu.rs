@@ -140,7 +140,7 @@ pub struct LaneErrors<'a> {
 
 #[derive(Debug, Clone)]
 enum Source<'a> {
-    /// Of the six channels.
+    /// One synthesizer for each channel.
     Synthesised(Box<[Synthesizer<LaneGenerator>; 6]>),
     /// For each run the rest of its window on the six channels, and the level from which that started (m/s² or rad/s).
     Recorded(Vec<[(&'a [f64], f64); 6]>),

@@ -48,7 +48,18 @@ impl Outage {
         outages.iter().any(|outage| outage.withholds(t_s))
     }
 
-    /// Whether a fix at `t_s` comes after it.
+    /// The instant of the first fix after it, of all instants in time order with their fixes; the last one where none
+    /// follows.
+    pub(crate) fn end_among(
+        &self,
+        mut instants: impl ExactSizeIterator<Item = (f64, bool)>,
+    ) -> usize {
+        let last = instants.len() - 1;
+        let first_fix = instants.position(|(t_s, is_fix)| is_fix && self.is_over(t_s));
+        first_fix.unwrap_or(last)
+    }
+
+    /// True if a fix at `t_s` comes after it.
     pub(crate) fn is_over(&self, t_s: f64) -> bool {
         self.end_s <= t_s + SLACK_S
     }

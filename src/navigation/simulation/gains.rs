@@ -20,12 +20,12 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Gains {
-    /// Shared where standard deviations and errors of runs 0 to 7 agree within 3 % with those of their own gains.
+    /// Shared where runs 0 to 7, made both ways, agree within 3 % in standard deviations and errors.
     #[default]
     Auto,
-    /// Of each run, about its own estimate.
+    /// Each run has its own, about its own estimate.
     Own,
-    /// Along the reference, the same for all runs.
+    /// All runs have those along the reference.
     Shared,
 }
 
@@ -34,7 +34,7 @@ nav_sim_signal::named!(Gains { Auto = "auto", Own = "own", Shared = "shared" });
 /// The gains that runs had.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct GainsUsed {
-    /// Whether they shared those along the reference.
+    /// True if they shared those along the reference.
     pub is_shared: bool,
     /// Largest relative difference between eight runs with shared and with own gains, wherever they were made both ways.
     pub largest_difference: Option<f64>,
@@ -47,7 +47,7 @@ impl GainsUsed {
         self.largest_difference = differences.into_iter().flatten().reduce(f64::max);
     }
 
-    /// Whether runs made both ways later differ by more than the mean of eight runs does by chance.
+    /// True if later runs made both ways differ by more than eight runs do by chance.
     pub fn disagree(&self) -> bool {
         self.is_shared
             && self
@@ -69,7 +69,7 @@ pub(super) type SharedFilter = Vec<SharedEvent>;
 pub(super) struct SharedEvent {
     /// Before the measurements, where an outage ends.
     pub before: Option<SharedCovariance>,
-    pub updates: Arc<[Arc<SharedUpdate>]>,
+    pub updates: Arc<[SharedUpdate]>,
     /// After them, where it is reported.
     pub after: Option<SharedCovariance>,
 }

@@ -159,7 +159,7 @@ impl<'a> Plan<'a> {
         })
     }
 
-    /// Whether the first fix after an outage, or the last event, is this one.
+    /// True for the first fix after an outage, and for the last event if there is none.
     pub(super) fn ends_outage(&self, event: usize) -> bool {
         self.outages.iter().any(|(_, end)| *end == event)
     }
@@ -185,11 +185,11 @@ fn effects(outage: &Outage, events: &[Event]) -> (f64, usize) {
         .iter()
         .filter(|e| e.report && outage.withholds(e.t_s))
         .count();
-    let first_fix = events.iter().position(|e| e.fix && outage.is_over(e.t_s));
-    (reports as f64, first_fix.unwrap_or(events.len() - 1))
+    let end = outage.end_among(events.iter().map(|e| (e.t_s, e.fix)));
+    (reports as f64, end)
 }
 
-/// What the IMU of an experiment feels over a sample, as it is in its middle; `first` is the first sample.
+/// Motion and temperature of the IMU in the middle of a sample; `first` is the first sample.
 pub(super) fn felt(
     experiment: &Experiment<'_>,
     index: usize,

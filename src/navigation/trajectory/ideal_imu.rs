@@ -45,7 +45,7 @@ pub(crate) struct IdealSamples<'a> {
     trajectory: &'a Trajectory,
     rate_hz: f64,
     gravity: GravityModel,
-    /// Those that are still to come.
+    /// Samples still to come.
     knots: &'a [f64],
     /// The motion up to the first of them.
     piece: Piece,

@@ -125,7 +125,7 @@ pub struct Kinematics {
 pub struct Trajectory {
     origin_e: DVec3,
     curve: Arc<Spline<7>>,
-    /// What was asked for last, for all clones: runs along one trajectory have one ideal IMU.
+    /// The ideal IMU computed last, shared by all clones.
     ideal: Arc<Mutex<Option<IdealImu>>>,
 }
 

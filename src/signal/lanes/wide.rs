@@ -39,10 +39,20 @@ pub trait Bits: Copy {
     fn or(self, other: Self) -> Self;
     /// Bitwise exclusive or.
     fn xor(self, other: Self) -> Self;
+    /// Shifted left by these counts < 64.
+    fn shl_each(self, counts: Self) -> Self;
+    /// Shifted right by these counts < 64, zeros from the left.
+    fn shr_each(self, counts: Self) -> Self;
     /// Shifted left by `count` < 64 bits.
-    fn shl(self, count: u64) -> Self;
+    #[inline(always)]
+    fn shl(self, count: u64) -> Self {
+        self.shl_each(Self::splat(count))
+    }
     /// Shifted right by `count` < 64 bits, zeros from the left.
-    fn shr(self, count: u64) -> Self;
+    #[inline(always)]
+    fn shr(self, count: u64) -> Self {
+        self.shr_each(Self::splat(count))
+    }
 }
 
 impl Wide for Lanes {
@@ -66,14 +76,13 @@ impl Wide for Lanes {
 }
 
 macro_rules! lane_integer_operator {
-    ($method:ident, $lane:ident, $other:ident, $argument:ty, $result:expr) => {
+    ($method:ident, $operator:expr) => {
         #[inline(always)]
-        fn $method(self, $other: $argument) -> Self {
-            let mut result = self;
-            for $lane in 0..LANES {
-                result[$lane] = $result(self[$lane]);
+        fn $method(mut self, other: Self) -> Self {
+            for i in 0..LANES {
+                self[i] = $operator(self[i], other[i]);
             }
-            result
+            self
         }
     };
 }
@@ -87,12 +96,12 @@ impl Bits for [u64; LANES] {
     fn store(self, lanes: &mut [u64; LANES]) {
         *lanes = self;
     }
-    lane_integer_operator!(add, i, other, Self, |x: u64| x.wrapping_add(other[i]));
-    lane_integer_operator!(and, i, other, Self, |x: u64| x & other[i]);
-    lane_integer_operator!(or, i, other, Self, |x: u64| x | other[i]);
-    lane_integer_operator!(xor, i, other, Self, |x: u64| x ^ other[i]);
-    lane_integer_operator!(shl, i, count, u64, |x: u64| x << count);
-    lane_integer_operator!(shr, i, count, u64, |x: u64| x >> count);
+    lane_integer_operator!(add, u64::wrapping_add);
+    lane_integer_operator!(and, |x, y| x & y);
+    lane_integer_operator!(or, |x, y| x | y);
+    lane_integer_operator!(xor, |x, y| x ^ y);
+    lane_integer_operator!(shl_each, |x: u64, count| x << count);
+    lane_integer_operator!(shr_each, |x: u64, count| x >> count);
 }
 
 /// What the processor can do.
@@ -182,22 +191,7 @@ mod x86 {
         kernel.run::<Avx2>()
     }
 
-    macro_rules! operator {
-        ($name:ident, $count:literal, $trait:ident, $method:ident, $intrinsic:ident) => {
-            impl $trait for $name {
-                type Output = Self;
-                #[inline(always)]
-                fn $method(mut self, other: Self) -> Self {
-                    for i in 0..$count {
-                        self.0[i] = unsafe { $intrinsic(self.0[i], other.0[i]) };
-                    }
-                    self
-                }
-            }
-        };
-    }
-
-    macro_rules! integer_operator {
+    macro_rules! by_register {
         ($count:literal, $method:ident, $intrinsic:ident) => {
             #[inline(always)]
             fn $method(mut self, other: Self) -> Self {
@@ -205,6 +199,15 @@ mod x86 {
                     self.0[i] = unsafe { $intrinsic(self.0[i], other.0[i]) };
                 }
                 self
+            }
+        };
+    }
+
+    macro_rules! operator {
+        ($name:ident, $count:literal, $trait:ident, $method:ident, $intrinsic:ident) => {
+            impl $trait for $name {
+                type Output = Self;
+                by_register!($count, $method, $intrinsic);
             }
         };
     }
@@ -228,26 +231,12 @@ mod x86 {
                         unsafe { $store(lanes.as_mut_ptr().add($width * i).cast(), self.0[i]) };
                     }
                 }
-                integer_operator!($count, add, $add);
-                integer_operator!($count, and, $and);
-                integer_operator!($count, or, $or);
-                integer_operator!($count, xor, $xor);
-                #[inline(always)]
-                fn shl(mut self, count: u64) -> Self {
-                    let counts = Self::splat(count);
-                    for i in 0..$count {
-                        self.0[i] = unsafe { $shl(self.0[i], counts.0[i]) };
-                    }
-                    self
-                }
-                #[inline(always)]
-                fn shr(mut self, count: u64) -> Self {
-                    let counts = Self::splat(count);
-                    for i in 0..$count {
-                        self.0[i] = unsafe { $shr(self.0[i], counts.0[i]) };
-                    }
-                    self
-                }
+                by_register!($count, add, $add);
+                by_register!($count, and, $and);
+                by_register!($count, or, $or);
+                by_register!($count, xor, $xor);
+                by_register!($count, shl_each, $shl);
+                by_register!($count, shr_each, $shr);
             }
         };
     }

@@ -26,7 +26,7 @@ pub struct Synthesizer<S: Streams = Generator> {
 }
 
 /// Samples made at a time, an even number: every process fills a block, then the blocks are summed.
-pub(crate) const BLOCK: usize = 64;
+const BLOCK: usize = 64;
 /// Recursions that advance together: each step waits for the last one of its own chain, and three chains side
 /// by side keep the processor busy meanwhile.
 const TOGETHER: usize = 3;
@@ -276,18 +276,14 @@ fn add_recursive<W: Wide, S: Streams, const N: usize>(
 
 /// Distribution of fresh numbers.
 #[derive(Debug, Clone, Copy)]
-enum Law {
+pub enum Law {
     /// On [0, 1), multiples of 2⁻⁵².
     Uniform,
-    /// Of mean 0 and variance 1.
+    /// Mean 0 and variance 1.
     Normal,
 }
 
 /// The streams of a process: one ([`Generator`]), or eight side by side ([`LaneGenerator`]).
-#[allow(
-    private_interfaces,
-    reason = "a trait of this module alone, named by its types"
-)]
 pub trait Streams: std::fmt::Debug + Clone {
     /// A number of each stream.
     type Sample: Real + std::fmt::Debug;
@@ -321,7 +317,6 @@ fn first_of<S: Streams>(streams: &mut S, law: Law) -> S::Sample {
     dispatch(Level::best(), First(streams, law))
 }
 
-#[allow(private_interfaces, reason = "as in the trait")]
 impl Streams for LaneGenerator {
     type Sample = Lanes;
     type Register<W: Wide> = W;
@@ -360,7 +355,6 @@ impl Streams for LaneGenerator {
     }
 }
 
-#[allow(private_interfaces, reason = "as in the trait")]
 impl Streams for Generator {
     type Sample = f64;
     type Register<W: Wide> = f64;

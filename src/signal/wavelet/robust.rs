@@ -11,7 +11,7 @@
 use super::WaveletError;
 use super::haar::{BLOCK, Compensated, Pyramid, WIDTH, array, butterflies, pairwise};
 use super::interval::edof_eta3;
-use crate::minimise::golden_section;
+use crate::minimise::line_minimum;
 use multiversion::multiversion;
 use statrs::function::erf::erf;
 use std::f64::consts::{PI, SQRT_2};
@@ -323,7 +323,7 @@ impl Equation<'_> {
     fn summit(&self, s: f64) -> (f64, f64) {
         // g is flat at its maximum: 1e-7 of ln s is 1e-14 of g, and a comparison of two g tells no more.
         let (u, step) = (s.ln(), STEP.ln());
-        let top = golden_section(u - step, u + step, 1e-7, |u| -self.at(u.exp())[0]).exp();
+        let top = line_minimum(u - step, u + step, 1e-7, |u| -self.at(u.exp())[0]).exp();
         (top, self.at(top)[0])
     }
 }

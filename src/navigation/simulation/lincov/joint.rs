@@ -28,7 +28,7 @@ pub(super) struct Joint<'a> {
     /// Samples so far.
     pub elapsed: f64,
     level: Level,
-    /// What a step computes on the way, and a measurement.
+    /// Intermediate results of a step, and of a measurement.
     means: Vec<Lanes>,
     scratch: Vec<Lanes>,
     measured: Measured,
@@ -336,7 +336,7 @@ fn map<W: Wide>(step: &Step, x: &mut [Lanes], u: &[Lanes], width: usize, signals
 
 /// (A P) Aᵀ of x from the rows of A P in the columns of x and of the signals' means.
 ///
-/// Of each pair of covariances that should be equal the mean is taken. Rounding makes them unequal, corrections leave their
+/// Covariances that should be equal are replaced by their mean. Rounding makes them unequal, corrections leave their
 /// difference as it is, and over the steps it would grow as the unaided vertical channel does, by e in some 400 s: after
 /// three hours no digit is left.
 #[inline(always)]

@@ -111,7 +111,7 @@ impl Row {
         }
     }
 
-    /// Whether any of the states of these sides may have a coefficient of its own.
+    /// True if a state of these sides may have a coefficient of its own.
     pub(super) fn is_of_states(&self, sides: &Sides) -> bool {
         sides.have_outer || self.h[NAV..].iter().any(|h| *h != 0.0)
     }
@@ -248,9 +248,7 @@ impl Track {
             }
         }
         for (i, outage) in outages.iter().enumerate() {
-            let first_fix = |mark: &Mark| mark.fix && outage.is_over(mark.t_s);
-            let end = track.marks.iter().position(first_fix);
-            let end = end.unwrap_or(track.marks.len() - 1);
+            let end = outage.end_among(track.marks.iter().map(|mark| (mark.t_s, mark.fix)));
             track.marks[end].outages.push(i);
         }
         track
@@ -494,7 +492,7 @@ impl Columns {
         columns
     }
 
-    /// What the signals are multiplied by.
+    /// Sets the factors of the signals.
     fn feel(&mut self, felt: &Surroundings) {
         for signal in SCALED..self.signals {
             let (.., of) = place(signal);
@@ -1214,7 +1212,7 @@ pub(super) struct Sides {
     pub estimated: usize,
     /// Signals that they reach: most have neither scale factors nor what comes after them.
     pub signals: usize,
-    /// Whether some of them are errors of measurements.
+    /// True if some of them are errors of measurements.
     have_outer: bool,
     /// By the number of samples of a step; few numbers occur.
     inputs: Vec<(u32, Inputs)>,
