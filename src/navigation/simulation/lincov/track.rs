@@ -620,6 +620,10 @@ fn covariance_of_start(experiment: &Experiment<'_>, start: &NavState) -> [Nav; N
 
 /// Longest step of an outline (s): with fixes, and without.
 const OUTLINE_STEP_S: [f64; 2] = [2.0, 5.0];
+/// Length of a drive from which these steps grow (s), and how far: each of the search's hundreds of passes would cost as much
+/// more as the drive is longer, and the search finds its belief as well by longer steps.
+const OUTLINE_DRIVE_S: f64 = 900.0;
+const MOST_STRETCH: f64 = 5.0;
 /// Time between two reports of an outline (s).
 const REPORT_S: f64 = 10.0;
 
@@ -670,6 +674,8 @@ impl Track {
     /// mean at the last of them.
     pub(super) fn outline(&self) -> Self {
         let last_fixes = self.last_fixes();
+        let drive_s = self.marks.last().map_or(0.0, |mark| mark.after_s);
+        let stretch = (drive_s / OUTLINE_DRIVE_S).clamp(1.0, MOST_STRETCH);
         let (mut steps, mut marks) = (Vec::new(), Vec::new());
         let (mut report_s, mut begin_s, mut before_s) = (f64::NEG_INFINITY, 0.0, 0.0);
         // What becomes one step, and one measurement of each kind: the last of so many, with the mean of their noise.
@@ -689,7 +695,7 @@ impl Track {
                     (*rows, *count) = (own, *count + 1.0);
                 }
             }
-            let longest_s = OUTLINE_STEP_S[usize::from(measured[0].1 == 0.0)] + SLACK_S;
+            let longest_s = stretch * OUTLINE_STEP_S[usize::from(measured[0].1 == 0.0)] + SLACK_S;
             let next = self.marks.get(i + 1).filter(|next| next.outages.is_empty());
             // An outage begins with its first missing fix and ends with the first fix after it, no step later.
             let is_bound = !mark.outages.is_empty() || last_fixes.contains(&i);
