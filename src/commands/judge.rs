@@ -4,11 +4,9 @@ use super::fuse::{Columns, TIME, number, table};
 use crate::app::{Command, Context, Failure, Out, PlainAnswer, Result, refused};
 use crate::io::trajectory_file::{load_reference, load_solution, parse_origin};
 use crate::parse::numbers;
-use crate::report::json;
 use crate::report::verdict::{drive_line, tone};
-use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, readable, window,
-};
+use crate::report::{error_charts, json};
+use nav_sim_document::{Cell, Colour, Document, Importance, Table, readable, window};
 use nav_sim_navigation::fusion::judge::{
     Doubt, Judgement, ReferenceOffset, StatedErrors, judge, rough_delay_s,
 };
@@ -316,29 +314,16 @@ fn page(judgement: &Judgement, outages: &[(f64, f64)]) -> Document {
         document.table(table.without_unknown());
     }
     document.section("Errors");
+    let rows = judgement.errors.iter().map(|e| (e.t_s, e.values, e.sigma));
+    let names = ["stated", "error"];
     document.charts(
-        &charts(judgement, outages),
+        &error_charts(
+            &[(rows.collect(), names, [Colour::BELIEVED, Colour::REAL])],
+            outages,
+        ),
         "Lines: solution less reference. Bands: ± 3 σ as stated.",
     );
     document
-}
-
-fn charts(judgement: &Judgement, outages: &[(f64, f64)]) -> Vec<Chart> {
-    let known = (0..REPORTED_NAMES.len()).filter(|i| !judgement.rmse.0[*i].is_nan());
-    let chart = |i: usize| {
-        let errors = &judgement.errors;
-        let band = errors
-            .iter()
-            .map(|e| (e.t_s, -3.0 * e.sigma[i], 3.0 * e.sigma[i]));
-        let line = errors.iter().map(|e| (e.t_s, e.values[i]));
-        let series = vec![
-            Series::new("3 σ", Colour::BELIEVED, Mark::Band(band.collect())),
-            Series::line("error", Colour::REAL, line.collect()),
-        ];
-        let panel = Panel::new(Axis::linear(REPORTED_NAMES[i]), series);
-        Chart::over_time(REPORTED_NAMES[i], vec![panel], outages).small()
-    };
-    known.map(chart).collect()
 }
 
 /// A row for each of the solution: errors, standard deviations, NEES where correlations are stated.

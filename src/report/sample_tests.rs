@@ -22,6 +22,7 @@ pub(crate) fn result() -> RunResult {
             see_sq: [n * sigma * sigma * 1.01; 9],
             bias_see: [n * 1e-4; 6],
             error: [0.2 * sigma; 9],
+            first_error: Some([0.4 * sigma; 9]),
             error_sq: [n * 1.1 * sigma * sigma; 9],
             error_4: [n * 3.0 * sigma.powi(4); 9],
             pos_error: [n * 1.6 * sigma, n * 3.0 * sigma * sigma],

@@ -3,7 +3,7 @@
 use super::{Cause, FuseAnswer};
 use crate::report::trajectory::track_map;
 use crate::report::verdict::{deciding, drive_line};
-use crate::report::{reduction_doubt, reduction_line, tone};
+use crate::report::{error_charts, reduction_doubt, reduction_line, tone};
 use glam::DVec3;
 use nav_sim_document::{
     Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, readable, seconds,
@@ -15,7 +15,7 @@ use nav_sim_navigation::fusion::{
     ClocksApart, Finding, FixRecord, Outliers, OwnNoise, Row, Solution, Withheld,
 };
 use nav_sim_navigation::metrics::VerdictKind;
-use nav_sim_navigation::simulation::REPORTED_NAMES;
+use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 
 impl FuseAnswer {
     /// Verdict, figures, charts and notes.
@@ -415,7 +415,7 @@ fn cause(cause: &Cause) -> String {
 const UNEVEN: f64 = 0.5;
 
 const POSITION: &str = "Dashed: horizontal 1 σ stated. Line: distance from the reference.";
-const ERRORS: &str = "Lines: estimate less reference. Bands: ± 1 σ.";
+const ERRORS: &str = "Lines: estimate less reference. Bands: ± 3 σ as stated.";
 const FIXES: &str = "Of a right filter 95 % of the used fixes are in the band.";
 
 /// Colour of what is smoothed.
@@ -436,7 +436,7 @@ fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
 fn solutions(solution: &Solution) -> Vec<(&[Row], [&'static str; 2], [Colour; 2])> {
     let rows = solution.rows.as_slice();
     match solution.smoothed.as_deref() {
-        None => vec![(rows, ["1 σ", "error"], [Colour::BELIEVED, Colour::REAL])],
+        None => vec![(rows, ["stated", "error"], [Colour::BELIEVED, Colour::REAL])],
         Some(smoothed) => {
             vec![
                 (rows, ["filter"; 2], [Colour::REAL; 2]),
@@ -470,37 +470,18 @@ fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
 }
 
 fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
-    let chart = |(i, name): (usize, &&str)| {
-        let is_velocity = (3..6).contains(&i);
-        let error = |row: &Row| {
-            (
-                row.t_s,
-                row.error
-                    .filter(|e| !is_velocity || e.velocity_sigma < UNEVEN)
-                    .map_or(f64::NAN, |e| e.values[i]),
-            )
-        };
-        let mut series = Vec::new();
-        for (rows, [stated, line], [believed, real]) in solutions(solution) {
-            series.push(Series::new(
-                stated,
-                believed,
-                Mark::Band(
-                    rows.iter()
-                        .map(|row| (row.t_s, -row.sigma[i], row.sigma[i]))
-                        .collect(),
-                ),
-            ));
-            series.push(Series::line(line, real, rows.iter().map(error).collect()));
+    let row = |row: &Row| {
+        let mut values = row.error.map_or([f64::NAN; REPORTED], |e| e.values);
+        if row.error.is_some_and(|e| e.velocity_sigma >= UNEVEN) {
+            values[3..6].fill(f64::NAN);
         }
-        Chart::over_time(
-            name,
-            vec![Panel::new(Axis::linear("").including(0.0, 0.0), series)],
-            outages,
-        )
-        .small()
+        (row.t_s, values, row.sigma)
     };
-    REPORTED_NAMES.iter().enumerate().map(chart).collect()
+    let sets: Vec<_> = solutions(solution)
+        .into_iter()
+        .map(|(rows, names, colours)| (rows.iter().map(row).collect(), names, colours))
+        .collect();
+    error_charts(&sets, outages)
 }
 
 fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {

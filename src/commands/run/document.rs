@@ -3,7 +3,9 @@
 use super::{Navigation, RunAnswer};
 use crate::report::trajectory::track_map;
 use crate::report::verdict::{requirement_line, verdict_lines, windows};
-use crate::report::{integration_line, reduction_doubt, reduction_line, tone};
+use crate::report::{
+    ErrorRow, error_charts, integration_line, reduction_doubt, reduction_line, tone,
+};
 use nav_sim_document::{
     Axis, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone, window,
 };
@@ -20,6 +22,7 @@ const SOURCES: usize = 3;
 const HORIZONTAL: &str = "Horizontal RMSE, and the filter's own standard deviation (ASEE, averaged standard estimation error; north and \
      east together) with the range up to three times that. Dots: median at the end of an outage, the bar up to the 95 % quantile.";
 const STATES_SHOWN: &str = "RMSE: how wrong the filter is. ASEE: its own standard deviation. Their ratio is 1 if the filter is right.";
+const FIRST: &str = "Lines: estimate less truth in one run. Bands: ± 3 ASEE.";
 const CONSISTENCY: &str = "NEES: normalised estimation error squared of position, velocity and attitude. Coverage: share of errors inside \
      the filter's ellipsoid of position and attitude.";
 
@@ -51,6 +54,13 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     outages(answer, &shown, &mut page);
     page.section("Errors over time");
     page.charts(&states(epochs, &windows), STATES_SHOWN);
+    let error = |e: &EpochMetrics| Some((e.t_s, e.first_error?, e.asee.0.map(|asee| asee.value)));
+    let first: Vec<ErrorRow> = epochs.iter().filter_map(error).collect();
+    if !first.is_empty() {
+        let first = (first, ["stated", "error"], [Colour::BELIEVED, Colour::REAL]);
+        let charts = error_charts(&[first], &windows);
+        page.folded("Errors of run 0", |page| page.charts(&charts, FIRST));
+    }
     page.section("Consistency");
     page.chart(&nees(epochs, summary), CONSISTENCY);
     page.table(consistency(answer));

@@ -148,6 +148,7 @@ fn epoch(judged: &Judged, bias_asee: [f64; BIASES], limit: f64) -> Option<EpochM
         bias_asee,
         rmse: exactly(instant.rmse()),
         bias: exactly(instant.reported(&instant.mean)),
+        first_error: None,
         mean_pos_err_m: exact(mean_size(instant, &[0, 1, 2])),
         mean_att_err_deg: exact(mean_size(instant, &[6, 7, 8]) / DEG),
         nees: exact(judged.consistency().nees),

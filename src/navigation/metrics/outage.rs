@@ -124,6 +124,8 @@ pub struct EpochMetrics {
     pub rmse: PerState<Estimate>,
     /// Mean error, estimate − truth.
     pub bias: PerState<Estimate>,
+    /// Error of run 0, estimate − truth; none where it diverged, or of expected values.
+    pub first_error: Option<[f64; REPORTED]>,
     /// Mean 3-D position error (m).
     pub mean_pos_err_m: Estimate,
     /// Mean attitude error (degrees).
@@ -147,6 +149,7 @@ impl EpochMetrics {
             bias_asee: s.bias_see.map(|sum| sum / s.count as f64),
             rmse: per_state(&|i| Estimate::root_mean_square(size, s.error_sq[i], s.error_4[i])),
             bias: per_state(&|i| mean(s.error[i], s.error_sq[i])),
+            first_error: s.first_error,
             mean_pos_err_m: mean(s.pos_error[0], s.pos_error[1]),
             mean_att_err_deg: mean(s.att_error[0], s.att_error[1]),
             nees: mean(s.nees[0], s.nees[1]),

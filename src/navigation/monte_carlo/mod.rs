@@ -120,6 +120,7 @@ impl EpochSums {
     fn add(&mut self, other: &Self) {
         self.count += other.count;
         self.covered += other.covered;
+        self.first_error = self.first_error.or(other.first_error);
         for i in 0..REPORTED {
             self.see[i] += other.see[i];
             self.see_sq[i] += other.see_sq[i];

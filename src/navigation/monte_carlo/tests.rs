@@ -397,6 +397,7 @@ fn sums_of_batches_are_sums_of_runs() {
         agree(sums.nees[1], &|e| e.nees[0].powi(2), k);
         agree(sums.pos_error[1], &|e| e.pos_error[0].powi(2), k);
         agree(sums.att_error[1], &|e| e.att_error[0].powi(2), k);
+        assert_eq!(sums.first_error, Some(single[0].epochs[k].error));
         assert_eq!(
             sums.covered,
             single.iter().map(|r| r.epochs[k].covered).sum::<u64>()

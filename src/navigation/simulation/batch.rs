@@ -225,7 +225,12 @@ impl<'a> Candidate<'a> {
             !self.trace.iter().all(finite)
         });
         let kept: Vec<usize> = (0..self.live).filter(|lane| !diverged[*lane]).collect();
-        let epochs = self.trace.iter().map(|e| e.sum(&kept)).collect();
+        let has_first = first == 0 && kept.first() == Some(&0);
+        let sum = |e: &EpochLanes| EpochSums {
+            first_error: has_first.then(|| e.error.map(|error| error[0])),
+            ..e.sum(&kept)
+        };
+        let epochs = self.trace.iter().map(sum).collect();
         let mean = |value: &dyn Fn(&EpochLanes) -> f64| mean(self.trace.iter().map(value));
         let record = |lane: usize| RunRecord {
             run: first + lane as u64,

@@ -70,6 +70,8 @@ pub struct EpochSums {
     pub bias_see: [f64; BIASES],
     /// Σ error, estimate − truth (m, m/s, degrees).
     pub error: [f64; REPORTED],
+    /// Error of run 0 alone; none in sums without it, or where it diverged.
+    pub first_error: Option<[f64; REPORTED]>,
     /// Σ error².
     pub error_sq: [f64; REPORTED],
     /// Σ error⁴ (for the standard error of the RMSE).
