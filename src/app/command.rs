@@ -21,7 +21,7 @@ use std::ffi::{OsStr, OsString};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Where a command writes.
+/// Output of a command: none, a file or a directory.
 #[derive(Debug, Clone, Copy)]
 pub enum Out {
     /// To stdout alone.
@@ -51,7 +51,7 @@ pub trait Command: clap::Args + Send + Sync + 'static {
     type Answer: Answer;
     /// Its name on the command line.
     const NAME: &'static str;
-    /// Where it writes.
+    /// Its output.
     const OUT: Out = Out::Nothing;
     /// True if its document can be written as a page or a picture.
     const PLOT: bool = true;
@@ -468,7 +468,7 @@ fn values(arg: &Arg, value: &Value) -> Vec<String> {
 /// An answer as it is printed and written, for callers that have no terminal.
 #[derive(Debug)]
 pub struct Answered {
-    /// As JSON.
+    /// The answer in JSON.
     pub json: String,
     /// Verdict, tables, charts and notes.
     pub document: Document,
@@ -760,7 +760,7 @@ fn ending(path: &Path) -> String {
 
 // `manifest.json`: where a result directory came from, and whether another command makes the same.
 
-/// Where a result directory came from.
+/// Provenance of a result directory: `manifest.json`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Layout version.

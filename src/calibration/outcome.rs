@@ -62,7 +62,8 @@ impl Outcome {
         }
     }
 
-    /// What stands for the noise in navigation: the model, or what is read off the curve where it does not describe that.
+    /// Outcome whose processes a navigation filter should use: the reading of the curve where the
+    /// model does not describe it, else the model itself.
     pub fn for_navigation(&self) -> &Self {
         self.reading.as_deref().unwrap_or(self)
     }
@@ -194,7 +195,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Whether a level is within the range of the fit; ends may be off by rounding.
+    /// Returns true for a level within the range of the fit; the ends may be off by rounding.
     pub(crate) fn counts(&self, level: u32) -> bool {
         let scale_s = tau_s(level, self.rate_hz);
         self.fit_range.is_none_or(|range| {
@@ -252,7 +253,7 @@ pub struct Inference {
     pub stretch: f64,
     /// One interval a parameter that is not fixed, in the order of the model.
     pub intervals: Vec<ParameterInterval>,
-    /// Whether the model describes the curve; of slopes (AVLR), which are not fitted to it, nothing is known.
+    /// Goodness of fit of the model; none for slopes (AVLR), which are not fitted to the curve.
     pub goodness: Option<Goodness>,
     /// Spread of the replicates at each level of the curve. Empty for a curve from elsewhere.
     pub spread: Vec<LevelSpread>,
@@ -288,8 +289,9 @@ impl Practical {
     /// random walk and a floor part by √2, over two by this.
     pub const BESIDE: f64 = 2.0;
 
-    /// Whether the data hold averages so long that the random walk is the larger part of them, and the model has it over an
-    /// octave of these: where they do not, K is what the pair says of times that nobody saw, or that were seen to be otherwise.
+    /// Returns true if K is supported by the data: the random walk dominates within the observed
+    /// averaging times, and the model agrees with it over an octave of these. Otherwise K
+    /// extrapolates.
     pub fn walk_is_observed(&self) -> bool {
         let lasts = |from: f64| self.walk_until_s.is_none_or(|until| until >= 2.0 * from);
         self.walk
@@ -335,7 +337,8 @@ pub struct LevelSpread {
     pub between: f64,
 }
 
-/// How a parameter differs between recordings: its logarithm (of phi and beta that of the correlation time) is normal.
+/// Normal distribution, between recordings, of the logarithm of a parameter (for phi and beta, of
+/// the correlation time).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct ParameterSpread {
     /// The parameter.
@@ -403,7 +406,7 @@ pub struct Goodness {
 const LEVEL: f64 = 0.05;
 
 impl Goodness {
-    /// Whether so large a J has a probability below 5 % when the model holds.
+    /// Returns true if the probability of a J this large under the model is below 5 %.
     pub fn is_rejected(&self) -> bool {
         self.p_value < LEVEL
     }
@@ -441,7 +444,7 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// Whether it was tested and does not describe the curve.
+    /// Returns true if the model was tested and does not describe the curve.
     pub fn is_rejected(&self) -> bool {
         self.j_p_value.is_some_and(|p| p < LEVEL)
     }
@@ -482,9 +485,8 @@ pub struct Miss {
     pub ratio: f64,
     /// The normal score of that ratio, a chi-square over its degrees of freedom where the model holds.
     pub deviations: f64,
-    /// Whether the scale counts in the fit.
     is_fitted: bool,
-    /// Whether the data are known to 10 % there.
+    /// True if the data are known to 10 % at this scale.
     is_known: bool,
 }
 
@@ -496,9 +498,9 @@ const IMPOSSIBLE: f64 = 1e-4;
 pub struct Departure {
     /// Scales that count in the fit.
     pub scales: usize,
-    /// Those that are missed by more than four standard deviations.
+    /// Scales at which the model is off by more than four standard deviations.
     pub missed: Vec<Miss>,
-    /// Of the scales that are known to 10 % (of all, if none is), the one with the ratio furthest from 1.
+    /// Scale with the ratio furthest from 1, among those known to 10 % (among all, if none is).
     pub furthest: Option<Miss>,
     /// The longest of these scales, where there are longer ones.
     pub known_to: Option<u32>,
@@ -568,7 +570,7 @@ impl Outcome {
         Departure::of(&all, self.goodness())
     }
 
-    /// Whether the model describes the curve, where that was asked for.
+    /// Goodness of fit of the model, if it was tested.
     pub fn goodness(&self) -> Option<Goodness> {
         self.inference.as_ref().and_then(|i| i.goodness)
     }

@@ -18,11 +18,11 @@ pub fn calibrate(groups: &[Group], settings: &Settings) -> Result<Vec<Outcome>, 
     calibrate_telling(groups, settings, &|_| {})
 }
 
-/// As [`calibrate`], and tells `advance` the number of steps done since, of [`ModelChoice::steps`] for each
-/// fit.
+/// Calibrates like [`calibrate`] and reports progress: `advance` receives the number of steps done
+/// since its last call, of [`ModelChoice::steps`] per fit.
 ///
 /// # Errors
-/// As [`calibrate`].
+/// The same as [`calibrate`].
 pub fn calibrate_telling(
     groups: &[Group],
     settings: &Settings,
@@ -133,7 +133,8 @@ pub fn infer(
     infer_telling(groups, outcomes, settings, bootstrap, &|_| {});
 }
 
-/// As [`infer`], and tells `advance` the number of draws done since.
+/// Runs [`infer`] and reports progress: `advance` receives the number of draws done since its last
+/// call.
 pub fn infer_telling(
     groups: &[Group],
     outcomes: &mut [Outcome],

@@ -225,7 +225,7 @@ impl Field<'_> {
         passing.or(simplest).unwrap_or(best)
     }
 
-    /// Whether the J-test does not reject a candidate.
+    /// Returns true if the J-test does not reject candidate `i`.
     fn passes(&self, i: usize, trials: &mut Trials) -> bool {
         let p = found(&trials.whole, i).unwrap_or_else(|| {
             let p = self.j_p_value(i);

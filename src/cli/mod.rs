@@ -347,7 +347,7 @@ enum Kind {
     Study,
     /// A noise model (what `nav-sim calibrate` writes)
     Model,
-    /// Where and how a drive begins (`nav-sim fuse --initial`)
+    /// Initial state of a drive (`nav-sim fuse --initial`)
     Initial,
     /// A trajectory by what the vehicle does (`nav-sim run`)
     Profile,

@@ -54,7 +54,7 @@ pub struct Compare {
     table: Option<TableForm>,
 }
 
-/// How a table is written.
+/// Layout of the printed table.
 #[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TableForm {
     /// A table of Markdown
@@ -273,7 +273,8 @@ pub(crate) fn between<'a>(
     Ok(found)
 }
 
-/// What makes two runs differ beside the model in the filter; then run k did not see the same noise.
+/// Differences between two runs other than the filter's model: with any, run k did not have the
+/// same noise.
 fn differences(candidate: &RunDirectory, reference: &RunDirectory) -> Vec<&'static str> {
     let (c, r) = (
         &candidate.origin.configuration,
@@ -301,7 +302,7 @@ fn differences(candidate: &RunDirectory, reference: &RunDirectory) -> Vec<&'stat
         .collect()
 }
 
-/// What made the INS errors: a recording, a model, or the filter's own.
+/// Hashes of the source of the INS errors: a recording, a model, or the filter's own model.
 fn truth(manifest: &Manifest) -> Vec<&str> {
     ["static", "truth", "model"]
         .map(|role| manifest.hashes(role))
@@ -337,7 +338,8 @@ pub struct Comparison {
     schema_version: u32,
     /// Run directory of the reference.
     pub(crate) reference: String,
-    /// Whether run k saw the same noise everywhere, so that intervals are those of paired differences.
+    /// True if run k had the same noise in all directories: intervals are then those of paired
+    /// differences.
     paired: bool,
     /// One row a run, the reference first.
     verdicts: Vec<Value>,
@@ -534,7 +536,7 @@ const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's
 /// Estimators by the names their run directories end in.
 const ESTIMATORS: [&str; 6] = ["sr-awv", "dr-awv", "awv", "rgmwm", "gmwm", "avlr"];
 
-/// Where a run stands in Table I: its row (scenario) and column (estimator, may be empty).
+/// Position of a run in Table I: its row (scenario) and column (estimator, may be empty).
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 struct Label {
     /// Row.

@@ -26,7 +26,7 @@ pub struct Inspect {
     /// Log
     #[arg(id = "log", value_name = "FILE")]
     file: PathBuf,
-    /// How it is read.
+    /// Options for reading it.
     #[command(flatten)]
     log: LogRequest,
 }

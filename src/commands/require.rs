@@ -62,7 +62,8 @@ pub struct Require {
     /// Receiver, start, IMU rate, aiding.
     #[command(flatten)]
     settings: ScenarioArgs,
-    /// What the vehicle knows of its own motion: a car moves neither sideways nor up; with MODEL, a table with and without
+    /// Motion constraints of the vehicle: a car moves neither sideways nor up; with MODEL, a table
+    /// with and without
     #[arg(long, value_name = "KIND", value_parser = ["car"])]
     vehicle: Option<String>,
     /// Rank the catalogued IMUs (`nav-sim datasheet --list`), or those of a directory of entries and model files
@@ -151,7 +152,7 @@ impl Command for Require {
 const NONE: &str = "no unit keeps the limits by figures that are all stated";
 
 impl Require {
-    /// What is asked, with the files read.
+    /// Reads the files and assembles the requirements.
     fn requirements(&self, context: &Context<'_>) -> Result<Requirements> {
         if self.limits.is_empty() {
             return refused(
@@ -181,7 +182,7 @@ impl Require {
 }
 
 impl Requirements {
-    /// What a given IMU makes of the limits.
+    /// Judges a given IMU against the limits.
     fn given(&self, path: &Path, has_vehicle: bool, context: &Context<'_>) -> Result<PlainAnswer> {
         let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
         let file = inputs::model(path, context)?;
@@ -335,7 +336,7 @@ impl Requirements {
 const CURVE_S: [u32; 7] = [1, 3, 10, 30, 60, 120, 300];
 /// Longest outage that is looked at (s).
 const LONGEST_S: f64 = 600.0;
-/// What confirms a figure of covariance analysis.
+/// Advice for confirming a figure of the covariance analysis.
 const CONFIRM: &str = "confirm with nav-sim run --method both";
 /// Warns of errors that are beyond linear theory.
 fn note_beyond(place: &str, document: &mut Document) {
@@ -422,7 +423,7 @@ pub enum Ask {
 }
 
 impl Ask {
-    /// How long it lasts at least (s).
+    /// Shortest length (s).
     fn length_s(self) -> f64 {
         match self {
             Self::Length(length_s) => length_s,
@@ -443,14 +444,14 @@ const TOGETHER_S: f64 = 60_000.0;
 /// Beginnings at least.
 const BEGINNINGS: f64 = 16.0;
 
-/// What is asked of an IMU, and where.
+/// Requirements on an IMU: limits, outage, trajectory.
 #[derive(Debug)]
 struct Requirements {
     /// Receiver, start and rate.
     scenario: Scenario,
     /// The reference.
     trajectory: Trajectory,
-    /// What the errors at the outage's end may be.
+    /// Limits of the errors at the outage's end.
     limits: Vec<Limit>,
     ask: Ask,
     first_s: f64,
@@ -613,7 +614,7 @@ impl Requirements {
         Ok((curves, longest, worst))
     }
 
-    /// What a model makes of the limits. `scenario` is that of the unit, with its turn-on biases.
+    /// Judges a model against the limits. `scenario` is that of the unit, with its turn-on biases.
     ///
     /// # Errors
     /// When the model has no filter.
@@ -680,8 +681,7 @@ impl Requirements {
         Ok(aided?.into())
     }
 
-    /// Whether `run` would say that the errors in an outage are beyond linear theory: by the covariance analysis that it
-    /// makes.
+    /// Outage whose errors are beyond linear theory by the criterion of `run`, if any.
     fn beyond_linear(
         &self,
         scenario: &Scenario,
@@ -930,7 +930,7 @@ impl Longest {
 /// Curves of errors, the longest outage within the limits, and the hardest limit.
 type Bridged = (Vec<Vec<Drift>>, Longest, Option<Worst>);
 
-/// What a model makes of its limits.
+/// Result of a model against the limits.
 #[derive(Debug, Serialize)]
 struct Judgement {
     outage: Longest,
@@ -945,7 +945,7 @@ struct Judgement {
 
 // Units of a catalogue against a limit.
 
-/// What a ranking takes for granted.
+/// Assumptions of a ranking.
 const RULE: &str = "A figure that is missing counts as none: open means that the limit would be kept then. Turn-on bias is the repeatability from one switching-on to the next, or that of the grade; an initial tolerance of the zero offset counts as removed before use. Figures named without a sensor are missing for both.";
 
 /// `bias, accel turn-on`: figures that both sensors lack are named once.

@@ -124,8 +124,8 @@ impl Tune {
         }
     }
 
-    /// What may be true, at the rate of the IMU: noise, turn-on bias, and what the scenario states of the true IMU and
-    /// receiver.
+    /// Candidate truths at the rate of the IMU: noise, turn-on bias, and the scenario's errors of
+    /// the true IMU and receiver.
     fn true_errors(&self, scenario: &Scenario, context: &Context<'_>) -> Result<Vec<TrueErrors>> {
         let truth = |path: &PathBuf| {
             let file = inputs::model(path, context)?;
@@ -394,7 +394,7 @@ impl Tuning {
         lines
     }
 
-    /// What covers the errors of the vehicle's own measurements.
+    /// Factor that covers the errors of the vehicle's own measurements.
     fn of_aiding(&self) -> Option<String> {
         let factor = self.aiding_sigmas.filter(|factor| *factor != 1.0)?;
         Some(if factor.is_nan() {
@@ -435,7 +435,7 @@ impl Tuning {
         (is_overconfident || is_at_limit).then(unmet)
     }
 
-    /// What helps there.
+    /// Advice where the factors are of no use.
     fn remedy(&self) -> &'static str {
         match self.aim {
             _ if !self.without_factor.is_empty() => {

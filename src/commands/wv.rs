@@ -30,14 +30,14 @@ pub struct Wv {
     /// Recordings, or directories of recordings
     #[arg(id = "recording", required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// How they are read.
+    /// Options for reading them.
     #[command(flatten)]
     pub recordings: RecordingRequest,
     /// Scales and robustness.
     #[command(flatten)]
     tuning: VarianceRequest,
-    /// Where the degrees of freedom of the intervals come from: eta3, the field's usual ones, conservative beyond the
-    /// first scale; large-sample, the autocovariance of the coefficients: with the stated coverage
+    /// Degrees of freedom of the intervals: eta3, the customary ones, conservative beyond the first
+    /// scale; large-sample, from the autocovariance of the coefficients, with the stated coverage
     #[arg(long, value_parser = parse::one_of::<Intervals>(&Intervals::NAMES), default_value_t, help_heading = "Wavelet variance")]
     intervals: Intervals,
 }
@@ -113,7 +113,7 @@ impl Wv {
     }
 }
 
-/// Where the degrees of freedom of intervals are from.
+/// Source of the degrees of freedom of intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Intervals {
     /// The field's usual ones, conservative beyond the first scale.

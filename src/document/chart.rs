@@ -1,13 +1,13 @@
-//! What a chart shows, before it is drawn.
+//! Contents of a chart, before it is drawn.
 
 /// An axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// Quantity and unit, such as `time (s)`.
     pub label: String,
-    /// Whether it runs by powers of ten; what is not positive is not shown then.
+    /// True for a logarithmic axis, which leaves out values that are not positive.
     pub is_log: bool,
-    /// What it shows at least.
+    /// Range that it always shows.
     pub include: Option<(f64, f64)>,
 }
 
@@ -41,7 +41,7 @@ impl Axis {
 /// A colour of the palette, which the blind to red or green can tell apart too (Okabe and Ito).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Colour {
-    /// That of the text: measurements.
+    /// Colour of text: measurements.
     Ink,
     /// Grey: what stands in the background.
     Soft,
@@ -52,11 +52,11 @@ pub enum Colour {
 impl Colour {
     /// Hues of the palette.
     pub const HUES: usize = 8;
-    /// What a filter or a model believes.
+    /// Standard deviation stated by a filter or a model.
     pub const BELIEVED: Self = Self::Hue(0);
-    /// What is true.
+    /// True or measured error.
     pub const REAL: Self = Self::Hue(1);
-    /// Where a right filter or model stays.
+    /// Region in which a consistent filter or model stays.
     pub const RIGHT: Self = Self::Hue(2);
 
     /// Class of the style sheet.
@@ -69,10 +69,10 @@ impl Colour {
     }
 }
 
-/// How a line is drawn.
+/// Style of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stroke {
-    /// As most are.
+    /// Solid line of normal width.
     Plain,
     /// One of many.
     Thin,
@@ -107,7 +107,7 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// What is drawn of a series.
+/// Mark of a series: line, points, band.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Mark {
     /// A line through points (x, y); a value that cannot be shown breaks it.
@@ -131,7 +131,7 @@ pub struct Series {
     pub name: String,
     /// Colour.
     pub colour: Colour,
-    /// What is drawn.
+    /// Its mark.
     pub mark: Mark,
 }
 
@@ -180,7 +180,7 @@ impl Series {
 pub struct Panel {
     /// Its own axis.
     pub y: Axis,
-    /// What is in it, the first at the bottom.
+    /// Series of the panel, the first at the bottom.
     pub series: Vec<Series>,
     /// Its height as a share of the usual one.
     pub height: f64,
@@ -202,7 +202,7 @@ impl Panel {
     }
 }
 
-/// How much room a chart takes.
+/// Size of a chart on the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Size {
     /// The whole width: drawn twice, for a screen and for a phone.
@@ -214,7 +214,7 @@ pub enum Size {
 /// Panels above one another with one x axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
-    /// What it shows, in words.
+    /// Title in words.
     pub title: String,
     /// The axis of all panels.
     pub x: Axis,
@@ -222,11 +222,11 @@ pub struct Chart {
     pub panels: Vec<Panel>,
     /// Vertical stripes (from, to), such as outages, and what they are.
     pub stripes: (String, Vec<(f64, f64)>),
-    /// Whether x and y have one scale, as on a map.
+    /// True if x and y share one scale, as on a map.
     pub is_map: bool,
     /// Charts of one group are zoomed together, and show their values at the same x.
     pub group: String,
-    /// How much room it takes.
+    /// Size on the page.
     pub size: Size,
 }
 

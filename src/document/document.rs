@@ -59,7 +59,7 @@ pub enum Block {
     Charts(Vec<Chart>, String),
     /// Files beside the document: relative path and what is there.
     Links(Vec<(String, String)>),
-    /// What few want to see, under a title.
+    /// Details folded away under a title.
     Folded(String, Vec<Block>),
 }
 
@@ -72,7 +72,7 @@ pub struct Document {
     pub tone: Tone,
     /// The answer: one sentence each, of at most 120 characters, the most important first.
     pub verdict: Vec<String>,
-    /// What follows the verdict.
+    /// Blocks after the verdict.
     pub blocks: Vec<Block>,
     notes: Vec<Note>,
 }

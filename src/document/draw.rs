@@ -189,11 +189,11 @@ fn values(mark: &Mark) -> (Vec<f64>, Vec<f64>) {
     }
 }
 
-/// How far beyond the main curves a logarithmic axis follows others.
+/// Largest factor by which a logarithmic axis extends beyond the main curves for others.
 const BEYOND: f64 = 30.0;
 
-/// What a panel shows: what is far beyond the main curves is cut, so that it does not flatten them. Bands and
-/// auxiliary lines may leave the panel.
+/// Range of the vertical axis. Values far beyond the main curves are cut, so that they do not
+/// flatten them; bands and auxiliary lines may leave the panel.
 fn y_range(panel: &Panel) -> Option<(f64, f64)> {
     let is_log = panel.y.is_log;
     let main = panel.series.iter().flat_map(|s| match &s.mark {
@@ -244,12 +244,12 @@ impl Ruler {
     }
 }
 
-/// Whether a value can be shown on an axis, which may be logarithmic.
+/// Returns true if an axis, which may be logarithmic, can show the value.
 fn is_shown(value: f64, is_log: bool) -> bool {
     value.is_finite() && (!is_log || value > 0.0)
 }
 
-/// What an axis shows: the values with some air, none without a value.
+/// Range of an axis: the values with a margin; none without a value.
 fn range(axis: &Axis, values: impl Iterator<Item = f64>, air: f64) -> Option<(f64, f64)> {
     let extra = axis.include.into_iter().flat_map(|(low, high)| [low, high]);
     let shown = values.chain(extra).filter(|v| is_shown(*v, axis.is_log));
@@ -514,7 +514,8 @@ pub fn one_line(text: &str) -> String {
     text.chars().map(shown).collect()
 }
 
-/// Whether a character turns the direction of what follows, and so shows a name as another (Unicode TR 36, sec. 2.1).
+/// Returns true for a character that turns the direction of the text after it, and so disguises a
+/// name (Unicode TR 36, sec. 2.1).
 const fn turns(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// What this process is writing. Whoever gives an output its name holds the list meanwhile, so that an
+/// Temporary files of this process. The list is locked while an output gets its name, so that an
 /// interrupt finds the output whole or without its name.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 /// Claims of this process.
@@ -560,7 +560,7 @@ fn is_part(path: &Path) -> bool {
         && (name == "report.html" || manifest.contains(&format!("\"{name}\": \"")))
 }
 
-/// What stands in a directory of results, told by its last file, which appears when the others are whole.
+/// State of a directory of results, told by its last file, which appears when the others are whole.
 pub(crate) enum Found {
     /// Nothing that may be replaced.
     Foreign,

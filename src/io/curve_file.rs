@@ -25,7 +25,7 @@ pub(crate) struct NamedCurve {
     pub curve: Curve,
 }
 
-/// What a curve file is.
+/// Layouts of a curve file, in words.
 const LAYOUT: &str = "a curve is a CSV with the columns tau_samples,wv,edof (tau_samples = 2, 4, 8, …), or a .wv.json \
                       written by calibrate or wv";
 
@@ -78,7 +78,7 @@ fn csv(path: &str, text: &str) -> Result<NamedCurve, Failure> {
     })
 }
 
-/// What tells the file of `wv` from that of `calibrate`.
+/// Key that distinguishes a file of `wv` from one of `calibrate`.
 #[derive(serde::Deserialize)]
 struct Signals {
     signals: Option<serde::de::IgnoredAny>,

@@ -1,4 +1,4 @@
-//! Where inputs are opened: what can be read once only is kept, what has no end is refused.
+//! Opens inputs: keeps those that can be read only once, refuses those without end.
 
 use super::Failure;
 use flate2::read::MultiGzDecoder;
@@ -51,8 +51,8 @@ pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
 
 /// Bytes that are read at once.
 const BUFFER: usize = 1 << 17;
-/// How many times its packed size a table may be, beyond [`LARGEST_PIPE`]: tables of measurements pack to a third to a
-/// twentieth, and gzip makes up to 1032 times as much of nothing.
+/// Largest ratio of the unpacked size of a table to its packed size, beyond [`LARGEST_PIPE`]:
+/// measurements pack to a third to a twentieth, and gzip expands zeros up to 1032 times.
 const MOST_PACKED: u64 = 40;
 
 /// Opens a table of text, unpacking it when its name ends in `.gz`.

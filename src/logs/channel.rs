@@ -22,7 +22,7 @@ pub struct Channel {
     pub clock: Clock,
     /// The number by which the format knows it.
     pub(crate) id: u32,
-    /// Of channels of the same content, the lowest is read when none is named.
+    /// Priority among channels of the same content: the lowest is read by default.
     pub(crate) rank: u8,
     /// Encoding of the messages, of which a container may have several.
     pub(crate) encoding: String,
@@ -166,7 +166,7 @@ pub struct Fix {
     pub sd_v_ned_m_s: Option<[f64; 3]>,
 }
 
-/// What a message holds. Samples are many, fixes are few.
+/// Contents of a message. Samples are many, fixes are few.
 pub(crate) enum Sample {
     Imu(ImuSample),
     Fix(Box<Fix>),

@@ -22,7 +22,7 @@ pub struct Band {
     pub ci_low: Vec<f64>,
     /// Upper ends.
     pub ci_high: Vec<f64>,
-    /// How each robust variance came about.
+    /// Status of each robust variance.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub status: Vec<String>,
 }
@@ -105,7 +105,7 @@ impl SignalCurves {
     }
 }
 
-/// What `wv` prints.
+/// JSON answer of `wv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SignalsFile {
     /// Layout version.
@@ -114,7 +114,7 @@ pub struct SignalsFile {
     pub rate_hz: f64,
     /// Efficiency of the robust variance; its degrees of freedom are edof times this.
     pub efficiency: f64,
-    /// Where the degrees of freedom are from: `eta3` or `large-sample`.
+    /// Source of the degrees of freedom: `eta3` or `large-sample`.
     pub edof_method: String,
     /// Confidence of the intervals.
     pub confidence: f64,

@@ -15,7 +15,7 @@ const MORE: f64 = 5.0;
 const LESS: f64 = 0.2;
 const MOST_ITERATIONS: u64 = 300;
 
-/// How far a descent goes.
+/// Bounds, damping and stopping rule of a descent.
 #[derive(Debug, Clone, Copy)]
 pub struct Descent<'a> {
     /// Smallest and largest value of each variable.
@@ -31,9 +31,9 @@ pub struct Descent<'a> {
 pub struct Minimum<V> {
     /// The variables.
     pub at: Vec<f64>,
-    /// What was evaluated there.
+    /// Value of the objective there.
     pub value: V,
-    /// Whether a step no longer changes anything.
+    /// True if the last step changed nothing to the stopping tolerance.
     pub has_converged: bool,
 }
 
@@ -188,7 +188,7 @@ pub fn line_minimum(low: f64, high: f64, tolerance: f64, f: impl Fn(f64) -> f64)
     best.copied().unwrap_or(0.5 * (low + high))
 }
 
-/// Where a condition on a positive number ends to hold, to a relative tolerance.
+/// Largest positive number at which `holds` is still true, to a relative tolerance.
 pub fn bisection(mut low: f64, mut high: f64, tolerance: f64, holds: impl Fn(f64) -> bool) -> f64 {
     while high - low > tolerance * high {
         let middle = 0.5 * (low + high);

@@ -45,12 +45,12 @@ nav_sim_signal::named!(
 );
 
 impl Estimator {
-    /// Whether it uses the robust wavelet variance.
+    /// Returns true for an estimator that uses the robust wavelet variance.
     pub const fn is_robust(self) -> bool {
         matches!(self, Self::SrAwv | Self::DrAwv | Self::Rgmwm)
     }
 
-    /// Whether it takes one replicate at a time.
+    /// Returns true for an estimator that takes one replicate at a time.
     pub const fn is_single(self) -> bool {
         matches!(self, Self::Gmwm | Self::Rgmwm | Self::Avlr | Self::Given)
     }
@@ -141,7 +141,8 @@ impl Replicate {
         }
     }
 
-    /// Whether that is the robust one: on coarse steps a robust estimator too takes the classical one.
+    /// Returns true if the variance used at a level is the robust one. On coarse quantization steps
+    /// a robust estimator falls back to the classical variance.
     pub(crate) fn is_robust(&self, estimator: Estimator, index: usize) -> bool {
         estimator.is_robust() && self.robust[index].status != Status::Coarse
     }
@@ -179,7 +180,7 @@ impl Replicate {
     }
 }
 
-/// What a calibration fails by, where advice depends on it.
+/// Reason for which a calibration fails, where the advice depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cause {
     /// A signal too short for its scales.
@@ -509,9 +510,9 @@ impl Group {
 /// Rule by which signals are replicates of one another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pool {
-    /// Those of one axis: a model an axis.
+    /// Signals of one axis: one model per axis.
     Axes,
-    /// Those of all axes of a sensor: one model a sensor.
+    /// Signals of all axes of a sensor: one model per sensor.
     Sensor,
 }
 

@@ -30,8 +30,8 @@ pub(crate) struct SamplingLaw {
     pub(crate) quantization: Vec<f64>,
     /// Squares of the autocorrelations of the coefficients of the last levels ([`squared_autocorrelations`]); none of others.
     autocorrelations: Vec<Vec<f64>>,
-    /// Of what a robust variance scatters more than the classical one, the part that is left in correlated coefficients, of each
-    /// level ([`fourth_powers`]).
+    /// Excess scatter of the robust variance over the classical one, at each level: the part that
+    /// remains in correlated coefficients ([`fourth_powers`]).
     fourth: Vec<f64>,
     /// Shape of the law of each level: a chi-square's but at the last levels.
     pub(crate) shapes: Vec<Shape>,
@@ -208,7 +208,8 @@ fn shape(model: &Composite, level: usize, levels: usize) -> Shape {
     Shape::new(&(0..8 * TO_A_LOBE).map(weight).collect::<Vec<f64>>())
 }
 
-/// Whether a record may hold a level's scale few times. Below level 4 a sixteenth of the scale is less than a sample.
+/// Returns true at a level whose scale fits only a few times into the record. Below level 4 a
+/// sixteenth of the scale is less than a sample.
 const fn is_last(level: usize, levels: usize) -> bool {
     level + LAST > levels && level >= 4
 }

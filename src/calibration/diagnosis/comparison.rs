@@ -151,7 +151,8 @@ pub(super) struct Piece<'a> {
 }
 
 impl Piece<'_> {
-    /// Whether drift makes so much of the wavelet variance at a level (index) that its scatter is not known.
+    /// Returns true if drift dominates the wavelet variance at a level (index), so that its scatter
+    /// is not known.
     pub(super) fn drifts(&self, level: usize) -> bool {
         drift_share(self.model, level as u32 + 1) > MOST_DRIFT
     }

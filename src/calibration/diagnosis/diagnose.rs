@@ -141,7 +141,6 @@ struct Excess {
     gaussian: f64,
     /// Standard deviation of either.
     sigma: f64,
-    /// Whether half of the signals or more have coarse steps there.
     is_stepped: bool,
 }
 
@@ -321,7 +320,8 @@ pub struct Alarm {
     /// First and last of the neighbouring scales (s) at which it is most unusual.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tau_s: Vec<f64>,
-    /// Of a drift: mean of the later half less that of the earlier one, of each axis (units).
+    /// Drift of each axis: mean of the later half minus that of the earlier one (units of the
+    /// sensor).
     #[serde(serialize_with = "by_axis", skip_serializing_if = "Vec::is_empty")]
     pub change: Vec<(Axis, f64)>,
     /// Deviations from the others there, axis by axis, in standard deviations.

@@ -108,7 +108,7 @@ fn term(kind: Kind, points: &[(f64, f64)]) -> Result<Process, CalibrationError> 
     Process::new(kind, 0.0, value, 1.0).map_err(outside)
 }
 
-/// Whether the first scales have a slope.
+/// Returns true if the first two points have this slope (in log-log).
 fn begins(points: &[(f64, f64)], slope: f64) -> bool {
     let ((x0, y0), (x1, y1)) = (points[0], points[1]);
     ((y1 - y0) / (x1 - x0) - slope).abs() <= NEAR

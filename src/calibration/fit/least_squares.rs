@@ -174,7 +174,7 @@ fn settled(
         .expect("two fits"))
 }
 
-/// Whether the weights of a fit are those of its own result.
+/// Returns true if the weights of a fit reproduce themselves: they follow from its own result.
 fn is_settled(curve: &Curve, fit: &Fit) -> bool {
     let nu = expected(curve, fit);
     nu.iter()

@@ -111,7 +111,8 @@ pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) 
 struct Grid<'a> {
     objective: &'a Objective,
     points: Vec<Vec<f64>>,
-    /// Whether a dimension is alike the one before it, so that only ascending pairs are needed.
+    /// True for a dimension of the same kind as the one before it: only ascending pairs are
+    /// searched.
     repeats: Vec<bool>,
     /// Shapes of the components without a coordinate, then those of the points of each dimension.
     shapes: Vec<Shape>,
@@ -278,8 +279,9 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// As many points as leave the number of combinations of alike dimensions at `most`, at least one more than there are
-/// dimensions. Unlike dimensions (an AR1 and an MA1) have up to k! times as many combinations.
+/// Largest number of points per dimension that keeps the combinations of dimensions of one kind at
+/// `most`, and at least one more than there are dimensions. Dimensions of two kinds (an AR1 and an
+/// MA1) have up to k! times as many combinations.
 fn points_per_dimension(dimensions: usize, most: usize) -> usize {
     // n·(n − 1)···/k! of k alike dimensions, of which ascending choices are all there are.
     let combinations = |n: usize| (0..dimensions).fold(1, |c, k| c * (n - k) / (k + 1));
@@ -359,7 +361,7 @@ struct LinearBest {
     gram: Matrix,
     /// Amplitudes, in units of their columns' lengths.
     x: Vector,
-    /// Those on no bound.
+    /// Variables that are not at a bound.
     is_free: [bool; MOST],
     residuals: Vec<f64>,
 }
@@ -474,7 +476,7 @@ impl Objective {
         }
     }
 
-    /// Whether the model is linear in its amplitudes.
+    /// Returns true if the model is linear in its amplitudes.
     const fn is_linear(&self) -> bool {
         self.quantization.is_none()
     }

@@ -101,7 +101,8 @@ pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<Pa
 /// makes wider where there are few replicates, the square.
 pub const WIDEST: f64 = 100.0;
 
-/// Whether an interval of a correlation time ends where nothing was sought: by the draws it may be any.
+/// Returns true if the interval of a correlation time reaches the end of the searched range: the
+/// time is then unbounded on that side.
 fn leaves_search(searched: Range, process: &Process, interval: &ParameterInterval) -> bool {
     let kappa = |end: f64| match interval.of.parameter {
         Parameter::Phi => Some(-end.ln()),

@@ -357,8 +357,8 @@ struct Scatter {
     between: f64,
     /// Residuals in standard deviations, noise and differences together; Σ of their squares is K − 1.
     units: Vec<f64>,
-    /// Those standard deviations over what noise and differences make: 1, or less where the replicates scatter less
-    /// than their noise does.
+    /// Observed standard deviation over the one predicted from noise and differences: 1, or less
+    /// where the replicates scatter less than their noise.
     factor: f64,
 }
 
@@ -556,8 +556,8 @@ struct Scale {
 }
 
 impl Scale {
-    /// Those that are long enough for the level of index `j`; none where no axis is there twice: each axis alone in its
-    /// recording is compared with nothing.
+    /// Selects the replicates long enough for the level of index `j`; none where each axis occurs
+    /// only once, so that there is nothing to compare.
     fn new(j: usize, replicates: &[Replicate], spread: &Spread, shape: &Shape) -> Option<Self> {
         let is_long_enough = |i: &usize| replicates[*i].levels() > j && spread.edof[*i][j] >= LEAST;
         let members: Vec<(usize, Option<Axis>)> = (0..replicates.len())

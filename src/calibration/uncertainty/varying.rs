@@ -1,14 +1,17 @@
-//! What the parameters of recordings differ by: the law of each from recording to recording.
+//! Between-recording distribution of each model parameter.
 //!
-//! The model is fitted to every replicate alone. Its parameters, on the scale of [`Parameter::scaled`], are y_i = mean of the
-//! axis + between_i + noise_i. The variance of the noise is that of fits to curves drawn by the large-sample law for the
-//! replicate's length; the variance between is what brings Q = Σ (y_i − mean)²/(between² + noise_i) to its degrees of freedom
-//! ([Paule and Mandel](crate::bibliography::PauleMandel82)). Its interval holds the values at which Q lies between the quantiles
-//! of its chi-square law ([Viechtbauer](crate::bibliography::Viechtbauer07)): exact for normal y. A parameter whose interval
-//! reaches 0 has no law.
+//! The model is fitted to every replicate alone. Its parameters, on the scale of
+//! [`Parameter::scaled`], are y_i = mean of the axis + between_i + noise_i. The noise variance is
+//! that of fits to curves drawn from the large-sample distribution for the replicate's length; the
+//! variance between recordings brings Q = Σ (y_i − mean)²/(between² + noise_i) to its degrees of
+//! freedom ([Paule and Mandel](crate::bibliography::PauleMandel82)). Its interval holds the values
+//! at which Q lies between the quantiles of its chi-square distribution
+//! ([Viechtbauer](crate::bibliography::Viechtbauer07)): exact for normal y. A parameter whose
+//! interval reaches 0 has no distribution.
 //!
-//! Axes of one recording may share what recordings differ by. Q then has fewer degrees of freedom than it has residuals: with A axes
-//! of correlation r their number over 1 + (A − 1) r², by the variance of a sum of A correlated chi-squares.
+//! The axes of one recording may share its differences from other recordings. Q then has fewer
+//! degrees of freedom than residuals: with A axes of correlation r, their number over 1 + (A − 1)
+//! r², by the variance of a sum of A correlated chi-squares.
 
 use super::bootstrap::CurveSampler;
 use super::intervals::{TAIL, matched, quantile};

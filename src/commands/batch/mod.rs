@@ -73,7 +73,7 @@ pub struct BatchRequest {
     pub force: bool,
 }
 
-/// What became of a study.
+/// Result of a `batch` command.
 #[derive(Debug)]
 pub enum Outcome {
     /// Merged: what is there is compared.
@@ -249,7 +249,7 @@ fn adopt(
     cells.iter().filter_map(changed).collect()
 }
 
-/// What a cell is that was asked for otherwise: the first setting or input that differs.
+/// Describes the first setting or input by which a computed cell differs from the requested one.
 fn difference(there: &Manifest, wanted: &Manifest) -> String {
     let keys = there.options.keys().chain(wanted.options.keys());
     let shown =
@@ -318,7 +318,7 @@ fn estimate(
 }
 
 impl Outcome {
-    /// What is missed: stated bounds, or cells that are to be computed.
+    /// Failure to report: missed bounds, or cells that are still to be computed.
     pub fn unmet(&self) -> Option<Failure> {
         match self {
             Self::Merged(answer) => answer.incomplete().or_else(|| answer.unmet()),
@@ -516,7 +516,8 @@ impl Study {
     }
 }
 
-/// What a single run takes: the parser of its options, and the reader of its scenario.
+/// Validator of values against a single run: the parser of its options and the reader of its
+/// scenario.
 struct Door {
     command: clap::Command,
     beside: PathBuf,
@@ -564,7 +565,7 @@ impl Door {
         Ok(())
     }
 
-    /// Whether a single run takes this value of a key.
+    /// Returns true if a single run accepts this value of a key.
     fn takes(&mut self, path: &str, value: &Value) -> bool {
         let memory = format!("{path}={value}");
         if let Some(known) = self.taken.get(&memory) {
@@ -874,7 +875,7 @@ impl Place<'_> {
         self.is_done(cell) || (!unit.whole && read_part(&self.part(cell, unit.first)).is_some())
     }
 
-    /// Whether nothing of a unit is missing.
+    /// Returns true if every cell of a unit is computed.
     fn has_unit(&self, unit: &Unit<'_>) -> bool {
         unit.cells.iter().all(|cell| self.has(unit, cell))
     }

@@ -933,7 +933,7 @@ pub(crate) fn figure_of(process: &Process, label: &str, sensor: Sensor) -> Optio
 pub(crate) struct CalibrationNote {
     /// Seed of the bootstrap, if there was one.
     pub seed: Option<u64>,
-    /// How the recordings were read and grouped, key by key: what was left out at their beginning, gaps, axes, scales, pool.
+    /// Reading and grouping of the recordings, by key: skipped start, gaps, axes, scales, pool.
     pub reading: toml::Table,
     /// The recordings or the curve, and the parameters file.
     pub inputs: Vec<Input>,

@@ -41,7 +41,7 @@ impl FromStr for EstimatorChoice {
 }
 
 impl EstimatorChoice {
-    /// Whether it takes one recording at a time, however many there are.
+    /// Returns true for an estimator that takes one recording at a time.
     pub fn is_single(self) -> bool {
         matches!(self, Self::One(estimator) if estimator.is_single())
     }
@@ -90,7 +90,7 @@ pub struct Calibration {
     pub groups: Vec<Group>,
     /// The fitted models: for each group, one per estimator.
     pub outcomes: Vec<Outcome>,
-    /// How they were fitted.
+    /// Settings of the fit.
     pub settings: Settings,
     /// The recordings that do not begin as they go on.
     pub beginnings: Vec<Beginning>,
@@ -98,7 +98,7 @@ pub struct Calibration {
     pub turn_on: Vec<TurnOnSpread>,
     /// Each recording against the others.
     pub diagnoses: Vec<Diagnosis>,
-    /// What the model files record beside the fits.
+    /// Provenance that the model files record beside the fits.
     pub(crate) note: CalibrationNote,
 }
 

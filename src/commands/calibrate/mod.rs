@@ -99,7 +99,7 @@ pub struct Calibrate {
     /// Draws behind intervals and goodness of fit (0: neither), fewer for tests
     #[arg(long, value_name = "B", hide = true, default_value_t = Bootstrap::DRAWS as u32, value_parser = clap::value_parser!(u32).range(0..=100_000))]
     bootstrap: u32,
-    /// How they are read.
+    /// Options for reading them.
     #[command(flatten)]
     pub recordings: RecordingRequest,
     /// Scales and robustness.
@@ -110,7 +110,7 @@ pub struct Calibrate {
 /// Flags about recordings and their averages, which a curve has behind it.
 const OF_RECORDINGS: [&str; 6] = ["estimator", "trim", "pool", "skip_s", "gaps", "efficiency"];
 
-/// Those of several recordings first, then those of one.
+/// Names of the estimators, those of several recordings first.
 pub(crate) const ESTIMATORS: [&str; 7] =
     ["awv", "sr-awv", "dr-awv", "gmwm", "rgmwm", "avlr", "all"];
 
@@ -249,7 +249,7 @@ impl Answer for Calibration {
 }
 
 impl Calibrate {
-    /// How models are fitted, checked before any file is read.
+    /// Settings of the fit, validated before any file is read.
     fn settings(&self) -> Result<Settings> {
         Ok(Settings {
             model: self.structure()?,
@@ -279,7 +279,7 @@ impl Calibrate {
         })
     }
 
-    /// How the recordings were read and grouped; of a curve nothing is known.
+    /// Reading and grouping of the recordings; empty for a curve.
     fn reading(&self, settings: &Settings) -> toml::Table {
         if self.curve.is_some() {
             return toml::Table::new();
@@ -310,7 +310,8 @@ impl Calibrate {
 
 // The files of a calibration: for each estimator a model, the curves behind it and the draws behind its intervals.
 
-/// What comes between the stem of `--out` and the endings of an estimator: of several `_<estimator>`.
+/// Text between the stem of `--out` and an estimator's file extensions: `_<estimator>` if there are
+/// several.
 fn stem_of(estimator: Estimator, estimators: &[Estimator]) -> String {
     match estimators.len() {
         1 => String::new(),

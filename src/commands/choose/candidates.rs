@@ -1,4 +1,4 @@
-//! What is chosen among.
+//! Candidates of `choose` and their cross-validation.
 
 use super::FEWEST;
 use super::ranking::Score;
@@ -24,17 +24,17 @@ use std::fmt;
 /// A way from recordings to a filter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// How replicates become one curve.
+    /// Estimator that combines the replicates into one curve.
     pub estimator: Estimator,
-    /// What is fitted to it.
+    /// Model fitted to the curve.
     pub model: ModelChoice,
-    /// How the model becomes states of the filter.
+    /// States by which the filter represents the model.
     pub filter: FilterStates,
-    /// What is done to the model in between.
+    /// Inflation of the model before the filter takes it.
     pub inflation: Inflation,
 }
 
-/// What is done to a model before a filter is made of it.
+/// Inflation of a model before a filter takes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Inflation {
     /// Nothing.
@@ -58,8 +58,8 @@ impl Candidate {
         }
     }
 
-    /// What is compared where nothing else is said: the three averages of N2, and beside AWV what else is done in
-    /// practice, from all states to the rule of thumb, and single recordings.
+    /// Default candidates: the three averages with N2; and with AWV the other common practices,
+    /// from all states to the rule of thumb and single recordings.
     pub(crate) fn usual() -> Vec<Self> {
         let n2 = |estimator| Self::new(estimator, ModelSpec::n2());
         let two_slopes = |estimator| Self::new(estimator, white_and_walk());
@@ -129,18 +129,19 @@ impl Candidate {
         }
     }
 
-    /// Whether it may be chosen. What is made of a single recording, while there are several, is shown for comparison.
+    /// Returns true if it may be chosen. Calibrations of a single recording are shown for
+    /// comparison only.
     pub const fn is_eligible(&self) -> bool {
         !self.estimator.is_single()
     }
 }
 
-/// What most filters of other programs know.
+/// Noise model of most filters: white noise and a random walk.
 fn white_and_walk() -> ModelSpec {
     "WN+RW".parse().expect("a sum of known processes")
 }
 
-/// Whether every process has a slope of its own in the Allan deviation.
+/// Returns true if every process has a slope of its own in the Allan deviation.
 fn is_of_slopes(model: &ModelChoice) -> bool {
     match model {
         ModelChoice::Given(spec) => spec.kinds().iter().all(|kind| kind.shape().is_none()),
@@ -368,7 +369,7 @@ impl Drive {
         Ok(results.iter().map(score).collect())
     }
 
-    /// What each candidate's filter believes by all recordings but one.
+    /// Noise model in each candidate's filter, calibrated from all recordings but one.
     fn beliefs(
         &self,
         laboratory: &Laboratory,

@@ -66,19 +66,20 @@ pub struct Choose {
     /// [default: 15, and full with awv]
     #[arg(long, value_name = "STATES", value_delimiter = ',')]
     filter: Vec<FilterStates>,
-    /// How models are inflated: none, x10 (ten times the standard deviations) [default: none, and both with awv]
+    /// Inflation of models: none, x10 (ten times the standard deviations) [default: none, and both
+    /// with awv]
     #[arg(long, value_name = "HOW", value_delimiter = ',')]
     inflate: Vec<Inflation>,
     /// Runs on each recording
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     runs: u64,
-    /// What DR-AWV drops at each end of each scale: a number, or a share such as 30%
+    /// Replicates that DR-AWV drops at each end of each scale: a number, or a share such as 30%
     #[arg(long, value_name = "A", default_value_t)]
     trim: Trim,
-    /// What to do where the time jumps or stands still: refuse the file, split it there, or ignore it
+    /// Handling of gaps and repeated times: refuse the file, split it there, or ignore them
     #[arg(long, value_parser = parse::one_of::<Gaps>(WHOLE), default_value_t)]
     gaps: Gaps,
-    /// How recordings are read.
+    /// Options for reading recordings.
     #[command(flatten)]
     pub recordings: ReadingRequest,
 }
@@ -256,7 +257,7 @@ impl Command for Choose {
 }
 
 impl Choose {
-    /// Those that are usual, or all combinations of what is given.
+    /// Candidates to compare: the default ones, or all combinations of the given options.
     fn candidates(&self) -> Result<Vec<Candidate>> {
         let Self {
             estimator,

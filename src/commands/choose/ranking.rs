@@ -38,7 +38,7 @@ pub struct FoldScore {
     pub recording: String,
     /// Windows of it.
     pub windows: u64,
-    /// How it did.
+    /// Its score.
     #[serde(flatten)]
     pub score: Score,
 }
@@ -52,15 +52,15 @@ pub struct Placed {
     pub place: &'static str,
     /// Its index among those that were given.
     pub index: usize,
-    /// Whether it may be chosen; others are shown for comparison.
+    /// True if it may be chosen; others are shown for comparison.
     pub eligible: bool,
-    /// Whether it is the winner, or cannot be told from it.
+    /// True for the winner and for candidates indistinguishable from it.
     pub tied: bool,
     /// Mean log score (nats an outage end).
     pub log_score: Mean,
     /// Horizontal RMSE at the ends of outages (m), root mean square over recordings.
     pub rmse_m: f64,
-    /// What its filter believes of it (m).
+    /// Standard deviation that its filter states for it (m).
     pub believed_m: f64,
     /// Mean NEES at the ends of outages; 9 is right.
     pub nees: Mean,
@@ -83,15 +83,15 @@ pub struct Ranking {
     pub candidates: Vec<Placed>,
     /// Recordings that no candidate describes: the least NEES of all is above 18 where 9 is right.
     pub undescribed: Vec<String>,
-    /// Whether the data tell the winner from any other that may be chosen.
+    /// True if the data distinguish the winner from at least one other eligible candidate.
     pub tells: bool,
 }
 
 impl Ranking {
-    /// Of what every recording, left out, says of every candidate.
+    /// Ranks the candidates by their scores on each left-out recording.
     ///
     /// # Panics
-    /// Without a candidate that may be chosen, or without a recording.
+    /// Without an eligible candidate, or without a recording.
     pub fn new(candidates: &[Candidate], folds: &[Fold]) -> Self {
         let eligible: Vec<usize> = (0..candidates.len())
             .filter(|c| candidates[*c].is_eligible())
@@ -334,7 +334,7 @@ pub struct Score {
 pub struct EndScore {
     /// Horizontal RMSE (m).
     pub rmse_m: f64,
-    /// What the filter believes of it (m).
+    /// Standard deviation that the filter states for it (m).
     pub believed_m: f64,
     /// Mean NEES of position, velocity and attitude; 9 is right.
     pub nees: f64,
@@ -343,7 +343,7 @@ pub struct EndScore {
 }
 
 impl Score {
-    /// Of runs with so many outages.
+    /// Scores the runs of one candidate with this number of outages.
     pub(crate) fn of(runs: &[RunRecord], outages: usize) -> Self {
         let kept: Vec<&[OutageRecord]> = runs
             .iter()

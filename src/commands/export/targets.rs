@@ -18,7 +18,7 @@ use std::str::FromStr;
 pub struct Target {
     /// Its name on the command line.
     pub name: &'static str,
-    /// What it takes a bias for.
+    /// Role of the bias in the target's filter.
     pub(super) bias: Bias,
     /// True if both sensors share one correlation time.
     pub(super) has_one_time: bool,

@@ -122,7 +122,7 @@ impl FuseAnswer {
         }
     }
 
-    /// What helps where the solution is overconfident.
+    /// Advice for an overconfident solution.
     pub(crate) fn advice(&self) -> &'static str {
         let outcome = &self.summary.outcome;
         if outcome.reference.is_some() && outcome.nis_per_component < 1.0 {

@@ -165,7 +165,8 @@ pub struct Fuse {
     /// Time by which receiver or logger stamp the fixes late (s)
     #[arg(long = "gnss-delay", value_name = "S", value_parser = number, default_value = "0", allow_hyphen_values = true)]
     gnss_delay_s: f64,
-    /// How long errors of fixes last: as the innovations show, no longer than a fix, or so many seconds (of positions)
+    /// Correlation time of the fixes' errors: auto (from the innovations), none, or seconds (of
+    /// positions)
     #[arg(long, value_name = "auto|none|SECONDS", value_parser = correlation, default_value = "auto")]
     gnss_correlation: Correlation,
     /// Fixes are left out as outliers whose normalised innovation a right filter exceeds less often than 1 - LEVEL
@@ -729,12 +730,12 @@ impl Drive<'_> {
     }
 }
 
-/// What a cause is looked for with.
+/// Input of the search for the cause of large innovations.
 struct Scene<'a> {
     belief: &'a Belief,
     start: &'a Start,
     settings: &'a Settings,
-    /// Whether the start was given.
+    /// True if the start was given.
     is_given: bool,
 }
 
@@ -875,7 +876,8 @@ fn belief(
     Ok((belief, quality))
 }
 
-/// What a filter expects beside the model, with what its states say of scale factors.
+/// Uncertainties that the filter expects beside the model, including the scale factors of its
+/// states.
 fn beside(states: FilterStates, initial: &InitialSettings) -> InitialSettings {
     let mut all = initial.clone();
     let ppm = states.scale_sigma() * 1e6;
@@ -965,13 +967,13 @@ pub struct FuseSummary {
     mounting: Option<MountingRow>,
     /// Root mean square of the horizontal standard deviation of the filter (m).
     pub horizontal_sigma_rms_m: f64,
-    /// How many times the stated standard deviations of position and velocity are believed.
+    /// Factors on the stated standard deviations of position and velocity.
     #[serde(skip)]
     pub sigma_factors: [f64; 2],
     /// Correlation of the innovations, and what the filter makes of it; none where fixes are few.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gnss_correlation: Option<Value>,
-    /// What the vehicle knows, where that was asked for.
+    /// Vehicle motion model, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vehicle: Option<Value>,
     /// White noise of the recording that is believed instead of the model's.
@@ -1108,7 +1110,7 @@ const MOUNTING_SIGMA_DEG: f64 = 1.0;
 const SCALE_SIGMA: f64 = 0.03;
 
 impl Fuse {
-    /// What is believed of the vehicle: nothing that was not asked for.
+    /// Aiding of the filter: only what was requested.
     fn aiding(&self) -> AidingSettings {
         let lever_arm_m = self.rear_axle_m;
         AidingSettings {

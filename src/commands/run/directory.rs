@@ -15,11 +15,11 @@ use std::path::Path;
 
 /// A run directory.
 pub(crate) struct RunDirectory {
-    /// Where it came from.
+    /// Its provenance.
     pub manifest: Manifest,
     /// Its configuration.
     pub origin: RunOrigin,
-    /// What was found.
+    /// Its results.
     pub experiment: Measured,
     /// Its summary, with the verdict as its own command found it, covariance analysis included.
     pub summary: Value,

@@ -77,7 +77,7 @@ pub struct Run {
     /// States of the filter, and what it expects beside the model.
     #[command(flatten)]
     filter: FilterArgs,
-    /// How statistics are computed: monte-carlo (sampled runs), lincov (linear covariance analysis, no sampling) or
+    /// Source of the statistics: monte-carlo (sampled runs), lincov (linear covariance analysis) or
     /// both (runs, compared with their expected values)
     #[arg(long, value_name = "METHOD", value_parser = parse::one_of::<Method>(&Method::NAMES))]
     method: Option<Method>,
@@ -115,7 +115,7 @@ pub struct RunAnswer {
 pub struct RunOrigin {
     /// The resolved configuration: every key, outages one by one.
     pub configuration: Scenario,
-    /// Whether the truth of each run was drawn from the spread of its model.
+    /// True if the truth of each run was drawn from the spread of its model.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub spread: bool,
     /// Estimator of the model in the filter, if it was calibrated ("awv", "sr-awv", "dr-awv", …).
@@ -410,7 +410,7 @@ impl PreparedRun<'_> {
         self.origin.configuration.outage.clone().unwrap_or_default()
     }
 
-    /// Whether two runs differ in the filter alone.
+    /// Returns true if two runs differ in the filter alone.
     pub(crate) fn shares_noise_with(&self, other: &Self) -> bool {
         let noise = |run: &Self| {
             let mut scenario = run.origin.configuration.clone();
@@ -562,7 +562,7 @@ pub struct NavigateInputs {
     pub trajectory: Trajectory,
     /// The noise model that the filter believes, at the rate of the IMU.
     pub model: Model,
-    /// What makes the errors of the true IMU.
+    /// Source of the true IMU's errors.
     pub truth: TrueImu,
     /// Bootstrap draws of the calibration of the model, at the rate of the IMU.
     pub model_draws: Option<Draws>,
@@ -745,7 +745,7 @@ fn doubt(inputs: &NavigateInputs, scenario: &Scenario, context: &Context<'_>) {
 /// Means over a second that differ so much are motion, not noise: m/s², rad/s.
 const MOTION: (f64, f64) = (0.5, 0.05);
 
-/// Where a recording is not static.
+/// Describes motion in a recording that should be static.
 fn motion(recording: &Recording) -> Option<String> {
     let second = (recording.rate_hz.round() as usize).max(1);
     recording.signals.iter().find_map(|signal| {
@@ -795,7 +795,7 @@ fn sampled(
     Ok(result)
 }
 
-/// What a covariance analysis is made of.
+/// Input of a covariance analysis.
 struct Analysis<'a> {
     experiment: &'a Experiment<'a>,
     track: &'a Track,
@@ -810,7 +810,7 @@ impl Analysis<'_> {
         Expected::along(self.track, self.experiment, self.belief, self.model?)
     }
 
-    /// What the calibrations leave open in the figures at the ends of outages.
+    /// Adds the uncertainty due to the calibrations to the figures at the ends of outages.
     fn add_intervals(
         &self,
         outages: &mut [OutageSummary],
@@ -829,7 +829,7 @@ impl Analysis<'_> {
         }
     }
 
-    /// What the errors at the ends of outages are made of.
+    /// Adds the error budget at the ends of outages.
     fn add_budgets(&self, filter: &FilterPass<'_>, outages: &mut [OutageSummary]) {
         let Some(model) = self.model else { return };
         let sources = TruthSide::sources(self.experiment, model);

@@ -455,15 +455,15 @@ struct Description {
     #[serde(rename = "schema")]
     #[schemars(range(min = 1, max = 1))]
     _schema: Option<u64>,
-    /// Of all axes of the accelerometers
+    /// Rules for all axes of the accelerometers
     #[serde(default)]
     accel: Vec<RuleTable>,
-    /// Of all axes of the gyroscopes
+    /// Rules for all axes of the gyroscopes
     #[serde(default)]
     gyro: Vec<RuleTable>,
 }
 
-/// What is done to the signals of a sensor
+/// Contamination of the signals of a sensor
 #[derive(Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 struct RuleTable {
@@ -482,9 +482,9 @@ enum Described {
     Step {
         /// Height of the step (units of the signal)
         amplitude: OneOrEach<f64>,
-        /// Where in the record, as a share of it (default: 0.5)
+        /// Position in the record, as a share of it (default: 0.5)
         at_share: Option<OneOrEach<Share>>,
-        /// Where in the record (s)
+        /// Position in the record (s)
         at_s: Option<OneOrEach<NonNegative>>,
     },
     /// A drift over the whole record
@@ -538,7 +538,7 @@ enum Described {
         process: String,
         /// Its parameter, such as gamma2
         parameter: String,
-        /// What it is multiplied by
+        /// Factor on the signal
         factor: OneOrEach<NonNegative>,
     },
 }

@@ -44,7 +44,7 @@ pub struct Entry {
     pub sensor: Sensor,
     /// Which.
     pub figure: Figure,
-    /// How much.
+    /// Its value.
     pub quantity: Quantity,
     /// Document and place.
     pub source: Option<String>,
@@ -52,7 +52,7 @@ pub struct Entry {
     pub quote: Option<String>,
 }
 
-/// What is known of an IMU from its datasheet.
+/// Figures of an IMU from its data sheet.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Datasheet {
     /// Manufacturer and name, if known.
@@ -61,7 +61,7 @@ pub struct Datasheet {
     pub class: Option<String>,
     /// At most one entry for each figure of each sensor.
     pub entries: Vec<Entry>,
-    /// What was assumed beside the figures.
+    /// Assumptions beside the figures.
     pub assumptions: Vec<String>,
 }
 
@@ -70,7 +70,7 @@ pub struct Datasheet {
 pub struct Made {
     /// The model.
     pub file: ModelFile,
-    /// What had to be assumed, or does not fit together.
+    /// Assumptions and contradictions to report.
     pub doubts: Vec<String>,
 }
 
@@ -206,7 +206,8 @@ impl Entry {
     }
 }
 
-/// How far the lowest point of the whole Allan deviation may be above the bias instability, as a ratio.
+/// Largest ratio of the minimum of the whole Allan deviation to the bias instability that needs no
+/// remark.
 const NOTABLE: f64 = 1.2;
 
 fn doubt_floor(sensor: Sensor, flicker: Flicker, density: f64, is_time_given: bool) -> Vec<String> {
@@ -338,7 +339,7 @@ const MOST: f64 = 1e12;
 /// A figure as given, and what it is in SI (ppm for scale factors).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
-    /// As given: "0.34 deg/sqrt(h)".
+    /// Text of the figure: "0.34 deg/sqrt(h)".
     pub given: String,
     /// In SI.
     pub value: f64,

@@ -1,5 +1,5 @@
-//! What `fuse` reads: recorded IMU data, GNSS fixes, an initial state. Our own tables, the headers that
-//! recordings may have, the text files of KF-GINS, the solutions of RTKLIB, the sentences of NMEA 0183.
+//! Input files of `fuse`: recorded IMU data, GNSS fixes, an initial state. Own tables, known
+//! headers of recordings, text files of KF-GINS, solutions of RTKLIB, sentences of NMEA 0183.
 
 use super::file_kind::{self, FileKind};
 use super::logs::LogOptions;
@@ -34,12 +34,12 @@ fn note(importance: Importance, text: impl Into<String>) -> Note {
     Note { importance, text }
 }
 
-/// How a file was read.
+/// Note on the reading of a file.
 fn remark(text: impl Into<String>) -> Note {
     note(Importance::Remark, text)
 }
 
-/// What is doubtful about a file.
+/// Warning about a file.
 fn doubt(text: impl Into<String>) -> Note {
     note(Importance::Warning, text)
 }
@@ -250,8 +250,9 @@ fn of_rows(
     Ok(((0..table.rows()).map(fix).collect(), remarks))
 }
 
-/// What a fix states in axes fixed to the Earth, as latitude, longitude, height and in the axes north, east, down.
-/// `covariances` are the signed roots of those between x and y, y and z, z and x, 0 where they are not stated.
+/// Converts an ECEF fix to latitude, longitude, height, and to the axes north, east, down.
+/// `covariances` are the signed roots of those between x and y, y and z, z and x; 0 where not
+/// stated.
 fn in_geodetic(
     [place, sigma, velocity, velocity_sigma]: [Option<DVec3>; 4],
     covariances: [Option<DVec3>; 2],
@@ -891,7 +892,7 @@ pub(crate) struct ImuFile {
     pub samples: Vec<ImuIncrement>,
     /// Samples a second, by the median step.
     pub rate_hz: f64,
-    /// What is doubtful, and how the file was read.
+    /// Warnings, and notes on the reading.
     pub remarks: Vec<Note>,
 }
 
@@ -1086,7 +1087,7 @@ fn doubt_units(
 /// Largest velocity (m/s): beyond that of the Earth's surface and of orbits.
 const MAX_SPEED_M_S: f64 = 1e4;
 
-/// Where and how a drive begins: nav-sim fuse --initial
+/// Initial state of a drive: nav-sim fuse --initial
 #[derive(Deserialize, JsonSchema)]
 #[schemars(title = "Initial state", deny_unknown_fields)]
 struct Description {

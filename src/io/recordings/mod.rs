@@ -27,7 +27,7 @@ use timing::Timing;
 pub mod facts;
 pub(crate) mod timing;
 
-/// How recordings are read.
+/// Options for reading recordings.
 #[derive(Debug, Clone, Default)]
 pub struct ReadOptions {
     /// Sample rate (Hz) for files without a time column; where there is one, it must agree within 1 %, and wins where
@@ -35,19 +35,19 @@ pub struct ReadOptions {
     pub rate_hz: Option<f64>,
     /// Seconds to leave out at the beginning (warm-up).
     pub skip_s: f64,
-    /// What to do where the time jumps or stands still.
+    /// Handling of gaps and repeated times.
     pub gaps: Gaps,
     /// The channels wanted; none: all. Others are neither parsed nor checked nor held in memory.
     pub channels: Option<Vec<Channel>>,
     /// Names of the columns, for files without a header and instead of the header of those with one.
     pub columns: Option<Vec<String>>,
-    /// What is read of a log.
+    /// Selection of a log's channels.
     pub log: LogOptions,
     /// Fewest samples a recording must have (at least 2).
     pub min_samples: usize,
 }
 
-/// What to do where a time step is over 1.5 or under 0.5 of the median step.
+/// Handling of time steps over 1.5 or under 0.5 of the median step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Gaps {
     /// Refuse the file.
@@ -395,7 +395,7 @@ fn natural(name: &str) -> (String, String) {
     (padded.collect(), name.to_owned())
 }
 
-/// Whether a name ends like a recording's.
+/// Returns true for a name with a recording's extension.
 fn is_recording(name: &str) -> bool {
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
@@ -438,7 +438,7 @@ mod listing_tests {
 
 // What was found in the files, for the user to check.
 
-/// What was found and assumed while reading.
+/// Findings and assumptions of the reading.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
@@ -466,7 +466,7 @@ impl Report {
     }
 }
 
-/// What was found and assumed in one file. Displays as one line.
+/// Findings and assumptions for one file. Displays as one line.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct FileReport {
@@ -478,17 +478,17 @@ pub struct FileReport {
     pub ignored: Vec<String>,
     /// Sample rate (Hz).
     pub rate_hz: f64,
-    /// Where the rate is from, in words.
+    /// Source of the rate, in words.
     pub rate_from: String,
     /// Samples of each recording made of the file (several if it was split at gaps).
     pub samples: Vec<usize>,
     /// The mean removed from each signal of the first of them (m/s² or rad/s).
     pub means: Vec<(Channel, f64)>,
-    /// What was assumed, in words.
+    /// Assumptions, in words.
     pub assumptions: Vec<String>,
     /// Doubts, in words.
     pub warnings: Vec<String>,
-    /// What tells its samples from those of others.
+    /// Fingerprints that detect samples shared with other files.
     marks: Vec<Marks>,
 }
 
@@ -644,7 +644,7 @@ fn with_holes(samples: &[f64], piece: &Range<usize>, holes: &[(usize, usize)]) -
     whole
 }
 
-/// Of the stretches between gaps those shorter than the longest by more than this are left out.
+/// Largest ratio of the longest stretch between gaps to one that is kept.
 const LONGEST_OVER_SHORTEST: usize = 16;
 
 /// The stretches of samples that become recordings: at least one.
@@ -688,7 +688,7 @@ const NO_GRAVITY: f64 = 0.3;
 /// A column without a larger value has squares that are no variances.
 const SMALLEST: f64 = 1e-45;
 
-/// What brings each column to SI units; refuses dead axes.
+/// Factors that bring each column to SI units; refuses dead axes.
 fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
     let from_gravity = gravity_factor(raw)?;
     let factor = |column: &Column| {

@@ -28,7 +28,7 @@ pub(crate) struct Dictionary<'a> {
     pub(crate) quantities: &'static [Quantity],
     /// Headers of texts without one, by the number of their columns.
     pub(crate) bare: &'static [&'static str],
-    /// Those of arrays.
+    /// Column names of arrays.
     pub(crate) array: &'static [&'static str],
     /// True if cells that hold no number of their range are NaN: who reads them leaves those rows out.
     pub(crate) is_partial: bool,
@@ -1037,7 +1037,7 @@ const fn is_quote(byte: u8, is_open: bool, before: u8, delimiter: u8) -> bool {
     byte == b'"' && (is_open || before == delimiter || before == b'"')
 }
 
-/// What a cell says, without the quotes around it.
+/// Contents of a cell without the quotes around it.
 fn unquoted(cell: &[u8]) -> Cow<'_, [u8]> {
     let inside = cell
         .trim_ascii()

@@ -30,7 +30,8 @@ fn dotted(path: &str, key: &str) -> String {
     }
 }
 
-/// Where the value of a path is written, and whether it is: if not, the span of the innermost table around it.
+/// Span of the value at a path, and true if it exists; else the span of the innermost table around
+/// it.
 fn span_of(table: &DeTable<'_>, path: &str) -> (Range<usize>, bool) {
     let (mut table, mut span) = (Some(table), 0..0);
     for part in path.split('.').filter(|part| !part.is_empty()) {
@@ -134,7 +135,7 @@ impl Source {
             .count()
     }
 
-    /// Where the value of a key is written, and whether it is: if not, the innermost table around it.
+    /// Span of the value of a key, and true if it exists; else the innermost table around it.
     fn place(&self, key: &str) -> (Range<usize>, bool) {
         let table = DeTable::parse(&self.text);
         table.map_or((0..0, false), |table| span_of(table.get_ref(), key))

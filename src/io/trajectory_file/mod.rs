@@ -397,10 +397,10 @@ struct Rows {
     velocities: Vec<DVec3>,
     /// Standard deviations in the order of the reported states (m, m/s, rad; NaN: not stated), one for each sample.
     sigmas: Vec<[f64; 9]>,
-    /// Whether positions are latitude and longitude, which may have been given in the wrong unit.
+    /// True if positions are latitude and longitude, whose unit may be wrong.
     geodetic: bool,
     doubts: Vec<String>,
-    /// Those that only a trajectory gives: columns that it does not use, and an attitude that follows the path.
+    /// Doubts for trajectories only: unused columns, and an attitude that follows the path.
     of_trajectory: Vec<String>,
 }
 

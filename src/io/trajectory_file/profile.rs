@@ -17,12 +17,12 @@ struct Description {
     start: Start,
     #[serde(default)]
     vehicle: Vehicle,
-    /// What the vehicle does, in order
+    /// Segments of the motion, in order
     #[schemars(length(min = 1))]
     segment: Vec<Segment>,
 }
 
-/// How the vehicle moves
+/// Motion of the vehicle
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 struct Vehicle {

@@ -249,7 +249,8 @@ impl Curve {
         correlation_time_s(&[self, other], policy)
     }
 
-    /// Whether all axes are the same white noise and random walk, so that the largest is one of them.
+    /// Returns true if all axes have the same white noise and random walk, so that the largest is
+    /// one of them.
     fn is_white_and_walk(&self) -> bool {
         let pair = |p: &Process| matches!(p.kind(), Kind::White | Kind::RandomWalk);
         self.axes

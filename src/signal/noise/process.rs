@@ -313,7 +313,7 @@ pub struct Process {
     rate_hz: f64,
 }
 
-/// As in model files: its code as `type`, and its parameters.
+/// Serialises as in model files: the process code as `type`, and the parameters.
 impl Serialize for Process {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         let parameters = self.parameters();
@@ -500,8 +500,9 @@ impl Process {
         }
     }
 
-    /// As a recursion b_k = phi b_{k−1} + w_k: phi, the variance of w, and that of b at the start (units²). A random walk has no
-    /// stationary variance and starts at 0. None for other kinds.
+    /// Coefficients of the recursion b_k = phi b_{k−1} + w_k: phi, the variance of w, and the
+    /// variance of b at the start (units²). A random walk has no stationary variance and starts at
+    /// 0. None for other kinds.
     pub fn recursion(&self) -> Option<[f64; 3]> {
         let (shape, amplitude) = (self.shape, self.amplitude);
         match self.kind {
@@ -522,7 +523,8 @@ impl Process {
         }
     }
 
-    /// As a moving average of two, X_t = W_t + theta W_{t−1}: theta and the variance of W (units²). None for other kinds.
+    /// Coefficients of the moving average X_t = W_t + theta W_{t−1}: theta and the variance of W
+    /// (units²). None for other kinds.
     pub fn moving_average(&self) -> Option<[f64; 2]> {
         match self.kind {
             Kind::Quantization => Some([-1.0, self.amplitude]),

@@ -91,7 +91,8 @@ pub fn reduce(
     })
 }
 
-/// Whether a filter with one bias an axis carries the noise as it is: at most one of its processes is a bias.
+/// Returns true if a filter with one bias per axis represents the noise exactly: at most one
+/// process is a bias.
 #[must_use]
 pub fn is_exact(noise: &Composite) -> bool {
     let states = |p: &Process| match p.kind() {

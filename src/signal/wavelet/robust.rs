@@ -51,14 +51,15 @@ const MOST_ZEROS: f64 = 0.1;
 const ZERO: f64 = 1e-3;
 
 impl RobustVariance {
-    /// Whether the coefficients lie on steps so coarse that the variance is not that of Gaussian ones: a tenth of them are zero,
-    /// the step (of the coefficients) a quarter of their standard deviation.
+    /// Returns true if the quantization steps of the coefficients are so coarse that a Gaussian
+    /// variance does not apply: a tenth of them are zero, and the step is a quarter of their
+    /// standard deviation.
     pub fn is_stepped(&self) -> bool {
         self.zeros > MOST_ZEROS
     }
 
-    /// Whether the steps leave it without a root, or make it another than the classical variance, whose degrees of freedom are
-    /// given. Of finer steps, or where the two agree, it is as good as ever.
+    /// Returns true if the steps leave the robust equation without a root, or move its root away
+    /// from the classical variance, which has `edof` degrees of freedom. Finer steps do no harm.
     pub(super) fn is_moved_by_steps(&self, classical: f64, edof: f64, efficiency: f64) -> bool {
         let ratio = (classical / self.value).ln();
         // (1/e − 1)·2/eta is the variance of the logarithm of the two of Gaussian coefficients.
@@ -121,7 +122,7 @@ pub(crate) fn m_scale(squares: &[f64], tuning: &Tuning) -> RobustVariance {
     begin.solve(squares, first, tuning)
 }
 
-/// Where the iteration begins.
+/// Starting point of the iteration.
 struct Begin {
     /// At most 4096 evenly spaced squares; all of a short vector.
     sample: Vec<f64>,
@@ -180,8 +181,8 @@ impl Begin {
 const MAD_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 /// Factor from one point of the march to the next.
 const STEP: f64 = 1.25;
-/// How far down the march goes. At efficiency 0.6 g of Gaussian coefficients is positive from 0.069 nu to nu:
-/// from a start up to sixteen times too high the march still reaches that region.
+/// Largest ratio by which the march descends. At efficiency 0.6, g of Gaussian coefficients is
+/// positive from 0.069 nu to nu: a start up to sixteen times too high still reaches that region.
 const DEPTH: f64 = 16.0;
 /// A Newton step this small leaves an error of its square.
 const LAST_STEP: f64 = 1e-7;
