@@ -64,7 +64,7 @@ pub(crate) mod help {
     );
 }
 
-/// Where in a file.
+/// Place in a file.
 #[derive(Clone)]
 pub(crate) enum Place {
     /// Anywhere in it.

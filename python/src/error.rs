@@ -20,7 +20,7 @@ pub(crate) fn raise(
     }
 }
 
-/// Of what concerns no file.
+/// Error that concerns no file.
 pub(crate) fn refused(py: Python<'_>, message: &str) -> PyErr {
     raise(py, message, None, None, None)
 }

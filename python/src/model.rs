@@ -21,7 +21,7 @@ fn read(py: Python<'_>, text: &str, path: Option<&str>) -> PyResult<ModelFile> {
     model_file::from_text(path, text).map_err(|e| error::of_failure(py, &e, ""))
 }
 
-/// What a model file holds, as JSON: `rate_hz`, and for each channel the list of its processes.
+/// Contents of a model file in JSON: `rate_hz`, and for each channel the list of its processes.
 #[pyfunction]
 #[pyo3(signature = (text, path))]
 pub(crate) fn model_contents(py: Python<'_>, text: &str, path: Option<&str>) -> PyResult<String> {

@@ -12,7 +12,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// What `command` answers to a request. `hidden`: a directory that no text shows.
+/// Answers a request to `command`. `hidden`: a directory that no text shows.
 #[pyfunction]
 #[pyo3(signature = (command, request, hidden, progress, threads=None))]
 pub(crate) fn answer(
@@ -88,12 +88,12 @@ impl Answer {
 
 #[pymethods]
 impl Answer {
-    /// As JSON.
+    /// The answer in JSON.
     fn json(&self) -> String {
         self.shown(&self.answered.json)
     }
 
-    /// As the terminal shows it.
+    /// The answer as text for the terminal.
     fn summary(&self, py: Python<'_>) -> String {
         py.detach(|| {
             let document = &self.answered.document;
@@ -112,7 +112,7 @@ impl Answer {
         lines.map(|line| self.shown(line)).collect()
     }
 
-    /// As a page of its own.
+    /// The answer as a self-contained page.
     fn html(&self, py: Python<'_>) -> String {
         py.detach(|| self.shown(&self.answered.document.html()))
     }

@@ -11,7 +11,7 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How often Python is asked whether to stop, and told how far a job is.
+/// Interval at which Python is polled for interrupts and told the progress.
 const SLICE: Duration = Duration::from_millis(50);
 
 /// Counts what a job has done, takes down what it warns of, and stops it.
@@ -27,7 +27,7 @@ pub(crate) struct Meter {
     pub(crate) deadline: OnceLock<Instant>,
 }
 
-/// What a stopped job unwinds with.
+/// Panic payload of a stopped job.
 struct Stopped;
 
 impl Front for Meter {
@@ -61,7 +61,7 @@ impl Meter {
         self.warnings.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What the job has warned of.
+    /// Warnings of the job.
     pub(crate) fn warnings(&self) -> Vec<String> {
         std::mem::take(&mut self.noted())
     }

@@ -10,7 +10,7 @@ use crate::trajectory::Trajectory;
 use crate::trajectory::ideal_imu::ideal_imu;
 use crate::units::Refused;
 
-/// How far the mechanised samples come away from the trajectory.
+/// Difference between the mechanised samples and the trajectory.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize)]
 pub struct Closure {
     /// IMU rate (Hz).
@@ -27,7 +27,7 @@ pub struct Closure {
     pub attitude_rad: f64,
 }
 
-/// What a closure must not exceed.
+/// Bounds on a closure.
 #[derive(Debug, Clone, Copy, serde::Serialize)]
 pub struct Bounds {
     /// Distance (m).
@@ -103,7 +103,7 @@ impl Closure {
         self.attitude_rad = larger(self.attitude_rad, turned);
     }
 
-    /// Whether it is within the bounds; what is not finite is within none.
+    /// Returns true if it is within the bounds; values that are not finite are not.
     pub fn within(&self, bounds: &Bounds) -> bool {
         self.position_m <= bounds.position_m
             && self.velocity_m_s <= bounds.velocity_m_s

@@ -30,7 +30,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::str::FromStr;
 
-/// What is limited at the end of an outage.
+/// Quantity with a limit at the end of an outage.
 #[derive(Debug, Clone, Copy)]
 pub enum Quantity {
     /// 95 % quantile of the horizontal error (m).
@@ -171,7 +171,7 @@ pub enum RequireError {
 /// True errors at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drift {
-    /// How long the outage has lasted (s).
+    /// Time since the start of the outage (s).
     pub after_s: f64,
     /// Mean of the position error, north and east (m).
     pub mean_m: [f64; 2],
@@ -217,7 +217,7 @@ impl Drift {
         }
     }
 
-    /// What a value is at most, at next to no cost.
+    /// Upper bound of a value, at next to no cost.
     fn bound(&self, quantity: Quantity) -> f64 {
         match quantity {
             Quantity::P50 => self.quantile_bound(0.5),
@@ -233,7 +233,7 @@ impl Drift {
         self.mean_m[0].hypot(self.mean_m[1]) + (-2.0 * (1.0 - probability).ln() * largest).sqrt()
     }
 
-    /// Whether a limit is exceeded, or the value is not a number.
+    /// Returns true if a limit is exceeded, or the value is not a number.
     pub fn exceeds(&self, limit: &Limit) -> bool {
         let is_within = |value: f64| value <= limit.most;
         !is_within(self.bound(limit.quantity)) && !is_within(self.value(limit.quantity))
@@ -413,7 +413,7 @@ pub fn evenly(first_s: f64, end_s: f64, length_s: f64, places: u32) -> Vec<Outag
 
 // The IMU that a limit needs: white noise and bias instability of each sensor, each with a quarter of the budget.
 
-/// How many intensities an IMU has here.
+/// Number of noise intensities of an IMU.
 pub const IMU_PARAMETERS: usize = 4;
 
 /// Intensities of an IMU, all axes alike.
@@ -435,7 +435,7 @@ const START: [f64; IMU_PARAMETERS] = [1e-3, 3e-4, 5e-5, 1e-5];
 const POOREST: f64 = 300.0;
 /// An intensity times this is as good as none.
 const NONE: f64 = 1e-5;
-/// How far from the start an intensity is sought, as a logarithm: beyond, any will do.
+/// Searched range of the logarithm of an intensity about the start: beyond, any value will do.
 const RANGE: f64 = 9.0;
 /// A logarithm of limit over error that is left: the search ends on either side of what it aims at, within [`EXACT`], its
 /// steps of up to a second leave up to 0.12 % less than those of `run` (biases, in outages of 5 s; 0.01 % from 10 s on, in the
@@ -496,7 +496,7 @@ impl ImuParameters {
         "gyroscope bias instability (deg/h)",
     ];
 
-    /// As good as without noise.
+    /// An IMU with practically no noise.
     fn perfect(t_corr_s: f64) -> Self {
         // 1e-5 of a consumer IMU, not zero: intensities are sought as logarithms.
         Self {
@@ -525,7 +525,7 @@ pub enum Answer {
     Never,
 }
 
-/// What is asked of an IMU.
+/// Requirements on an IMU.
 pub struct Need<'a> {
     /// The trajectory and the places of the outage.
     pub course: &'a Course<'a>,
@@ -586,7 +586,7 @@ impl Need<'_> {
         Ok(self.at_limit(&imu, [1.0; IMU_PARAMETERS])?.1)
     }
 
-    /// What an intensity may be where the others are multiplied by `others`.
+    /// Largest value of an intensity when the others are multiplied by `others`.
     ///
     /// # Errors
     /// When the model has no filter.
@@ -611,7 +611,7 @@ impl Need<'_> {
         })
     }
 
-    /// As [`Self::alone`], the others as good as none.
+    /// Largest value of an intensity when the others are practically zero.
     ///
     /// # Errors
     /// When the model has no filter.
@@ -692,10 +692,10 @@ impl Need<'_> {
 
 // How far a given IMU is from its limits, and what one without errors would leave.
 
-/// How an IMU stands to its limits.
+/// Margins of an IMU to its limits.
 #[derive(Debug, Clone, Serialize)]
 pub struct Margins {
-    /// Whether the limits are kept.
+    /// True if the limits are kept.
     pub met: bool,
     /// The hardest limit.
     #[serde(flatten)]

@@ -57,7 +57,7 @@ pub struct Strapdown<L = Lanes> {
     gravity: GravityModel,
 }
 
-/// What one step passed through, for the filter that linearises about it.
+/// Intermediate results of a step, about which the filter linearises.
 #[derive(Debug, Clone, Copy)]
 pub struct StepTrace<L> {
     /// Attitude matrix at the middle of the step, takes b, returns n.

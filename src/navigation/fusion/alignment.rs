@@ -22,7 +22,8 @@ use crate::units::{DEG, Refused};
 use glam::{DQuat, DVec3};
 use std::f64::consts::{PI, SQRT_2};
 
-/// How much later other starts are tried (s), where none at the first moving fix agrees with what follows.
+/// Delays of further start times to try (s), where none at the first moving fix agrees with the
+/// fixes after it.
 const LATER_S: [f64; 5] = [15.0, 30.0, 60.0, 120.0, 240.0];
 /// Tilt beyond which the axes of an IMU are hardly those of a vehicle (rad).
 const UPRIGHT: f64 = 45.0 * DEG;
@@ -30,9 +31,9 @@ const UPRIGHT: f64 = 45.0 * DEG;
 /// A start found in the recording.
 #[derive(Debug, Clone)]
 pub struct Alignment {
-    /// Where the filter starts.
+    /// Initial state and its uncertainty.
     pub start: Start,
-    /// What speaks against it.
+    /// Doubts about it.
     pub doubts: Vec<(VerdictKind, Finding)>,
 }
 
@@ -346,8 +347,8 @@ pub(super) fn between(imu: &[ImuIncrement], from: f64, to: f64) -> &[ImuIncremen
     &imu[first..end.max(first)]
 }
 
-/// How far the IMU turns through the samples, from its axes then to those at the start, and the velocity that the
-/// specific force makes, in the axes at the start (m/s).
+/// Attitude of the IMU at the end of the samples with respect to its axes at the start, and the
+/// velocity change by specific force, in the axes at the start (m/s).
 pub(super) fn carried(samples: &[ImuIncrement]) -> (DQuat, DVec3) {
     let (mut q, mut dv) = (DQuat::IDENTITY, DVec3::ZERO);
     for s in samples {
@@ -360,7 +361,8 @@ pub(super) fn carried(samples: &[ImuIncrement]) -> (DQuat, DVec3) {
 
 // The course of the vehicle from GNSS: velocities as measured, or from positions a second or more apart.
 
-/// How far the axis of a vehicle may be from its course on a straight road (rad): slip, mounting.
+/// Largest angle between the axis of a vehicle and its course on a straight road (rad): slip,
+/// mounting.
 const SLIP: f64 = 2.0 * DEG;
 /// Distance from the axle that does not steer to the IMU (m): in a turn the course there leaves the axis.
 const AXLE_M: f64 = 2.0;
@@ -368,14 +370,14 @@ const AXLE_M: f64 = 2.0;
 /// vehicles do, and of what never does, as people, carts and small robots.
 const FAST: (f64, f64) = (3.0, 5.0);
 const SLOW: (f64, f64) = (0.5, 10.0);
-/// What sways to the side at a walk (m/s).
+/// Lateral sway at a walk (m/s).
 const SWAY: f64 = 0.15;
 /// Shortest time from one position to another that gives a velocity, and the longest (s).
 const BASELINE_S: (f64, f64) = (1.0, 3.0);
-/// What a vehicle may accelerate between two positions, of which their mean velocity says nothing (m/s²).
+/// Largest acceleration allowed between two fixes (m/s²).
 const ACCELERATION: f64 = 2.0;
 
-/// How a drive goes.
+/// Carrier of the IMU, by its motion.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Pace {
     Fast,
@@ -389,7 +391,7 @@ impl Pace {
         least.max(sigmas * sigma)
     }
 
-    /// How far the axis is from the course at such a speed (rad).
+    /// Standard deviation of the angle between axis and course at a speed (rad).
     pub(super) fn slip(self, speed: f64) -> f64 {
         if self == Self::Fast {
             SLIP
@@ -536,15 +538,15 @@ fn derived(before: &GnssFix, fix: &GnssFix) -> Option<Moving> {
 
 /// Lengths of static windows (s). A long one leaves less acceleration that GNSS does not see.
 const STILL_S: [f64; 4] = [2.0, 4.0, 8.0, 16.0];
-/// How long it takes from the first acceleration to a speed that GNSS shows (s).
+/// Time from the first acceleration to a speed that GNSS shows (s).
 const DEPARTURE_S: f64 = 3.0;
-/// How long the gyroscopes carry a levelling on (s).
+/// Longest time over which the gyroscopes propagate a levelling (s).
 const MAX_AGE_S: f64 = 60.0;
 /// Length of the window in motion (s).
 const MOVING_S: f64 = 5.0;
 /// Spread of specific force (m/s²) and mean angular rate (rad/s) above which nothing is static.
 const STILL: (f64, f64) = (0.5, 0.03);
-/// How many times the spread of the quietest window a static one may have: engines idle, roads shake more.
+/// Largest spread of a static window over that of the quietest one: engines idle, roads shake more.
 const QUIET: f64 = 3.0;
 
 /// Roll and pitch at the first moving fix.
@@ -708,7 +710,7 @@ impl Scene<'_> {
     }
 }
 
-/// Whether velocities are those of rest, each and on average, as far as they are good to.
+/// Returns true if velocities are zero to within their standard deviations, each and on average.
 fn slow(seen: &[&Moving]) -> bool {
     let n = seen.len() as f64;
     let mean = seen
@@ -722,8 +724,8 @@ fn slow(seen: &[&Moving]) -> bool {
     !seen.is_empty() && seen.iter().all(each) && mean < 0.2_f64.max(4.0 * sigma)
 }
 
-/// Whether the fixes in a stretch of time stay in one place, as far as they are good to: within four
-/// standard deviations of the first.
+/// Returns true if the fixes in a stretch of time stay within four standard deviations of the
+/// first.
 fn stays(fixes: &[Moving], from: f64, to: f64) -> bool {
     let within: Vec<&GnssFix> = fixes
         .iter()
@@ -758,7 +760,7 @@ fn level(f_b: DVec3, f_h: DVec3) -> RollPitchYaw {
 
 // Which of two starts the fixes that follow speak for: the filter is run from both, and its innovations tell.
 
-/// How much of the recording is tried at first (s). Doubled while the two starts are not told apart.
+/// Length of the recording that is tried first (s). Doubled until the two starts are told apart.
 const TRIAL_S: f64 = 60.0;
 /// A heading that the smoother moves by more than so many of its standard deviations is not known as well as it says.
 const MOVED: f64 = 3.0;
@@ -767,7 +769,7 @@ const WIDEST_DEG: f64 = 30.0;
 /// Difference of −2 ln(likelihood) between forwards and backwards from which one is refuted: odds of e^10.
 const DECIDED: f64 = 20.0;
 
-/// How well a start agrees with the fixes after it.
+/// Agreement of a start with the fixes after it.
 #[derive(Clone, Copy)]
 struct Agreement {
     /// −2 ln(likelihood) of the innovations, up to a constant.

@@ -28,8 +28,8 @@ const MOST: usize = 2000;
 const FEWEST: usize = 30;
 /// Correlation from which the turns are the same ones.
 const SAME: f64 = 0.8;
-/// How much more of the turns must be left unexplained as the clocks are, and the least share that counts: between fixes
-/// the course of a vehicle is not quite its heading.
+/// Factor by which the clocks as given must leave more of the turns unexplained, and the least
+/// share that counts: between fixes the course of a vehicle is not quite its heading.
 const UNEXPLAINED: f64 = 2.0;
 const LEAST: f64 = 0.005;
 
@@ -248,7 +248,8 @@ pub fn rest_of_origin(recorded: &Recorded<'_>, belief: &Belief, settings: &Setti
     delay_s + rest_s.map_or_else(|| vertex(&all, least), |[rest_s, _]| rest_s)
 }
 
-/// How far behind a step the parabola through it and its neighbours is least (s): a delay that the innovations hardly tell.
+/// Minimum of the parabola through a step and its neighbours (s behind the step): a delay that the
+/// innovations hardly show.
 fn vertex<T>(tried: &[(f64, f64, T)], least: usize) -> f64 {
     let three = least.checked_sub(1).and_then(|k| tried.get(k..k + 3));
     let Some([(_, before, _), (_, at, _), (_, after, _)]) = three else {

@@ -1,10 +1,10 @@
-//! How the IMU sits in a road vehicle, found from the drive itself.
+//! Mounting angles of the IMU in a road vehicle, estimated from the drive itself.
 //!
-//! The vehicle is taken to move along its x axis, forwards for the most part, without slip and without bank on
-//! average. First the specific force is compared with what the change of the GNSS velocity says it is along the track
-//! (`track`): gravity gives roll and pitch, accelerations and turns the yaw. Then the filter of the fusion
-//! carries the attitude of the IMU through the whole drive, its biases estimated, and the mounting is the mean
-//! rotation from it to the track (`refined`).
+//! The vehicle is assumed to move along its x axis, forwards for the most part, without slip and
+//! without bank on average. First the specific force is compared with the change of the GNSS
+//! velocity along the track (`track`): gravity gives roll and pitch; accelerations and turns give
+//! the yaw. Then the fusion filter propagates the attitude of the IMU through the whole drive with
+//! its biases estimated, and the mounting is the mean rotation from it to the track (`refined`).
 
 use super::alignment::{Alignment, Moving, Pace, between, carried, coarse, courses, steps};
 use super::outcome::{is_contradicted, nis_per_component};
@@ -31,7 +31,7 @@ pub struct Mounting {
     pub sigma_b: DVec3,
     /// Distance driven with a known course (m).
     pub way_m: f64,
-    /// How many times the stated standard deviations of the fixes it was found with.
+    /// Factor on the stated standard deviations of the fixes with which it was found.
     pub sigma_factor: f64,
 }
 
@@ -172,17 +172,18 @@ impl Blocks {
 const ROWS_HZ: f64 = 2.0;
 /// Banks and slopes of roads beside those of the track, at a time (rad).
 const AT_A_TIME: DVec3 = DVec3::new(2.0 * DEG, 1.0 * DEG, 0.0);
-/// What a body leans and nods under an acceleration (rad per m/s²), and how far the IMU is from the axle that does not
-/// steer (m): in a turn the course there leaves the axis.
+/// Roll and pitch of a body under an acceleration (rad per m/s²), and the distance of the IMU from
+/// the axle that does not steer (m): in a turn the course there leaves the axis.
 const LEAN: f64 = 1.0 * DEG;
 const AXLE_M: f64 = 2.0;
-/// What no drive shows (rad). Roads fall to the side by 2 to 2.5 % (1.1 to 1.4°), always to the same one for who keeps to it;
-/// loads tilt a body; a vehicle does not run quite along its axis.
+/// Systematic part that no drive shows (rad). Roads fall to the side by 2 to 2.5 % (1.1 to 1.4°),
+/// to the same side wherever traffic keeps to one; loads tilt a body; a vehicle does not run quite
+/// along its axis.
 const UNSEEN: DVec3 = DVec3::new(1.5 * DEG, 0.5 * DEG, 0.3 * DEG);
-/// How many times the standard deviation of the rough yaw the filter begins with: its own, from the same data, is hardly
-/// counted twice then.
+/// Factor on the standard deviation of the rough yaw for the filter's start: the filter uses the
+/// same data, which are hardly counted twice then.
 const LOOSE: f64 = 3.0;
-/// How many standard deviations the yaw of the filter may be from the rough one.
+/// Largest difference between the filter's yaw and the rough one, in standard deviations.
 const APART: f64 = 4.0;
 /// Banks of roads and leaning bodies are less than this, root mean square (rad).
 const BANKED: f64 = 8.0 * DEG;
@@ -302,7 +303,8 @@ fn moment([before, row, after]: [&Row; 3], pace: Pace) -> Option<Moment> {
     })
 }
 
-/// Where the vehicle goes backwards its front is behind the track's. More of the way is forwards.
+/// Turns the track around where the vehicle goes backwards. Most of the way is assumed to be
+/// forwards.
 fn turn_to_front(moments: &mut [Moment]) -> Result<(), Refused> {
     let is_against = |m: &Moment| (m.q * DVec3::X).x < 0.0;
     let way =
@@ -335,7 +337,8 @@ fn mean(moments: &[Moment]) -> DQuat {
     mean
 }
 
-/// What banks into its turns is an aircraft, whose way says little of its attitude.
+/// Refuses a carrier that banks into its turns: an aircraft, whose track says little of its
+/// attitude.
 fn upright(moments: &[Moment], mean: DQuat) -> Result<(), Refused> {
     let square = moments
         .iter()
@@ -388,7 +391,8 @@ fn of_filter(moments: &[Moment]) -> DVec3 {
 
 /// Times between two velocities whose difference is an acceleration (s).
 const APART_S: (f64, f64) = (0.9, 5.0);
-/// What the accelerations of a vehicle differ from those of its antenna by (m/s²): sway, vibrations, the arm between.
+/// Standard deviation of a vehicle's acceleration from that of its antenna (m/s²): sway, vibration,
+/// lever arm.
 const SWAY: f64 = 0.5;
 /// Slopes of roads (rad): vertical velocities that are worse than this are not believed.
 const SLOPE: f64 = 3.0 * DEG;

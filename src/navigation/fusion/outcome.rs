@@ -29,7 +29,7 @@ pub struct OutageDrift {
     pub outage: Outage,
     /// Fixes that were withheld.
     pub fixes_withheld: usize,
-    /// Whether a fix follows it.
+    /// True if a fix follows it.
     followed_by_fix: bool,
     /// Against the first fix after it (the last withheld one, when none follows).
     pub end_from_fix: Option<Drift>,
@@ -40,7 +40,7 @@ pub struct OutageDrift {
 /// Innovations of the fixes that end outages and gaps, all together: the only ones that the filter was not led to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Ends {
-    /// How many outages and gaps.
+    /// Number of outages and gaps.
     pub count: usize,
     /// Root mean square of the horizontal error over its standard deviation: 1 if right.
     pub error_over_sigma: f64,
@@ -104,9 +104,10 @@ pub struct FromReference {
     pub error_over_sigma: PerState<f64>,
     /// Mean NEES.
     pub nees_mean: f64,
-    /// What it is if both are right.
+    /// Degrees of freedom of the NEES: its mean if both are right.
     nees_dof: usize,
-    /// How well the velocity of the reference is known, which the NEES allows for: root mean square (m/s).
+    /// Root mean square of the standard deviation of the reference's velocity, which the NEES
+    /// includes (m/s).
     pub velocity_sigma_m_s: f64,
     /// Verdict on the errors over their standard deviations.
     pub verdict: Option<DriveVerdict>,
@@ -351,7 +352,7 @@ pub enum Finding {
     Correlated {
         /// Autocorrelation of the innovations from one fix to the next, of position or velocity.
         lag_1: f64,
-        /// How many times the stated standard deviation of position the filter believes.
+        /// Factor on the stated standard deviation of position in the filter.
         pos_sigma_factor: f64,
         /// The same of velocity.
         vel_sigma_factor: f64,
@@ -363,7 +364,7 @@ pub enum Finding {
     },
     /// Minutes in which most fixes are too far from the solution.
     Minutes {
-        /// How many of them.
+        /// Number of such minutes.
         bad: usize,
         /// All minutes with fixes.
         of: usize,
@@ -374,7 +375,7 @@ pub enum Finding {
     },
     /// Mean NIS of what the vehicle knows.
     Aid {
-        /// As [`super::AidInnovations`] has it.
+        /// Name as in [`super::AidInnovations`].
         aid: &'static str,
         /// Divided by the number of components: 1 if right.
         nis_per_component: f64,
@@ -395,7 +396,7 @@ pub enum Finding {
 pub struct Assessment {
     /// The gravest of the findings.
     pub verdict: VerdictKind,
-    /// What was found, the gravest first.
+    /// Findings, the gravest first.
     pub findings: Vec<(VerdictKind, Finding)>,
 }
 
@@ -462,7 +463,7 @@ pub fn assess(
     Assessment { verdict, findings }
 }
 
-/// Whether the fixes contradict a solution.
+/// Returns true if the fixes contradict a solution.
 pub(super) fn is_contradicted(solution: &Solution, of_start: &[(VerdictKind, Finding)]) -> bool {
     let found = [Some(nis(solution)), stretches(solution)];
     of_start
@@ -604,7 +605,7 @@ pub enum FusionError {
     Place {
         /// The first fix after the start (s).
         t_s: f64,
-        /// How far (m).
+        /// Distance (m).
         metres: f64,
         /// Horizontal standard deviation of both (m).
         sigma_m: f64,
@@ -614,13 +615,13 @@ pub enum FusionError {
     Pole {
         /// When (s).
         t_s: f64,
-        /// Where (degrees).
+        /// Latitude (degrees).
         lat_deg: f64,
     },
-    /// What a smoother would have to keep.
+    /// The smoother needs too much memory.
     #[error("the smoother would take {:.1} GB for {marks} rows and fixes of {states} states, 2 GB at most", bytes / 1e9)]
     Memory {
-        /// How much (bytes).
+        /// Its size (bytes).
         bytes: f64,
         /// Rows and fixes.
         marks: f64,
@@ -639,8 +640,8 @@ pub enum FusionError {
 const WEEK_S: f64 = 604_800.0;
 
 impl FusionError {
-    /// How late the fixes are by their clock, where that is why nothing overlaps (s): whole weeks, or what makes both
-    /// recordings begin in the same second.
+    /// Clock delay of the fixes that explains the lack of overlap (s): whole weeks, or the value
+    /// that starts both recordings in the same second.
     pub fn delay_s(&self) -> Option<f64> {
         let Self::Clocks { imu, gnss } = self else {
             return None;

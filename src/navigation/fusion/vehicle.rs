@@ -1,5 +1,5 @@
-//! What a vehicle knows of its own velocity, made from a recording: it moves neither sideways nor up, a wheel turns, it
-//! stands.
+//! Velocity measurements that a vehicle provides: no sideways or vertical motion (NHC), wheel
+//! speed, standstill (ZUPT).
 
 use super::alignment::courses;
 use super::{Recorded, Whiteness, kept};
@@ -14,7 +14,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Speeds below and above which a vehicle stands and moves (m/s).
 const SPEEDS: (f64, f64) = (0.3, 1.0);
-/// How far a speed tells (s).
+/// Time over which a speed is valid (s).
 const REACH_S: f64 = 1.0;
 /// A sample so many times as long as the median one bridges a gap.
 const LONG: f64 = 1.5;
@@ -69,7 +69,7 @@ pub struct AidInnovations {
     pub count: usize,
     /// Mean NIS divided by the number of components: 1 if right.
     pub nis_per_component: f64,
-    /// Where that lies if right, 95 %.
+    /// 95 % band of it for a consistent filter.
     pub nis_band: Band,
     /// Autocorrelation of the innovations from one measurement to the next; none where they are few.
     pub whiteness: Option<Whiteness>,
@@ -147,7 +147,7 @@ pub fn vehicle_velocities(
     all
 }
 
-/// How many times the speed of the fixes a wheel reads where both move: the median; none where they never do.
+/// Median ratio of the wheel's speed to that of the fixes while moving; none where they never move.
 pub fn wheel_ratio(
     recorded: &Recorded<'_>,
     wheel: &[WheelSpeed],
@@ -245,7 +245,7 @@ const KEPT: f64 = 0.9;
 /// Fewest windows at rest that tell the noise.
 const FEWEST: usize = 10;
 
-/// What fixes or a wheel say of an instant.
+/// Motion at an instant according to fixes or a wheel.
 #[derive(Clone, Copy, PartialEq)]
 enum Motion {
     /// It stands.
@@ -353,7 +353,7 @@ impl Standstill {
         window.iter().map(of_sample).sum::<f64>() / degrees(window.len())
     }
 
-    /// Whether a window is one of standstill, of which fixes or a wheel say this.
+    /// Returns true if the vehicle stands still in a window, given the motion by fixes or a wheel.
     fn stands(&self, window: &[ImuIncrement], motion: Motion) -> bool {
         match motion {
             Motion::Still => self.statistic(window) < self.thresholds[0],

@@ -1,4 +1,5 @@
-//! What a covariance analysis says: the figures that runs would scatter about, without a run.
+//! Expected figures by covariance analysis: the values about which runs would scatter, without a
+//! run.
 
 use super::estimate::{Estimate, PerState, QuadraticForm};
 use super::outage::{EpochMetrics, is_beyond_linear, within};

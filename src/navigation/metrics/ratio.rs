@@ -30,9 +30,11 @@ pub struct Measured {
     pub runs: Vec<RunRecord>,
     /// Outages (start, end) (s).
     pub outages: Vec<(f64, f64)>,
-    /// As in [`RunResult`](crate::simulation::RunResult): runs beyond these share their noise.
+    /// Number of independent windows, as in [`RunResult`](crate::simulation::RunResult): more runs
+    /// than these share their noise.
     pub independent_windows: Option<f64>,
-    /// Whether the one run stands for what covariance analysis expects: it has no Monte-Carlo error.
+    /// True if the one run is the expectation of a covariance analysis: it has no Monte-Carlo
+    /// error.
     pub is_expected: bool,
 }
 
@@ -229,9 +231,9 @@ fn root((ratio, half_width_pct): MeanRatio) -> (f64, Option<[f64; 2]>) {
     (pct(root), half.map(interval))
 }
 
-/// How the runs of two experiments belong together.
+/// Correspondence between the runs of two experiments.
 struct Pairing {
-    /// Whether run k of both saw the same noise.
+    /// True if run k of both had the same noise.
     paired: bool,
     /// Independent windows of noise, where they are limited.
     windows: Option<f64>,

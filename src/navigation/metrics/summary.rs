@@ -11,14 +11,14 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::fmt;
 use std::str::FromStr;
 
-/// What the user reads first.
+/// Summary of an experiment: `summary.json`.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Summary {
     /// Layout version.
     pub schema_version: u32,
     /// "monte-carlo", "lincov" or "both".
     pub method: &'static str,
-    /// Whether the filter is as good as it believes.
+    /// Verdict on the filter's consistency.
     pub verdict: Verdict,
     /// Runs, diverged ones included.
     pub runs: u64,
@@ -45,18 +45,19 @@ pub struct Summary {
     pub nis: Nis,
     /// Share of runs inside the filter's ellipsoid of position and attitude.
     pub coverage: Coverage,
-    /// What the reduction to 15 states costs; none where it loses nothing.
+    /// Cost of the reduction to 15 states; none where it loses nothing.
     pub reduction: Option<ReductionQuality>,
     /// Largest error that the strapdown alone makes at the IMU's rate, over the sigma that the filter states; 0 (and not in
     /// files) where the trajectory closes.
     #[serde(skip_serializing_if = "is_zero")]
     pub strapdown_over_sigma: f64,
-    /// What covariance analysis expects, where it stands beside runs.
+    /// Summary by covariance analysis, beside one by runs.
     pub lincov: Option<Box<Summary>>,
-    /// Whether covariance analysis has another verdict, and figures that the runs contradict: errors are no longer small.
+    /// True if covariance analysis gives another verdict and figures that the runs contradict:
+    /// errors are too large for linear theory.
     #[serde(skip)]
     pub is_contradicted: bool,
-    /// What was required, and whether it is met.
+    /// Requirements, each with its result.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub require: Vec<Met>,
 }
@@ -84,7 +85,7 @@ pub struct OutageSummary {
     pub start_s: f64,
     /// First instant with a fix again (s).
     pub end_s: f64,
-    /// Whether the filter is as good at its end as it believes.
+    /// Verdict on the filter's consistency at its end.
     pub verdict: OutageVerdict,
     /// Mean over the outage's epochs of the ASEE.
     pub asee_mean: PerState<f64>,
@@ -120,7 +121,7 @@ pub struct OutageSummary {
     pub log_density_end_std_error: f64,
     /// Horizontal error at the same instant.
     pub horizontal_error_end_m: Spread,
-    /// Whether covariance analysis finds errors in it that are beyond linear theory.
+    /// True if its errors are beyond linear theory by covariance analysis.
     pub beyond_linear: bool,
     /// Time until the error is back to what it was before.
     pub reconvergence_s: Recovery,
@@ -158,7 +159,7 @@ pub struct Recovery {
     pub never: Option<u64>,
 }
 
-/// Whether a chi-square statistic is where a correct filter puts it.
+/// Chi-square statistic with its band for a consistent filter.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Consistency {
     /// Degrees of freedom: what a correct filter's mean is.
@@ -224,7 +225,7 @@ impl Summary {
         }
     }
 
-    /// What is said of epochs alone.
+    /// Summary of the epochs alone.
     pub(super) fn over(
         epochs: &[EpochMetrics],
         verdict: Verdict,
@@ -349,8 +350,9 @@ impl Summary {
             self.contradicts(expected) && self.verdict.kind != expected.verdict.kind;
     }
 
-    /// Whether a figure of the runs (RMSE of every state and NEES at the end of each outage, means over the run of RMSE, NEES
-    /// and coverage) is further from the expected one, in its own Monte-Carlo standard errors, than chance explains.
+    /// Returns true if a figure of the runs (RMSE of every state and NEES at the end of each
+    /// outage, means over the run of RMSE, NEES and coverage) is further from the expected one, in
+    /// Monte-Carlo standard errors, than chance explains.
     fn contradicts(&self, expected: &Self) -> bool {
         let distance = |value: f64, error: f64, expected: f64| (value - expected) / error;
         let v = &self.verdict;
@@ -388,7 +390,7 @@ impl Summary {
 /// A ratio of RMSE to standard deviation that is further from 1 at the end of an outage deserves a warning.
 pub const TOLERANCE: f64 = 0.1;
 
-/// What the covariance analysis says of the reduced filter where the model is true.
+/// Quality of the reduced filter by covariance analysis, with the model as truth.
 #[derive(Debug, Clone, Serialize)]
 pub struct ReductionQuality {
     /// True RMSE over the filter's own standard deviation at the end of each outage: above 1 it is
@@ -477,18 +479,18 @@ pub struct Requirement {
 /// Position and velocity down among the reported states.
 const DOWN: [usize; 2] = [2, 5];
 
-/// Whether a requirement is met, and by how much.
+/// Requirement with its result and margin.
 #[derive(Debug, Clone, Serialize)]
 pub struct Met {
     /// The figure.
     pub name: String,
     /// The most it may be.
     pub limit: f64,
-    /// What it is, at its worst.
+    /// Its largest value.
     pub value: f64,
     /// The outage at whose end that is (from 0); none: the mean over the run.
     pub outage: Option<usize>,
-    /// Whether it is within the limit, and a covariance analysis alone can say so.
+    /// True if it is within the limit; by covariance analysis, only where linear theory holds.
     pub met: bool,
     /// The outage (from 0) in which errors are beyond linear theory, where covariance analysis would call the limit met and cannot, for
     /// want of what comes after that outage, or where runs decide in its place.
@@ -529,7 +531,7 @@ impl FromStr for Requirement {
 }
 
 impl Requirement {
-    /// Whether it says anything only of outages.
+    /// Returns true for a figure that exists only with outages.
     pub const fn needs_outage(&self) -> bool {
         matches!(self.figure, Figure::P50 | Figure::P95)
     }

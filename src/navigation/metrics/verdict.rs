@@ -1,15 +1,17 @@
-//! Whether a filter is as good as it believes: one verdict, from the normalised errors of all runs.
+//! Verdict on the consistency of a filter, from the normalised errors of all runs.
 //!
-//! Statistics: NEES and (error/SEE)² of every reported state, as means over the whole run and at the end of
-//! each outage. Of a right filter each is a mean of chi-square variables, one of 9 or of 1 degree of freedom
-//! for each independent sample. Of simulated runs that is a run: the epochs of one run hang together, so a mean
-//! over epochs is given the freedom of a single epoch, an interval that holds whatever their correlation and is exact
-//! at the ends of outages. Of one recorded drive the errors themselves show how long they last
-//! ([`SampleSize::of_series`]). All statistics together alarm on a right filter with probability 1 % at most
-//! (Bonferroni), and what is significant but smaller than 10 % is let pass.
+//! Statistics: NEES and (error/SEE)² of every reported state, as means over the whole run and at
+//! the end of each outage. For a consistent filter each is a mean of chi-square variables, with 9
+//! or 1 degrees of freedom per independent sample. For simulated runs a sample is a run: the epochs
+//! of one run are correlated, so a mean over epochs gets the degrees of freedom of a single epoch,
+//! an interval that holds for any correlation and is exact at the ends of outages. For one recorded
+//! drive the errors themselves show their correlation time ([`SampleSize::of_series`]). All
+//! statistics together alarm on a consistent filter with probability 1 % at most (Bonferroni), and
+//! a significant difference below 10 % is not reported.
 //!
-//! A filter that does not alarm is consistent only where the samples would have found errors that matter: 25 % above the
-//! filter's standard deviations in all states together, 50 % in one of them. Fewer samples leave it undecided.
+//! A filter without an alarm is consistent only if the samples would have detected relevant errors:
+//! 25 % above the filter's standard deviations in all states together, 50 % in one of them. With
+//! fewer samples the verdict is undecided.
 
 use super::estimate::{Estimate, PerState, SampleSize, chi_square_interval};
 use crate::simulation::{NEES_DOF, OutageRecord, REPORTED, REPORTED_NAMES, RunRecord, TOLERANCE};
@@ -363,12 +365,12 @@ impl Verdict {
         })
     }
 
-    /// Whether it rests on covariance analysis, not on runs.
+    /// Returns true if it rests on covariance analysis instead of runs.
     pub fn is_expected(&self) -> bool {
         self.basis == Basis::Expectation
     }
 
-    /// Whether the errors are of another order than the filter believes.
+    /// Returns true if the errors exceed the filter's sigma by an order of magnitude.
     pub fn is_far_off(&self) -> bool {
         self.nees > FAR
     }
@@ -541,7 +543,7 @@ impl Judge {
         enough
     }
 
-    /// Whether a statistic is significantly and materially off.
+    /// Verdict of a statistic that is off both significantly and materially; else none.
     fn fault(statistic: &Statistic) -> Option<VerdictKind> {
         let (lower, upper) = statistic.limits;
         let ratio = statistic.ratio.value;

@@ -9,7 +9,7 @@ use crate::units::Refused;
 use crate::wavelet::haar;
 use rand::RngExt;
 
-/// What makes the errors of the true IMU.
+/// Source of the true IMU's errors.
 #[derive(Debug, Clone, Copy)]
 pub enum Truth<'a> {
     /// Synthesised from a model, per run and axis.
@@ -42,9 +42,9 @@ pub enum TruthError {
     TooShort {
         /// Name of the recording.
         recording: String,
-        /// How long it lasts (s).
+        /// Its length (s).
         has_s: f64,
-        /// How long the trajectory lasts (s).
+        /// Length of the trajectory (s).
         needs_s: f64,
     },
 }
@@ -84,8 +84,8 @@ impl Truth<'_> {
         }
     }
 
-    /// How many windows of `samples` samples the recordings hold side by side: runs beyond these share noise
-    /// with others. None for a model, which gives every run noise of its own.
+    /// Number of disjoint windows of `samples` samples in the recordings: more runs than these
+    /// share noise. None for a model, which gives every run its own noise.
     pub(crate) fn independent_windows(&self, samples: usize) -> Option<f64> {
         match self {
             Self::Model(_) | Self::Drawn(_) => None,

@@ -322,7 +322,7 @@ impl Assessment {
     }
 }
 
-/// What eight runs report at one epoch.
+/// Reported values of eight runs at one epoch.
 struct EpochLanes {
     t_s: f64,
     gnss: bool,
@@ -336,7 +336,7 @@ struct EpochLanes {
 }
 
 impl EpochLanes {
-    /// What the first `live` lanes report at an event.
+    /// Reported values of the first `live` lanes at an event.
     fn of(ekf: &Ekf, live: usize, plan: &Plan<'_>, event: &Event) -> Self {
         let found = Assessment::of(ekf, live, &event.reference);
         let states: [usize; COVERAGE_DOF] =

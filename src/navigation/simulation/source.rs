@@ -1,4 +1,4 @@
-//! What is random of eight runs: starts, inertial errors, fixes, heights, what a vehicle measures of itself.
+//! Random quantities of eight runs: starts, inertial errors, fixes, heights, aiding measurements.
 
 use super::plan::{Aided, Event, Plan};
 use crate::earth::moved;
@@ -19,7 +19,7 @@ use crate::units::DEG;
 use glam::{DQuat, DVec3};
 use std::ops::Range;
 
-/// What eight runs measure at an instant.
+/// Measurements of eight runs at an instant.
 pub(super) struct Measured {
     pub fix: Option<Fix>,
     pub height: Option<Lanes>,
@@ -159,7 +159,7 @@ impl<'a> Source<'a> {
         Some(h)
     }
 
-    /// What the vehicle measures of itself at this epoch.
+    /// Aiding measurements of the vehicle at this epoch.
     fn aids(&mut self, event: &Event) -> Vec<(Aid, Vec3)> {
         let after_s = event.sample as f64 / self.rate_hz;
         let mut measure = |aided: &Aided| {
@@ -219,7 +219,7 @@ fn nominal_start(plan: &Plan<'_>, key: StreamKey<'_>) -> NavState {
 
 // One run as its sensors record it: the data that fusion reads, made by the machinery of the runs.
 
-/// What was recorded, and where the filter would start.
+/// Recorded measurements of one run, and the initial state of its filter.
 #[derive(Debug, Clone)]
 pub struct Recording {
     /// Samples, increments over the interval that ends at their time.
@@ -233,7 +233,7 @@ pub struct Recording {
 /// Samples whose errors are drawn at a time.
 const BLOCK: usize = 4096;
 
-/// What the sensors record in a run: the same noise as the run itself has.
+/// Records the sensors in a run, with the same noise as in the run itself.
 pub fn record(plan: &Plan<'_>, run: u64) -> Recording {
     let mut source = Source::new(plan, run, 1);
     let fix = |event: &Event| {

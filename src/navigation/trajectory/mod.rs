@@ -43,7 +43,7 @@ pub enum Error {
     /// A spline needs four samples.
     #[error("{found} samples: a trajectory needs at least 4")]
     TooFew {
-        /// How many were given.
+        /// Number of samples.
         found: usize,
     },
     /// NaN or infinity.

@@ -1,5 +1,5 @@
-//! Whether a trajectory could be a vehicle's: speed, acceleration, jerk and angular rate within limits,
-//! velocities that agree with positions.
+//! Plausibility of a trajectory: limits on speed, acceleration, jerk and angular rate; velocities
+//! that agree with positions.
 
 use super::Trajectory;
 use crate::linalg::{by_value, larger};
@@ -12,7 +12,8 @@ const JERK_WINDOW_S: f64 = 0.1;
 /// Excesses nearer than this to one another are one (s).
 const SAME_EVENT_S: f64 = 1.0;
 
-/// What has a limit, and its unit: speed, acceleration, change of acceleration over 0.1 s, angular rate.
+/// Limited quantities and their units: speed, acceleration, change of acceleration over 0.1 s,
+/// angular rate.
 const QUANTITIES: [(&str, &str); 4] = [
     ("speed", "m/s"),
     ("acceleration", "m/s²"),
@@ -20,8 +21,8 @@ const QUANTITIES: [(&str, &str); 4] = [
     ("angular rate", "deg/s"),
 ];
 
-/// What no land vehicle does, nor an aircraft that is not aerobatic: 350 m/s, 30 m/s², 35 m/s³, 200 deg/s. Recorded
-/// drives stay below 25 m/s³ but for glitches of the recording.
+/// Limits that no land vehicle and no aircraft outside aerobatics exceeds: 350 m/s, 30 m/s², 35
+/// m/s³, 200 deg/s. Recorded drives stay below 25 m/s³ but for glitches of the recording.
 pub const LIMITS: [f64; 4] = [350.0, 30.0, 35.0, 200.0];
 
 /// A stretch beyond a limit.
@@ -155,7 +156,8 @@ impl VelocityMisfit {
         })
     }
 
-    /// Whether they contradict the positions: 0.1 m/s + 2 % of the speed in the mean, or 1 m/s + 10 % once.
+    /// Returns true if they contradict the positions: 0.1 m/s + 2 % of the speed in the mean, or 1
+    /// m/s + 10 % once.
     pub fn contradicts(&self) -> bool {
         self.rms > 0.1 + 0.02 * self.rms_speed || self.worst > 1.0 + 0.1 * self.rms_speed
     }

@@ -28,14 +28,14 @@ use serde::{Deserialize, Deserializer};
 /// A motion profile.
 #[derive(Debug, Clone)]
 pub struct Profile {
-    /// Where and how it starts.
+    /// Initial state.
     pub start: Start,
-    /// What the vehicle does with its roll angle.
+    /// Roll angle in turns.
     pub bank: Bank,
     /// Time over which accelerations and rates build up and fade (s), unless a segment says otherwise or
     /// is shorter than twice that.
     pub ramp_s: f64,
-    /// What it does, in order.
+    /// Segments, in order.
     pub segments: Vec<Segment>,
 }
 
@@ -89,7 +89,7 @@ pub enum Bank {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Segment {
-    /// What happens.
+    /// Kind of motion.
     #[serde(flatten)]
     pub kind: Kind,
     /// Height gained over the segment (m), negative downwards.
@@ -100,7 +100,7 @@ pub struct Segment {
     pub ramp_s: Option<f64>,
 }
 
-/// What happens in a segment (angles in rad; in files degrees).
+/// Motion in a segment (angles in rad; in files degrees).
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum Kind {
@@ -112,7 +112,7 @@ pub enum Kind {
         #[serde(rename = "to_speed_m_s")]
         #[schemars(with = "NonNegative")]
         to_speed: f64,
-        /// How fast.
+        /// Acceleration or duration.
         #[serde(flatten)]
         by: Acceleration,
     },
@@ -121,7 +121,7 @@ pub enum Kind {
         /// By how much, positive to the right.
         #[serde(rename = "angle_deg", deserialize_with = "degrees")]
         angle: f64,
-        /// How fast.
+        /// Turn rate, radius or duration.
         #[serde(flatten)]
         by: Turning,
     },
@@ -129,7 +129,7 @@ pub enum Kind {
     Climb {
         /// Height gained (m).
         height_m: f64,
-        /// How long it is.
+        /// Duration or distance.
         #[serde(flatten)]
         by: Length,
     },
@@ -149,7 +149,7 @@ pub enum Kind {
         /// The points; the path ends at the last and passes inside the others.
         #[schemars(length(min = 1))]
         points: Vec<Waypoint>,
-        /// How fast the turns are.
+        /// Rate or radius of the turns.
         #[serde(flatten)]
         by: Turning,
     },
@@ -160,7 +160,7 @@ const fn braking() -> f64 {
     1.5
 }
 
-/// How long a straight is.
+/// Length of a straight.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 pub enum Length {
     /// In time (s).
@@ -171,7 +171,7 @@ pub enum Length {
     Distance(#[schemars(with = "Positive")] f64),
 }
 
-/// How fast speed changes.
+/// Rate of a speed change.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 pub enum Acceleration {
     /// Within a time (s).
@@ -182,7 +182,7 @@ pub enum Acceleration {
     Peak(#[schemars(with = "Positive")] f64),
 }
 
-/// How fast heading changes.
+/// Rate of a heading change.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 pub enum Turning {
     /// Within a time (s).
@@ -247,7 +247,7 @@ impl Profile {
 pub struct Error {
     /// Which segment, counted from 0; none for the profile's own keys and its start.
     pub segment: Option<usize>,
-    /// What is wrong.
+    /// The problem.
     pub problem: Problem,
 }
 
@@ -876,7 +876,7 @@ impl Path<'_> {
         Err(Problem::new("points", text).advise(NEARER))
     }
 
-    /// What is left to turn (rad) to the target after a turn by an angle.
+    /// Angle that remains to the target after a turn by `angle` (rad).
     fn miss(&self, angle: f64, target: [f64; 2], by: Turning, ramp_s: f64) -> Result<f64, Problem> {
         let [chord, _] = self.corner(angle, by, ramp_s)?;
         let (sin_psi, cos_psi) = (self.heading + 0.5 * angle).sin_cos();
