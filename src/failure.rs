@@ -1,7 +1,7 @@
 //! Errors as the user reads them, with their exit codes.
 
 use clap::error::ContextKind;
-use nav_sim_calibration::{CalibrationError, Cause};
+use nav_sim_calibration::{CalibrationError, CalibrationFault};
 use nav_sim_navigation::sensors::imu::TruthError;
 use nav_sim_navigation::sensors::outage::OutageError;
 use nav_sim_navigation::simulation::ExperimentError;
@@ -448,16 +448,18 @@ impl From<ExperimentError> for Failure {
 impl From<CalibrationError> for Failure {
     fn from(e: CalibrationError) -> Self {
         let hint = match e.cause {
-            Cause::TooShort => "fewer --scales, or record for longer",
-            Cause::TooFewScales => "record for longer, or a --model with fewer processes",
-            Cause::NotPositive => {
+            CalibrationFault::TooShort => "fewer --scales, or record for longer",
+            CalibrationFault::TooFewScales => {
+                "record for longer, or a --model with fewer processes"
+            }
+            CalibrationFault::NotPositive => {
                 "the signal is quantised so coarsely that scales are silent: --estimator awv, or another range"
             }
-            Cause::Trim => "a smaller --trim, or --estimator sr-awv",
-            Cause::NoSlope => {
+            CalibrationFault::Trim => "a smaller --trim, or --estimator sr-awv",
+            CalibrationFault::NoSlope => {
                 "--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm"
             }
-            Cause::Other => return Self::input(e),
+            CalibrationFault::Other => return Self::input(e),
         };
         Self::input(e).hint(hint)
     }

@@ -3,7 +3,7 @@
 use crate::error;
 use crate::work::work;
 use nav_sim::app::{Answer as _, Answered, Context, Failure};
-use nav_sim::commands::batch::{BatchRequest, Outcome};
+use nav_sim::commands::batch::{BatchOutcome, BatchRequest};
 use nav_sim::document::Importance;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -171,11 +171,11 @@ pub(crate) fn study_run(
         (outcome, meter.warnings())
     })?;
     let outcome = outcome.and_then(|outcome| match outcome.unmet() {
-        Some(failure) if matches!(outcome, Outcome::Stopped { .. }) => Err(failure),
+        Some(failure) if matches!(outcome, BatchOutcome::Stopped { .. }) => Err(failure),
         _ => Ok(outcome),
     });
     let answer = match outcome.map_err(|e| error::of_failure(py, &e, ""))? {
-        Outcome::Merged(answer) => {
+        BatchOutcome::Merged(answer) => {
             let answered = Answered {
                 json: serde_json::to_string(&*answer).unwrap_or_default(),
                 document: answer.document(),

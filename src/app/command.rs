@@ -2,7 +2,7 @@
 //! studies) become it by the same parser, so that both are refused in the same words.
 
 use super::{Context, Failure, Front, Input, Refuse, Result, refused};
-use crate::io::atomic::{AtomicDir, Claim, Found, claim_directory, claim_file};
+use crate::io::atomic::{AtomicDir, Claim, DirectoryState, claim_directory, claim_file};
 use crate::io::{atomic, input, suggest};
 use crate::parse;
 use crate::report::json;
@@ -610,14 +610,14 @@ impl<C: Command> Asked<C> {
                 let recognise = |text: &str| {
                     let there = present(text).filter(|there| there.name == C::NAME);
                     let Some(there) = there else {
-                        return Found::Foreign;
+                        return DirectoryState::Foreign;
                     };
                     let is_own = |name: &str| there.outputs.contains_key(name);
                     let mut others = names.iter().filter(|name| !is_own(name));
                     match others.any(|name| out.join(name.as_ref()).exists()) {
-                        true => Found::Foreign,
-                        false if there.key == manifest.key => Found::Same,
-                        false => Found::Other,
+                        true => DirectoryState::Foreign,
+                        false if there.key == manifest.key => DirectoryState::Same,
+                        false => DirectoryState::Other,
                     }
                 };
                 let own = [PAGE, MANIFEST].map(Cow::Borrowed);

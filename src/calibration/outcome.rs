@@ -4,7 +4,7 @@ use crate::curve::{CalibrationError, Estimator, Pool, Scope, Trim, implied};
 use crate::fit::{Fit, Weighting, avlr, refit, score};
 use crate::imu::Axis;
 use crate::model::{ModelSpec, SpecError};
-use crate::noise::practical::{Minimum, Pair};
+use crate::noise::practical::{AllanMinimum, Pair};
 use crate::noise::{Composite, Model, ParameterRef};
 use crate::wavelet::{Curve, Tuning};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -41,7 +41,7 @@ pub struct Outcome {
     /// Specification of the model.
     pub spec: ModelSpec,
     /// Ranking by which the specification was chosen, if it was.
-    pub ranking: Option<Ranking>,
+    pub ranking: Option<ModelRanking>,
     /// The curve that was fitted.
     pub curve: Curve,
     /// The model.
@@ -274,7 +274,7 @@ pub struct Practical {
     /// N and K, of the policy "matched" over the default horizon.
     pub walk: Pair,
     /// B.
-    pub minimum: Option<Minimum>,
+    pub minimum: Option<AllanMinimum>,
     /// 95 % intervals of N, K and B.
     pub intervals: PracticalIntervals,
     /// Longest averaging time that was observed (s): how far a minimum was looked for.
@@ -429,7 +429,7 @@ pub struct Indistinct {
 
 /// A model that was tried.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
+pub struct ModelCandidate {
     /// The model.
     pub spec: ModelSpec,
     /// Σ Omega_j (nu_j − nu_j(theta))².
@@ -443,7 +443,7 @@ pub struct Candidate {
     pub j_p_value: Option<f64>,
 }
 
-impl Candidate {
+impl ModelCandidate {
     /// Returns true if the model was tested and does not describe the curve.
     pub fn is_rejected(&self) -> bool {
         self.j_p_value.is_some_and(|p| p < LEVEL)
@@ -457,9 +457,9 @@ impl Candidate {
 
 /// The candidates and the choice.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Ranking {
+pub struct ModelRanking {
     /// The candidates, the least WVIC first.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<ModelCandidate>,
     /// Index of the chosen one.
     pub chosen: usize,
     /// The largest simpler model that does not do as well as the chosen one, and the probability of so large a difference of
@@ -495,7 +495,7 @@ const IMPOSSIBLE: f64 = 1e-4;
 
 /// A curve against its model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Departure {
+pub struct CurveDeparture {
     /// Scales that count in the fit.
     pub scales: usize,
     /// Scales at which the model is off by more than four standard deviations.
@@ -509,7 +509,7 @@ pub struct Departure {
     pub misfit: Option<Miss>,
 }
 
-impl Departure {
+impl CurveDeparture {
     fn of(all: &[Miss], goodness: Option<Goodness>) -> Self {
         let beyond = |all: &[Miss], deviations: f64| -> Vec<Miss> {
             let is_beyond = |m: &&Miss| m.deviations.abs() > deviations;
@@ -553,7 +553,7 @@ fn furthest(all: &[Miss]) -> Option<Miss> {
 
 impl Outcome {
     /// The curve against the model.
-    pub fn departure(&self) -> Departure {
+    pub fn departure(&self) -> CurveDeparture {
         let curve = &self.curve;
         let implied = implied(&self.fit.composite, curve);
         let data = curve.wv.iter().zip(&curve.edof).zip(implied);
@@ -567,7 +567,7 @@ impl Outcome {
             is_known: (2.0 / edof).sqrt() <= KNOWN,
         };
         let all: Vec<Miss> = curve.levels.iter().zip(data).map(miss).collect();
-        Departure::of(&all, self.goodness())
+        CurveDeparture::of(&all, self.goodness())
     }
 
     /// Goodness of fit of the model, if it was tested.
@@ -588,7 +588,7 @@ impl Outcome {
 
 #[cfg(test)]
 mod departure_tests {
-    use super::{Departure, Miss, chance};
+    use super::{CurveDeparture, Miss, chance};
     use crate::fit::score;
     use crate::pipeline::fit_given;
     use crate::wavelet::Curve;
@@ -610,7 +610,7 @@ mod departure_tests {
                 })
                 .collect()
         };
-        let departure = |deviations| Departure::of(&off(deviations), None);
+        let departure = |deviations| CurveDeparture::of(&off(deviations), None);
         let allowed = departure(-1.0);
         assert!(
             (chance(&off(-1.0)) - 0.4457).abs() < 5e-5 && allowed.misfit.is_none(),
@@ -626,7 +626,7 @@ mod departure_tests {
             "{impossible:?}"
         );
         assert_eq!(impossible.misfit.unwrap().level, 12);
-        assert_eq!(Departure::of(&off(1.0)[..8], None).known_to, None);
+        assert_eq!(CurveDeparture::of(&off(1.0)[..8], None).known_to, None);
     }
 
     /// White noise, exact but for a fifth more at one scale: missed where recordings are alike, not where they differ by as much.

@@ -16,7 +16,7 @@ use crate::curve::{CalibrationError, Estimator, Group, implied, p_value};
 use crate::fit::{Fit, Weighting, fit, refit, too_few_scales};
 use crate::model::ModelSpec;
 use crate::noise::Kind;
-use crate::outcome::{Advance, Candidate, ModelChoice, Ranking, Settings};
+use crate::outcome::{Advance, ModelCandidate, ModelChoice, ModelRanking, Settings};
 use crate::uncertainty::bootstrap::CurveSampler;
 use crate::wavelet::Curve;
 use rayon::prelude::*;
@@ -73,7 +73,7 @@ pub(crate) fn choose(
     curve: &Curve,
     settings: &Settings,
     advance: Advance<'_>,
-) -> Result<(ModelSpec, Ranking), CalibrationError> {
+) -> Result<(ModelSpec, ModelRanking), CalibrationError> {
     let stage = ModelChoice::Auto.steps() / ModelChoice::STAGES;
     // One weighting for all candidates, whatever their models expect.
     let reported = settings;
@@ -92,7 +92,7 @@ pub(crate) fn choose(
         .filter(|(_, f)| f.zero.is_empty() && f.at_end.is_empty())
         .collect();
     advance(stage);
-    let field = Field {
+    let field = CandidateSet {
         group,
         estimator,
         curve,
@@ -128,7 +128,7 @@ fn found(tested: &[(usize, f64)], i: usize) -> Option<f64> {
 }
 
 /// The candidates, with all that their comparison needs.
-struct Field<'a> {
+struct CandidateSet<'a> {
     group: &'a Group,
     estimator: Estimator,
     curve: &'a Curve,
@@ -139,8 +139,8 @@ struct Field<'a> {
     fits: Vec<(ModelSpec, Fit)>,
 }
 
-impl Field<'_> {
-    fn rank(&self, stage_done: &dyn Fn()) -> Option<(ModelSpec, Ranking)> {
+impl CandidateSet<'_> {
+    fn rank(&self, stage_done: &dyn Fn()) -> Option<(ModelSpec, ModelRanking)> {
         let nearest = (0..self.fits.len())
             .min_by(|a, b| self.objective(*a).total_cmp(&self.objective(*b)))?;
         // One set of curves for all candidates: their optimisms are then compared on the same noise.
@@ -170,14 +170,14 @@ impl Field<'_> {
             }
         }
         order(&mut ranked);
-        let candidate = |&(i, optimism): &(usize, f64)| Candidate {
+        let candidate = |&(i, optimism): &(usize, f64)| ModelCandidate {
             spec: self.fits[i].0.clone(),
             objective: self.objective(i),
             optimism,
             p_value: found(&trials.simpler, i),
             j_p_value: found(&trials.whole, i),
         };
-        let candidates: Vec<Candidate> = ranked.iter().map(candidate).collect();
+        let candidates: Vec<ModelCandidate> = ranked.iter().map(candidate).collect();
         let place = ranked.iter().position(|(i, _)| *i == chosen)?;
         let too_simple = trials.simpler.iter().rev();
         let too_simple = too_simple
@@ -186,7 +186,7 @@ impl Field<'_> {
         let spec = |i: usize| self.fits[i].0.clone();
         Some((
             spec(chosen),
-            Ranking {
+            ModelRanking {
                 candidates,
                 chosen: place,
                 too_simple: too_simple.map(|(i, p)| (spec(i), p)),

@@ -30,7 +30,7 @@ struct Cli {
     #[command(flatten)]
     common: Common,
     #[command(subcommand)]
-    command: Command,
+    command: CliCommand,
 }
 
 macro_rules! driven {
@@ -54,19 +54,19 @@ with_commands!(driven);
 
 #[derive(Subcommand)]
 #[expect(clippy::large_enum_variant, reason = "there is one, once a process")]
-enum Command {
+enum CliCommand {
     #[command(flatten)]
     Driven(Driven),
     Trajectory(TrajectoryArgs),
-    Batch(batch::Args),
-    Demo(demo::Args),
+    Batch(batch::BatchArgs),
+    Demo(demo::DemoArgs),
     Init(InitArgs),
     Schema(SchemaArgs),
     Completions(CompletionsArgs),
     Man(ManArgs),
 }
 
-impl Command {
+impl CliCommand {
     /// True if the command itself ends in good order at a signal.
     const fn heeds_signals(&self) -> bool {
         matches!(self, Self::Batch(_))
@@ -336,11 +336,11 @@ Examples:
 struct SchemaArgs {
     /// Which file
     #[arg(value_enum)]
-    of: Kind,
+    of: SchemaKind,
 }
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug)]
-enum Kind {
+enum SchemaKind {
     /// All settings of a run (`nav-sim run --scenario`)
     Scenario,
     /// A grid of experiments (`nav-sim batch`)
@@ -359,14 +359,14 @@ fn schema(args: &SchemaArgs) -> String {
     crate::report::json(&schema_of(args.of))
 }
 
-fn schema_of(of: Kind) -> serde_json::Value {
+fn schema_of(of: SchemaKind) -> serde_json::Value {
     match of {
-        Kind::Scenario => schemars::schema_for!(Scenario).to_value(),
-        Kind::Study => schemars::schema_for!(Study).to_value(),
-        Kind::Model => model_file::schema(),
-        Kind::Initial => fusion_files::initial_schema(),
-        Kind::Profile => trajectory_file::profile_schema(),
-        Kind::Contamination => contamination_file::schema(),
+        SchemaKind::Scenario => schemars::schema_for!(Scenario).to_value(),
+        SchemaKind::Study => schemars::schema_for!(Study).to_value(),
+        SchemaKind::Model => model_file::schema(),
+        SchemaKind::Initial => fusion_files::initial_schema(),
+        SchemaKind::Profile => trajectory_file::profile_schema(),
+        SchemaKind::Contamination => contamination_file::schema(),
     }
 }
 

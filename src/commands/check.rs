@@ -7,7 +7,7 @@ use crate::io::Place;
 use crate::io::file_kind::{self, FileKind};
 use crate::io::fusion_files::{ImuFile, read_gnss, read_imu, read_initial};
 use crate::io::recordings::Gaps;
-use crate::io::toml_file::Source;
+use crate::io::toml_file::TomlSource;
 use crate::io::{contamination_file, curve_file, datasheet, scenario_file};
 use crate::parse;
 use crate::report::six_digits;
@@ -105,7 +105,7 @@ fn drive(imu: &ImuFile, context: &Context<'_>) -> String {
 fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<String> {
     let beside = path.parent().unwrap_or(Path::new(""));
     let found = match file_kind::of(path)? {
-        FileKind::Scenario => match Source::read(path)?.table()?.is_empty() {
+        FileKind::Scenario => match TomlSource::read(path)?.table()?.is_empty() {
             true => "an empty file; as a scenario, all defaults",
             false => scenario_file::read(path).map(|_| "a scenario")?,
         },

@@ -9,7 +9,7 @@ use crate::report::csv::{csv, flat, merged};
 use crate::report::verdict::{SPOKEN, axis_of, tone, verdict_counts};
 use crate::report::{in_order, some};
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
+    Cell, Chart, ChartAxis, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
     window,
 };
 use nav_sim_navigation::metrics::{self, OutageComparison, PerState, StateRatio};
@@ -436,7 +436,7 @@ impl Comparison {
                 )
             };
             let zero = Series::new("", Colour::Ink, Mark::Level(0.0));
-            let axis = Axis::linear(&format!("{}: (ratio − 1)·100 (%)", SPOKEN[*state]))
+            let axis = ChartAxis::linear(&format!("{}: (ratio − 1)·100 (%)", SPOKEN[*state]))
                 .including(-1.0, 1.0);
             let series = std::iter::once(zero)
                 .chain(others.iter().enumerate().map(line))

@@ -5,7 +5,7 @@ use crate::app::{Answer, Command, Context, Result};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::logs;
 use nav_sim_document::{Document, Importance, Table, Tone, six_digits};
-use nav_sim_logs::{Channel, Content, Error, Log, Stamp};
+use nav_sim_logs::{Content, Log, LogChannel, LogError, Stamp};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -110,7 +110,7 @@ pub fn inspect(path: &Path, stamp: Stamp) -> Result<Inspection> {
     })
 }
 
-fn inspected(log: &Log, channel: &Channel, stamp: Stamp) -> Result<InspectedChannel, Error> {
+fn inspected(log: &Log, channel: &LogChannel, stamp: Stamp) -> Result<InspectedChannel, LogError> {
     let (content, units, stamps) = match channel.content {
         _ if channel.messages == 0 => ("other", None, Vec::new()),
         Content::Imu => (

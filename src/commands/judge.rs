@@ -7,7 +7,8 @@ use crate::parse::numbers;
 use crate::report::json;
 use crate::report::verdict::{drive_line, tone};
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, readable, window,
+    Cell, Chart, ChartAxis, Colour, Document, Importance, Mark, Panel, Series, Table, readable,
+    window,
 };
 use nav_sim_navigation::fusion::judge::{
     Doubt, Judgement, ReferenceOffset, StatedErrors, judge, rough_delay_s,
@@ -335,7 +336,7 @@ fn charts(judgement: &Judgement, outages: &[(f64, f64)]) -> Vec<Chart> {
             Series::new("3 σ", Colour::BELIEVED, Mark::Band(band.collect())),
             Series::line("error", Colour::REAL, line.collect()),
         ];
-        let panel = Panel::new(Axis::linear(REPORTED_NAMES[i]), series);
+        let panel = Panel::new(ChartAxis::linear(REPORTED_NAMES[i]), series);
         Chart::over_time(REPORTED_NAMES[i], vec![panel], outages).small()
     };
     known.map(chart).collect()

@@ -11,8 +11,8 @@ use crate::report::csv::merged;
 use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds, window};
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
-    Answer as Bound, Course, Drift, ImuParameters, Limit, Margins, Need, Quantity, RequireError,
-    Worst, evenly,
+    Course, Drift, ImuParameters, ImuSearch, IntensityBound as Bound, Limit, LimitQuantity,
+    Margins, RequireError, Worst, evenly,
 };
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::aiding::AidingSettings;
@@ -245,7 +245,7 @@ impl Requirements {
         Ok(PlainAnswer::new(json, document).judged(unmet))
     }
 
-    fn verdict(&self, judgement: &Judgement, outages: &[Outage]) -> Vec<String> {
+    fn verdict(&self, judgement: &LimitResult, outages: &[Outage]) -> Vec<String> {
         let longest = &judgement.outage.text;
         let Some(margins) = &judgement.margins else {
             let (limits, starts) = (self.limits_in_words(), starts(outages));
@@ -388,14 +388,14 @@ impl Requirements {
 }
 
 /// A quantity and its unit, for axes and heads.
-const fn quantity_in_words(quantity: Quantity) -> &'static str {
+const fn quantity_in_words(quantity: LimitQuantity) -> &'static str {
     match quantity {
-        Quantity::P50 => "horizontal error, median (m)",
-        Quantity::P95 => "horizontal error, 95 % quantile (m)",
-        Quantity::Rmse => "horizontal error, RMSE (m)",
-        Quantity::Roll => "roll, RMSE (°)",
-        Quantity::Pitch => "pitch, RMSE (°)",
-        Quantity::Yaw => "yaw, RMSE (°)",
+        LimitQuantity::P50 => "horizontal error, median (m)",
+        LimitQuantity::P95 => "horizontal error, 95 % quantile (m)",
+        LimitQuantity::Rmse => "horizontal error, RMSE (m)",
+        LimitQuantity::Roll => "roll, RMSE (°)",
+        LimitQuantity::Pitch => "pitch, RMSE (°)",
+        LimitQuantity::Yaw => "yaw, RMSE (°)",
     }
 }
 
@@ -505,7 +505,7 @@ impl Requirements {
         let outages = self.outages();
         let course = self.course(&outages)?;
         let scenario = &self.with_stated_turn_on();
-        let need = Need {
+        let need = ImuSearch {
             course: &course,
             scenario,
             limits: &self.limits,
@@ -618,7 +618,7 @@ impl Requirements {
     ///
     /// # Errors
     /// When the model has no filter.
-    fn judged(&self, scenario: &Scenario, model: &Model) -> Result<Judgement, RequireError> {
+    fn judged(&self, scenario: &Scenario, model: &Model) -> Result<LimitResult, RequireError> {
         let (curves, outage, worst) = self.bridged(scenario, model)?;
         // of one set of starts: with fewer starts for longer outages the worst of them would fall
         let lasts = |length_s: &u32| !after(&curves, f64::from(*length_s)).is_empty();
@@ -647,7 +647,7 @@ impl Requirements {
             (Some(margins), Some(shown))
         };
         let beyond_linear = shown.map(|outage| self.beyond_linear(scenario, model, outage));
-        Ok(Judgement {
+        Ok(LimitResult {
             curves: self.limits.iter().map(of_limit).collect(),
             outage,
             beyond_linear: beyond_linear.transpose()?.flatten(),
@@ -932,7 +932,7 @@ type Bridged = (Vec<Vec<Drift>>, Longest, Option<Worst>);
 
 /// Result of a model against the limits.
 #[derive(Debug, Serialize)]
-struct Judgement {
+struct LimitResult {
     outage: Longest,
     /// The quantity of each limit, at its worst place, after outages of growing length: of the places that allow them all.
     curves: Vec<Value>,

@@ -1,7 +1,7 @@
 //! Where outages are tried.
 
 use super::*;
-use nav_sim_navigation::require::Quantity;
+use nav_sim_navigation::require::LimitQuantity;
 use nav_sim_navigation::trajectory::TrajectorySample;
 
 /// At rest from 1000 s on, for so long.
@@ -15,7 +15,7 @@ fn at_rest(lasts_s: f64, ask: Ask, first_s: Option<f64>) -> Result<Requirements,
     };
     let trajectory = Trajectory::from_samples(&(0..=8).map(sample).collect::<Vec<_>>()).unwrap();
     let limits = vec![Limit {
-        quantity: Quantity::P95,
+        quantity: LimitQuantity::P95,
         most: 5.0,
     }];
     Requirements::new(Scenario::default(), trajectory, limits, ask, first_s)

@@ -59,7 +59,7 @@ Examples:
 
 /// The trajectory of a command.
 #[derive(clap::Args, Debug)]
-struct Source {
+struct TrajectorySource {
     /// Motion profile (.toml) or table (.csv, .tsv, .txt, also .gz)
     #[arg(id = "trajectory", value_name = "TRAJECTORY")]
     path: PathBuf,
@@ -74,7 +74,7 @@ fn origin(text: &str) -> Result<[f64; 3], String> {
         .ok_or_else(|| "not LAT_DEG,LON_DEG,H_M with a latitude within ±89.9".to_owned())
 }
 
-impl Source {
+impl TrajectorySource {
     /// Reads it, and warns of what is doubtful about it.
     fn read(&self, context: &Context<'_>) -> Result<(Trajectory, Vec<String>)> {
         let read = trajectory_file::load(&self.path, self.origin)?;
@@ -87,7 +87,7 @@ impl Source {
 #[derive(clap::Args, Debug)]
 pub struct Convert {
     #[command(flatten)]
-    source: Source,
+    source: TrajectorySource,
     /// Instants per second (default: of generate 100, of convert the rows of the input)
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
     pub(crate) rate_hz: Option<f64>,
@@ -134,7 +134,7 @@ Examples:
   nav-sim trajectory check trajectories/figure_eight.toml --limit-speed 15 --format json")]
 pub struct CheckTrajectory {
     #[command(flatten)]
-    source: Source,
+    source: TrajectorySource,
     /// IMU rate at which the closure is computed
     #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = parse::rate_hz)]
     rate_hz: f64,
@@ -279,7 +279,7 @@ Examples:
       --scenario examples/scenario.toml -o flight")]
 pub struct Record {
     #[command(flatten)]
-    source: Source,
+    source: TrajectorySource,
     /// Noise model of the IMU
     #[arg(value_name = "MODEL")]
     model: PathBuf,

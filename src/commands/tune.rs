@@ -207,7 +207,7 @@ impl Tune {
         truths: &[TrueErrors],
         track: &Track,
         outages: &[Outage],
-    ) -> std::result::Result<Tuning, BeliefError> {
+    ) -> std::result::Result<TuneResult, BeliefError> {
         let mut scenario = given.clone();
         match self.filter {
             // what goes with the filter of 21 states beside the model stays
@@ -242,7 +242,7 @@ impl Tune {
         };
         let factors = task.factors()?;
         let after = task.consistency(task.filter, &factors)?;
-        Ok(Tuning {
+        Ok(TuneResult {
             filter: self.filter,
             filter_of_run,
             before: Task { track, ..task }.consistency(task.filter, &[])?,
@@ -321,7 +321,7 @@ const UNCHANGED: f64 = 0.01;
 
 /// Factors, and the filter before and after them.
 #[derive(Debug, Clone)]
-struct Tuning {
+struct TuneResult {
     /// The filter that was tuned.
     filter: FilterStates,
     /// The filter that `run` makes of the model unless told otherwise.
@@ -355,7 +355,7 @@ fn kind(found: &FilterConsistency) -> VerdictKind {
     }
 }
 
-impl Tuning {
+impl TuneResult {
     /// The factors and their cost, then the filters that they make.
     fn verdict(&self) -> Vec<String> {
         let name = filter_name(self.filter);
@@ -470,7 +470,7 @@ impl Tuning {
     }
 }
 
-impl Tuning {
+impl TuneResult {
     fn json(&self) -> Value {
         let end = |(after_s, rmse): (&f64, &[f64; REPORTED_NAMES.len()])| {
             json!({
@@ -546,7 +546,7 @@ fn factors_in_words(changed: &[&Factor]) -> String {
     changed.iter().map(word).collect::<Vec<_>>().join(", ")
 }
 
-impl Tuning {
+impl TuneResult {
     fn document(&self) -> Document {
         let found = kind(&self.after);
         let tone = match self.fault() {
@@ -583,7 +583,7 @@ impl Tuning {
     }
 }
 
-impl Tuning {
+impl TuneResult {
     /// State, time and truth of the largest error.
     fn place(&self, found: &FilterConsistency) -> String {
         let mut place = REPORTED_NAMES[found.largest.state].to_owned();
@@ -623,8 +623,8 @@ mod tests {
         }
     }
 
-    fn result(filter: FilterStates, of_run: FilterConsistency) -> Tuning {
-        Tuning {
+    fn result(filter: FilterStates, of_run: FilterConsistency) -> TuneResult {
+        TuneResult {
             aiding_sigmas: None,
             filter,
             filter_of_run: FilterStates::Reduced15,

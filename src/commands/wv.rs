@@ -13,7 +13,7 @@ use nav_sim_calibration::{
     Diagnosis, Pool, Replicate, Settings, calibrate, diagnose, duration, grouped, median,
     replicates,
 };
-use nav_sim_document::{Axis, Cell, Chart, Colour, Document, Panel, Series, Table, Tone};
+use nav_sim_document::{Cell, Chart, ChartAxis, Colour, Document, Panel, Series, Table, Tone};
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::wavelet::{WaveletError, haar, interval};
 use rayon::prelude::*;
@@ -216,8 +216,8 @@ fn chart(file: &SignalsFile, channel: Channel) -> Chart {
     };
     Chart::new(
         &format!("{} {}", sensor_name(channel.sensor), channel.axis),
-        Axis::log("scale τ (s)"),
-        vec![Panel::new(Axis::log(variance), series)],
+        ChartAxis::log("scale τ (s)"),
+        vec![Panel::new(ChartAxis::log(variance), series)],
     )
     .small()
     .in_group("scales")
@@ -307,7 +307,7 @@ fn ratios(s: &SignalCurves) -> impl Iterator<Item = (f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::curves::Band;
+    use crate::report::curves::VarianceBand;
     use nav_sim_signal::imu::{Axis, Sensor};
 
     fn file(count: usize) -> SignalsFile {
@@ -315,7 +315,7 @@ mod tests {
         let tau_s: Vec<f64> = (1..=14).map(|j| f64::from(j).exp2() / 100.0).collect();
         let wv: Vec<f64> = tau_s.iter().map(|tau| 1.0 / tau).collect();
         let edof: Vec<f64> = (1..=14).map(|j| 1e5 / f64::from(j).exp2()).collect();
-        let band = |factor: f64, status: &str| Band {
+        let band = |factor: f64, status: &str| VarianceBand {
             wv: wv.iter().map(|x| x * factor).collect(),
             ci_low: wv.clone(),
             ci_high: wv.clone(),

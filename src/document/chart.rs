@@ -2,7 +2,7 @@
 
 /// An axis.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Axis {
+pub struct ChartAxis {
     /// Quantity and unit, such as `time (s)`.
     pub label: String,
     /// True for a logarithmic axis, which leaves out values that are not positive.
@@ -11,7 +11,7 @@ pub struct Axis {
     pub include: Option<(f64, f64)>,
 }
 
-impl Axis {
+impl ChartAxis {
     /// A linear axis.
     pub fn linear(label: &str) -> Self {
         Self {
@@ -96,7 +96,7 @@ impl Stroke {
 
 /// A point and its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
+pub struct PointInterval {
     /// Where.
     pub x: f64,
     /// The value.
@@ -115,7 +115,7 @@ pub enum Mark {
     /// The area between two curves (x, low, high).
     Band(Vec<(f64, f64, f64)>),
     /// Points with error bars.
-    Points(Vec<Interval>),
+    Points(Vec<PointInterval>),
     /// A line at one value of y.
     Level(f64),
     /// The area between two values of y.
@@ -156,7 +156,7 @@ impl Series {
         colour: Colour,
         points: impl IntoIterator<Item = (f64, f64, f64)>,
     ) -> Self {
-        let point = |(x, y, half): (f64, f64, f64)| Interval {
+        let point = |(x, y, half): (f64, f64, f64)| PointInterval {
             x,
             y,
             low: y - half,
@@ -179,7 +179,7 @@ impl Series {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
     /// Its own axis.
-    pub y: Axis,
+    pub y: ChartAxis,
     /// Series of the panel, the first at the bottom.
     pub series: Vec<Series>,
     /// Its height as a share of the usual one.
@@ -188,7 +188,7 @@ pub struct Panel {
 
 impl Panel {
     /// A panel of the usual height.
-    pub fn new(y: Axis, series: Vec<Series>) -> Self {
+    pub fn new(y: ChartAxis, series: Vec<Series>) -> Self {
         Self {
             y,
             series,
@@ -217,7 +217,7 @@ pub struct Chart {
     /// Title in words.
     pub title: String,
     /// The axis of all panels.
-    pub x: Axis,
+    pub x: ChartAxis,
     /// From top to bottom.
     pub panels: Vec<Panel>,
     /// Vertical stripes (from, to), such as outages, and what they are.
@@ -232,7 +232,7 @@ pub struct Chart {
 
 impl Chart {
     /// A chart of one or more panels, of the whole width.
-    pub fn new(title: &str, x: Axis, panels: Vec<Panel>) -> Self {
+    pub fn new(title: &str, x: ChartAxis, panels: Vec<Panel>) -> Self {
         Self {
             title: title.to_owned(),
             x,
@@ -246,10 +246,10 @@ impl Chart {
 
     /// A map: east to the right, north up, in metres, one scale.
     pub fn map(title: &str, series: Vec<Series>) -> Self {
-        let panel = Panel::new(Axis::linear("north (m)"), series);
+        let panel = Panel::new(ChartAxis::linear("north (m)"), series);
         Self {
             is_map: true,
-            ..Self::new(title, Axis::linear("east (m)"), vec![panel])
+            ..Self::new(title, ChartAxis::linear("east (m)"), vec![panel])
         }
     }
 
@@ -257,7 +257,7 @@ impl Chart {
     pub fn over_time(title: &str, panels: Vec<Panel>, outages: &[(f64, f64)]) -> Self {
         Self {
             stripes: ("outage".to_owned(), outages.to_vec()),
-            ..Self::new(title, Axis::linear("time (s)"), panels).in_group("time")
+            ..Self::new(title, ChartAxis::linear("time (s)"), panels).in_group("time")
         }
     }
 

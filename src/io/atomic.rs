@@ -486,7 +486,7 @@ pub(crate) fn claim_directory<'a>(
     files: &[impl AsRef<str>],
     inputs: impl Iterator<Item = &'a Path> + Clone,
     force: bool,
-    recognise: impl FnOnce(&str) -> Found,
+    recognise: impl FnOnce(&str) -> DirectoryState,
 ) -> Result<Claim, Failure> {
     for name in files {
         guard_inputs(&directory.join(name.as_ref()), inputs.clone())?;
@@ -498,18 +498,18 @@ pub(crate) fn claim_directory<'a>(
     let last = directory.join(files.last().map_or("", AsRef::as_ref));
     let found = match fs::read_to_string(&last) {
         // killed where it put its files in place
-        Err(_) if claim.is_left || is_empty(directory) => Found::Same,
-        Err(_) => Found::Foreign,
+        Err(_) if claim.is_left || is_empty(directory) => DirectoryState::Same,
+        Err(_) => DirectoryState::Foreign,
         Ok(text) => recognise(&text),
     };
     match found {
-        Found::Foreign => Err(foreign(directory)),
-        Found::Other if !force => {
+        DirectoryState::Foreign => Err(foreign(directory)),
+        DirectoryState::Other if !force => {
             let why = "holds the result of another configuration, other inputs or another seed";
             Err(refused(directory, why)
                 .or_hint("name another place for it, or replace it with --force"))
         }
-        Found::Other | Found::Same => Ok(claim),
+        DirectoryState::Other | DirectoryState::Same => Ok(claim),
     }
 }
 
@@ -561,7 +561,7 @@ fn is_part(path: &Path) -> bool {
 }
 
 /// State of a directory of results, told by its last file, which appears when the others are whole.
-pub(crate) enum Found {
+pub(crate) enum DirectoryState {
     /// Nothing that may be replaced.
     Foreign,
     /// A result of another configuration, other inputs or another seed.

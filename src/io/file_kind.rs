@@ -88,7 +88,7 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, Failure> {
         return Ok(FileKind::Recording);
     }
     match logs::kind_of(path) {
-        Some(nav_sim_logs::Kind::Npz) => return Ok(FileKind::Recording),
+        Some(nav_sim_logs::LogFormat::Npz) => return Ok(FileKind::Recording),
         Some(_) => return Ok(FileKind::Log),
         None => {}
     }

@@ -127,7 +127,7 @@ fn damp(ins: &mut Strapdown, truth: &NavState, dt: f64) {
 mod tests {
     use super::*;
     use crate::trajectory::profile::{
-        Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
+        Acceleration, Bank, Length, Profile, ProfileStart, Segment, SegmentKind, Turning,
     };
     use glam::{DQuat, DVec3};
 
@@ -135,25 +135,25 @@ mod tests {
     #[test]
     fn ten_hours_close() {
         let cycle = [
-            Kind::Accelerate {
+            SegmentKind::Accelerate {
                 to_speed: 15.0,
                 by: Acceleration::Duration(20.0),
             },
-            Kind::Straight(Length::Duration(820.0)),
-            Kind::Turn {
+            SegmentKind::Straight(Length::Duration(820.0)),
+            SegmentKind::Turn {
                 angle: 1.5,
                 by: Turning::Duration(20.0),
             },
-            Kind::Accelerate {
+            SegmentKind::Accelerate {
                 to_speed: 8.0,
                 by: Acceleration::Duration(20.0),
             },
-            Kind::Turn {
+            SegmentKind::Turn {
                 angle: -1.4,
                 by: Turning::Duration(20.0),
             },
         ];
-        let segment = |kind: &Kind| Segment {
+        let segment = |kind: &SegmentKind| Segment {
             kind: kind.clone(),
             climb_m: 0.0,
             ramp_s: None,
@@ -164,7 +164,7 @@ mod tests {
             .take(40 * cycle.len())
             .map(segment)
             .collect();
-        let start = Start {
+        let start = ProfileStart {
             t_s: 0.0,
             lat: 0.8,
             lon: 0.1,

@@ -32,7 +32,7 @@ use std::str::FromStr;
 
 /// Quantity with a limit at the end of an outage.
 #[derive(Debug, Clone, Copy)]
-pub enum Quantity {
+pub enum LimitQuantity {
     /// 95 % quantile of the horizontal error (m).
     P95,
     /// Its median (m).
@@ -47,7 +47,7 @@ pub enum Quantity {
     Yaw,
 }
 
-nav_sim_signal::named!(Quantity {
+nav_sim_signal::named!(LimitQuantity {
     P95 = "p95_m",
     P50 = "p50_m",
     Rmse = "rmse_m",
@@ -56,7 +56,7 @@ nav_sim_signal::named!(Quantity {
     Yaw = "yaw_deg",
 }, in files);
 
-impl Quantity {
+impl LimitQuantity {
     /// Roll, pitch or yaw, from 0.
     fn angle(self) -> Option<usize> {
         (self as usize).checked_sub(Self::Roll as usize)
@@ -78,7 +78,7 @@ impl Quantity {
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Limit {
     /// The quantity.
-    pub quantity: Quantity,
+    pub quantity: LimitQuantity,
     /// Its largest value allowed (m or degrees).
     #[serde(rename = "limit")]
     pub most: f64,
@@ -93,7 +93,7 @@ impl FromStr for Limit {
             let quantity = name.parse().ok()?;
             Some(Self { quantity, most })
         };
-        let names = Quantity::NAMES.join(", ");
+        let names = LimitQuantity::NAMES.join(", ");
         let expected = "expected NAME<=LIMIT with a positive limit, NAME one of";
         read().ok_or_else(|| format!("{expected} {names}"))
     }
@@ -194,19 +194,19 @@ impl Drift {
     }
 
     /// The value of a quantity (m or degrees).
-    pub fn value(&self, quantity: Quantity) -> f64 {
+    pub fn value(&self, quantity: LimitQuantity) -> f64 {
         match quantity {
-            Quantity::P50 => self.quantile(0.5),
-            Quantity::P95 => self.quantile(0.95),
-            Quantity::Rmse => self.square(quantity).sqrt(),
-            Quantity::Roll => self.angles_deg[0],
-            Quantity::Pitch => self.angles_deg[1],
-            Quantity::Yaw => self.angles_deg[2],
+            LimitQuantity::P50 => self.quantile(0.5),
+            LimitQuantity::P95 => self.quantile(0.95),
+            LimitQuantity::Rmse => self.square(quantity).sqrt(),
+            LimitQuantity::Roll => self.angles_deg[0],
+            LimitQuantity::Pitch => self.angles_deg[1],
+            LimitQuantity::Yaw => self.angles_deg[2],
         }
     }
 
     /// The mean square behind a quantity (m² or degrees²), in which the parts of independent sources add.
-    fn square(&self, quantity: Quantity) -> f64 {
+    fn square(&self, quantity: LimitQuantity) -> f64 {
         match quantity.angle() {
             Some(i) => self.angles_deg[i].powi(2),
             // The quantiles have no sum over sources: shares are of the mean square whatever quantile is
@@ -218,10 +218,10 @@ impl Drift {
     }
 
     /// Upper bound of a value, at next to no cost.
-    fn bound(&self, quantity: Quantity) -> f64 {
+    fn bound(&self, quantity: LimitQuantity) -> f64 {
         match quantity {
-            Quantity::P50 => self.quantile_bound(0.5),
-            Quantity::P95 => self.quantile_bound(0.95),
+            LimitQuantity::P50 => self.quantile_bound(0.5),
+            LimitQuantity::P95 => self.quantile_bound(0.95),
             _ => self.value(quantity),
         }
     }
@@ -240,7 +240,7 @@ impl Drift {
     }
 
     /// The largest value of a quantity and where it is; what is not a number is the largest.
-    pub fn largest(drifts: &[Self], quantity: Quantity) -> Option<(usize, f64)> {
+    pub fn largest(drifts: &[Self], quantity: LimitQuantity) -> Option<(usize, f64)> {
         let bound = |drift: &Self| {
             Some(drift.bound(quantity))
                 .filter(|b| !b.is_nan())
@@ -516,7 +516,7 @@ impl ImuParameters {
 
 /// An intensity that keeps the limits, or none that matters.
 #[derive(Debug, Clone, Copy)]
-pub enum Answer {
+pub enum IntensityBound {
     /// At most this.
     AtMost(f64),
     /// Any value will do.
@@ -526,7 +526,7 @@ pub enum Answer {
 }
 
 /// Requirements on an IMU.
-pub struct Need<'a> {
+pub struct ImuSearch<'a> {
     /// The trajectory and the places of the outage.
     pub course: &'a Course<'a>,
     /// Receiver, start and IMU rate.
@@ -537,7 +537,7 @@ pub struct Need<'a> {
     pub t_corr_s: f64,
 }
 
-impl Need<'_> {
+impl ImuSearch<'_> {
     /// The IMU that meets the limits with 1.5 thousandths in reserve, its four intensities with equal shares in the
     /// variance that GNSS and start leave.
     ///
@@ -595,7 +595,7 @@ impl Need<'_> {
         imu: &ImuParameters,
         which: usize,
         others: f64,
-    ) -> Result<Answer, BeliefError> {
+    ) -> Result<IntensityBound, BeliefError> {
         let base = imu.times(std::array::from_fn(
             |i| if i == which { 1.0 } else { others },
         ));
@@ -605,9 +605,9 @@ impl Need<'_> {
         Ok(match margin {
             // Regula falsi may end at a bracket without the last digit: ten times the tolerance is still a
             // crossing.
-            m if m.abs() <= 10.0 * EXACT => Answer::AtMost(found.values[which]),
-            m if m > 0.0 => Answer::Any,
-            _ => Answer::Never,
+            m if m.abs() <= 10.0 * EXACT => IntensityBound::AtMost(found.values[which]),
+            m if m > 0.0 => IntensityBound::Any,
+            _ => IntensityBound::Never,
         })
     }
 
@@ -615,7 +615,11 @@ impl Need<'_> {
     ///
     /// # Errors
     /// When the model has no filter.
-    pub fn quite_alone(&self, imu: &ImuParameters, which: usize) -> Result<Answer, BeliefError> {
+    pub fn quite_alone(
+        &self,
+        imu: &ImuParameters,
+        which: usize,
+    ) -> Result<IntensityBound, BeliefError> {
         self.alone(imu, which, NONE)
     }
 

@@ -182,7 +182,7 @@ impl Replicate {
 
 /// Reason for which a calibration fails, where the advice depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cause {
+pub enum CalibrationFault {
     /// A signal too short for its scales.
     TooShort,
     /// A trim that leaves no replicate.
@@ -202,18 +202,18 @@ pub enum Cause {
 #[error("{message}")]
 pub struct CalibrationError {
     /// Its cause.
-    pub cause: Cause,
+    pub cause: CalibrationFault,
     message: String,
 }
 
 impl CalibrationError {
-    pub(crate) fn new(cause: Cause, message: impl ToString) -> Self {
+    pub(crate) fn new(cause: CalibrationFault, message: impl ToString) -> Self {
         let message = message.to_string();
         Self { cause, message }
     }
 
     pub(crate) fn other(message: impl ToString) -> Self {
-        Self::new(Cause::Other, message)
+        Self::new(CalibrationFault::Other, message)
     }
 
     /// The same, of a group or a signal.
@@ -270,7 +270,7 @@ pub fn average(
         let message = format!(
             "trimming {trim} replicates at each end needs at least {least} replicates; there are {count}"
         );
-        return Err(CalibrationError::new(Cause::Trim, message));
+        return Err(CalibrationError::new(CalibrationFault::Trim, message));
     }
     let quantization = estimator.is_robust().then(|| *tuning.quantization());
     let kept_of_all = (count - 2 * dropped(count)) as f64;
@@ -533,7 +533,7 @@ pub fn replicates(
         let levels = levels.unwrap_or_else(|| default_levels(samples));
         let error = |e: WaveletError| {
             let message = format!("{}, {channel}: {e}", recording.name);
-            CalibrationError::new(Cause::TooShort, message)
+            CalibrationError::new(CalibrationFault::TooShort, message)
         };
         let (classical, robust, coverage) = if signal.samples.iter().any(|x| x.is_nan()) {
             let Gappy {

@@ -2,19 +2,19 @@
 
 use super::Calibration;
 use crate::app::Input;
-use crate::commands::export::Quantity;
+use crate::commands::export::ExportQuantity;
 use crate::io::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn, known};
 use crate::report::csv::merged;
 use crate::report::curves::{FittedCurve, band, curve, recording_names, sensor_name};
 use crate::report::{in_order, some};
 use nav_sim_calibration::{
-    Beginning, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Miss, Outcome,
-    ParameterInterval, ParameterSpread, Ranking, Settings, TurnOnFinding, TurnOnSpread,
-    Undetermined, Verdict, WIDEST, duration, percent, tau_s,
+    Beginning, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Miss, ModelCandidate,
+    ModelRanking, Outcome, ParameterInterval, ParameterSpread, RecordingVerdict, Settings,
+    TurnOnFinding, TurnOnSpread, Undetermined, WIDEST, duration, percent, tau_s,
 };
 use nav_sim_document::{
-    Axis as ChartAxis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke,
-    Table, Tone, readable,
+    Cell, Chart, ChartAxis, Colour, Document, Importance, Mark, Panel, Series, Stroke, Table, Tone,
+    readable,
 };
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::practical::Horizon;
@@ -182,7 +182,7 @@ fn policy() -> String {
 }
 
 pub(crate) fn is_abnormal(diagnosis: &Diagnosis) -> bool {
-    diagnosis.verdict != Verdict::Normal
+    diagnosis.verdict != RecordingVerdict::Normal
 }
 
 /// A row a parameter.
@@ -551,7 +551,10 @@ fn recording_notes(
     settings: &Settings,
 ) -> Vec<String> {
     let own: Vec<&Diagnosis> = diagnoses.iter().filter(|d| d.sensor == sensor).collect();
-    let abnormal = own.iter().filter(|d| d.verdict == Verdict::Noise).count();
+    let abnormal = own
+        .iter()
+        .filter(|d| d.verdict == RecordingVerdict::Noise)
+        .count();
     let mut notes = Vec::new();
     if abnormal > 0 && 2 * abnormal >= own.len() {
         notes.push(
@@ -634,9 +637,9 @@ fn turn_on_remark(found: &TurnOnSpread) -> String {
 }
 
 /// The reasons of a choice.
-fn reasons(ranking: &Ranking) -> Vec<String> {
+fn reasons(ranking: &ModelRanking) -> Vec<String> {
     let (best, taken) = (&ranking.candidates[0], &ranking.candidates[ranking.chosen]);
-    let wvic = |c: &Candidate| format!("{} {:.4}", c.spec, c.wvic());
+    let wvic = |c: &ModelCandidate| format!("{} {:.4}", c.spec, c.wvic());
     let (name, pair) = (&taken.spec, format!("{}, {}", wvic(taken), wvic(best)));
     let mut lines = vec![match taken.p_value {
         None if taken.spec == best.spec => {
@@ -737,8 +740,8 @@ fn fit_json(outcome: &Outcome, all: &[Outcome], settings: &Settings) -> Value {
     merged([fit_record(outcome, settings), fit_facts])
 }
 
-fn candidates(ranking: &Ranking) -> Vec<Value> {
-    let entry = |(i, c): (usize, &Candidate)| {
+fn candidates(ranking: &ModelRanking) -> Vec<Value> {
+    let entry = |(i, c): (usize, &ModelCandidate)| {
         json!({
             "model": c.spec.to_string(),
             "objective": c.objective,
@@ -834,12 +837,12 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
         let floor = minimum.map_or(none, |m| format!("floor at {}", duration(m.tau_s)));
         let b = minimum.map(|m| m.deviation);
         let k = practical.walk_is_observed().then_some(pair.walk);
-        let unit = |quantity: Quantity| quantity.sheet(sensor);
+        let unit = |quantity: ExportQuantity| quantity.sheet(sensor);
         let (n, to) = (Some(pair.density), to.unwrap_or_default());
         put(
             "N".to_owned(),
             white,
-            unit(Quantity::Density),
+            unit(ExportQuantity::Density),
             n,
             ends.density,
             &to,
@@ -847,7 +850,7 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
         put(
             "B".to_owned(),
             "bias instability B",
-            unit(Quantity::Bias),
+            unit(ExportQuantity::Bias),
             b,
             ends.instability,
             &floor,
@@ -855,7 +858,7 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
         put(
             "K".to_owned(),
             walk,
-            unit(Quantity::Walk),
+            unit(ExportQuantity::Walk),
             k,
             ends.walk,
             &from,

@@ -75,7 +75,7 @@ impl EstimatorChoice {
 }
 
 /// Recordings that were measured, none a copy of another.
-pub(crate) struct Measured {
+pub(crate) struct MeasuredRecordings {
     pub report: Report,
     pub replicates: Vec<(Channel, Replicate)>,
     pub beginnings: Vec<Beginning>,
@@ -110,7 +110,7 @@ pub(crate) fn measure(
     estimators: EstimatorChoice,
     settings: &Settings,
     context: &Context<'_>,
-) -> Result<Measured, Failure> {
+) -> Result<MeasuredRecordings, Failure> {
     // As many scales as parameters, and one that the default leaves out.
     reading.min_samples = scales.map_or(2 << settings.model.parameters(), |j| 1 << j);
     let look = |recording: Recording| MeasuredRecording::new(recording, scales, &settings.tuning);
@@ -132,7 +132,7 @@ pub(crate) fn measure(
     };
     let mut measured: Vec<_> = looks.into_iter().flat_map(|look| look.replicates).collect();
     one_switching_on(&report, &mut measured);
-    Ok(Measured {
+    Ok(MeasuredRecordings {
         report,
         replicates: measured,
         beginnings,

@@ -26,7 +26,7 @@ mod measure;
 
 pub(crate) use document::{CalibrationNote, figure_of, is_abnormal, recordings_line};
 pub use measure::{Calibration, EstimatorChoice};
-pub(crate) use measure::{Measured, measure, visit};
+pub(crate) use measure::{MeasuredRecordings, measure, visit};
 
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
 use crate::app::{Answer, Command, Context, Out, OutputFile, Result, refused};
@@ -170,7 +170,7 @@ impl Command for Calibrate {
             None => {
                 let (reading, scales) = (self.recordings.options(), self.tuning.levels());
                 let estimators = self.estimator;
-                let Measured {
+                let MeasuredRecordings {
                     replicates,
                     beginnings,
                     settings,

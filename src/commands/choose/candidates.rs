@@ -4,8 +4,8 @@ use super::FEWEST;
 use super::ranking::Score;
 use crate::app::{Failure, Refuse};
 use nav_sim_calibration::{
-    CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, Replicate, Settings,
-    Verdict, calibrate, diagnose, grouped, model_of,
+    CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, RecordingVerdict,
+    Replicate, Settings, calibrate, diagnose, grouped, model_of,
 };
 use nav_sim_navigation::ekf::{Belief, FilterStates};
 use nav_sim_navigation::monte_carlo;
@@ -248,7 +248,7 @@ impl Laboratory {
         let all: Vec<&Unit> = self.units.iter().collect();
         let (groups, outcomes, settings) = self.fit(&all, Estimator::DrAwv, &n2)?;
         let mut diagnoses = diagnose(&groups, &outcomes, &settings);
-        diagnoses.retain(|diagnosis| diagnosis.verdict != Verdict::Normal);
+        diagnoses.retain(|diagnosis| diagnosis.verdict != RecordingVerdict::Normal);
         let is_abnormal = |name: &String| diagnoses.iter().any(|d| d.name == *name);
         let is_normal = |k: &usize| !self.units[*k].iter().any(|(_, r)| is_abnormal(&r.name));
         let normal: Vec<usize> = self.others(None).filter(is_normal).collect();

@@ -11,7 +11,7 @@ use crate::app::inputs::{self, SettingsArgs};
 use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
 use crate::app::{Command, Context, Inputs, Out, PlainAnswer, Result, refused};
 use crate::commands::calibrate::{
-    Calibration, CalibrationNote, ESTIMATORS, EstimatorChoice, Measured, measure,
+    Calibration, CalibrationNote, ESTIMATORS, EstimatorChoice, MeasuredRecordings, measure,
 };
 use crate::io::recordings::{self, FileReport, Gaps};
 use crate::parse;
@@ -312,7 +312,7 @@ fn nominal_hz(found_hz: f64, fix_hz: f64) -> f64 {
 }
 
 /// The recordings, each with its signals' wavelet variances.
-fn units(measured: &Measured) -> Vec<Unit> {
+fn units(measured: &MeasuredRecordings) -> Vec<Unit> {
     let unit = |file: &FileReport| {
         let names: Vec<String> = file.recordings().map(|(name, _)| name).collect();
         let own = measured

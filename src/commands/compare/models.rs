@@ -2,7 +2,7 @@
 
 use crate::app::{Context, PlainAnswer, Result};
 use crate::commands::calibrate::figure_of;
-use crate::commands::export::Quantity;
+use crate::commands::export::ExportQuantity;
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::{self, ModelFile};
 use crate::report::some;
@@ -23,7 +23,11 @@ fn estimates((file, draws): &(ModelFile, Option<Draws>), channel: Channel) -> Ve
     let drawn: Vec<_> = drawn.map(|model| model.axis(channel)).collect();
     let stretch = draws.as_ref().map_or(1.0, |draws| draws.stretch);
     let figures = figures_with_intervals(model, &drawn, stretch, rate_hz, range_s);
-    let quantities = [Quantity::Density, Quantity::Walk, Quantity::Bias];
+    let quantities = [
+        ExportQuantity::Density,
+        ExportQuantity::Walk,
+        ExportQuantity::Bias,
+    ];
     let mut all: Vec<Estimate> = Vec::new();
     for (k, (quantity, (value, ends))) in quantities.into_iter().zip(figures).enumerate() {
         let (unit, factor) = quantity.sheet(channel.sensor);

@@ -5,7 +5,7 @@
 //! [`Export::quantity`], with `^2`, `*f`, `*sqrt(f)`, `*sqrt(2f)` or `/sqrt(SECONDS)` behind them; `in` clamps to the documented
 //! range, `else` stands for what is not finite. `{=}` repeats the last value, `{unit}` its unit; `{head OPEN|CLOSE}` is the head of comments.
 
-use super::{Entry, Export, SensorExport};
+use super::{Export, ExportEntry, SensorExport};
 use nav_sim_document::one_line;
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_signal::names::UnknownName;
@@ -417,8 +417,8 @@ fn comment(text: &str) -> String {
 
 impl Export {
     /// Fills the template: the entries of the file, and its text below the comments of `head`.
-    pub(super) fn filled(&self, head: &[String]) -> (Vec<Entry>, String) {
-        let (mut entries, mut text): (Vec<Entry>, String) = (Vec::new(), String::new());
+    pub(super) fn filled(&self, head: &[String]) -> (Vec<ExportEntry>, String) {
+        let (mut entries, mut text): (Vec<ExportEntry>, String) = (Vec::new(), String::new());
         let mut last = String::new();
         for template in self.target.template.lines() {
             let (mut line, mut rest, mut meaning) = (String::new(), template, None);
@@ -476,7 +476,12 @@ impl Export {
     }
 
     /// A value as it is written, and its entry where it has a unit; `line` stands before it.
-    fn value(&self, name: &str, argument: &'static str, line: &str) -> (String, Option<Entry>) {
+    fn value(
+        &self,
+        name: &str,
+        argument: &'static str,
+        line: &str,
+    ) -> (String, Option<ExportEntry>) {
         let words: Vec<&'static str> = argument.split(' ').collect();
         let after = |word: &str| words.iter().position(|w| *w == word).map(|i| words[i + 1]);
         let unit = words.first().copied().filter(|w| !["", "else"].contains(w));
@@ -495,7 +500,7 @@ impl Export {
         let key = line
             .split(|c: char| !(c.is_alphanumeric() || "._".contains(c)))
             .find(|w| !w.is_empty());
-        let entry = unit.map(|unit| Entry {
+        let entry = unit.map(|unit| ExportEntry {
             key: after("as").or(key).unwrap_or_default().to_owned(),
             value,
             unit,

@@ -19,11 +19,11 @@ use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
 use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
 use nav_sim_navigation::fusion::mounting::{self, Mounting};
 use nav_sim_navigation::fusion::{
-    Assessment, ClocksApart, Correlation, Displaced, Finding, FixRecord, Found, FusionError,
-    Heading, Levelling, Outcome, OwnNoise, Recorded, Row, Settings, Solution, Start, Weighed,
-    WheelSpeed, Withheld, aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier,
-    fuse, fuse_correlated, interval_s, outcome, own_noise, predicts_as_well, rest_of_origin,
-    rough_origin, vehicle_velocities, wheel_ratio, withheld,
+    AlignmentSummary, ClocksApart, Correlation, Displaced, Finding, FixRecord, FusionAssessment,
+    FusionError, FusionFigures, Heading, Levelling, OwnNoise, Recorded, Row, Settings, Solution,
+    Start, Weighed, WheelSpeed, Withheld, aid_innovations, assess, check_clocks, clocks_apart,
+    displaced, earlier, fuse, fuse_correlated, interval_s, outcome, own_noise, predicts_as_well,
+    rest_of_origin, rough_origin, vehicle_velocities, wheel_ratio, withheld,
 };
 use nav_sim_navigation::gnss::{FixSigma, GnssFix};
 use nav_sim_navigation::linalg::median;
@@ -64,7 +64,7 @@ impl Command for Fuse {
     }
 
     fn run(&self, context: &Context<'_>) -> Result<FuseAnswer> {
-        Drive::read(self, context)?.fuse(context)
+        RecordedDrive::read(self, context)?.fuse(context)
     }
 }
 
@@ -424,7 +424,7 @@ pub struct FuseAnswer {
 }
 
 /// A drive that was read.
-struct Drive<'a> {
+struct RecordedDrive<'a> {
     request: &'a Fuse,
     imu: Vec<ImuIncrement>,
     imu_rate_hz: f64,
@@ -436,7 +436,7 @@ struct Drive<'a> {
     reference: Option<Reference>,
 }
 
-impl<'a> Drive<'a> {
+impl<'a> RecordedDrive<'a> {
     /// Reads the files of a request.
     ///
     /// # Errors
@@ -614,11 +614,11 @@ impl<'a> Drive<'a> {
             true => withheld(&recorded, &belief, &start, &settings, &weighed)?,
             false => None,
         };
-        let Assessment { verdict, findings } = assess(&weighed, &outcome, &doubts, withheld);
+        let FusionAssessment { verdict, findings } = assess(&weighed, &outcome, &doubts, withheld);
         let is_correlated = weighed.correlation().is_some();
         let is_unexplained =
             verdict >= VerdictKind::Doubtful || verdict == VerdictKind::Undecided && is_correlated;
-        let scene = Scene {
+        let scene = CauseSearch {
             belief: &belief,
             start: &start,
             settings: &settings,
@@ -680,7 +680,7 @@ impl<'a> Drive<'a> {
 /// Help where the mounting is not found.
 const NOT_MOUNTED: &str = "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, velocities in the fixes and one clock (--gnss-delay)";
 
-impl Drive<'_> {
+impl RecordedDrive<'_> {
     /// Brings fixes to the clock of the IMU where the two have nothing in common and no delay is given; by how much (s).
     fn common_origin(&mut self) -> Result<Option<f64>> {
         let recorded = Recorded {
@@ -731,7 +731,7 @@ impl Drive<'_> {
 }
 
 /// Input of the search for the cause of large innovations.
-struct Scene<'a> {
+struct CauseSearch<'a> {
     belief: &'a Belief,
     start: &'a Start,
     settings: &'a Settings,
@@ -739,12 +739,16 @@ struct Scene<'a> {
     is_given: bool,
 }
 
-impl Scene<'_> {
+impl CauseSearch<'_> {
     /// Cause of innovations that are large or last: the clocks, else the antenna or a small delay.
-    fn cause(&self, recorded: &Recorded<'_>) -> Option<Cause> {
-        let small =
-            || displaced(recorded, self.belief, self.start, self.settings).map(Cause::Displaced);
-        self.clocks(recorded).map(Cause::Clocks).or_else(small)
+    fn cause(&self, recorded: &Recorded<'_>) -> Option<InnovationCause> {
+        let small = || {
+            displaced(recorded, self.belief, self.start, self.settings)
+                .map(InnovationCause::Displaced)
+        };
+        self.clocks(recorded)
+            .map(InnovationCause::Clocks)
+            .or_else(small)
     }
 
     /// Clocks that are apart, where the innovations are smaller when they are not: the course of what walks or slips has
@@ -794,7 +798,7 @@ impl Scene<'_> {
     }
 }
 
-impl Cause {
+impl InnovationCause {
     /// The same where the fixes were delayed already (s).
     fn after(mut self, given_s: f64) -> Self {
         match &mut self {
@@ -984,7 +988,7 @@ pub struct FuseSummary {
     pub withheld: Option<Withheld>,
     /// Fixes, NIS, errors at the ends of outages and against the reference.
     #[serde(flatten)]
-    pub outcome: Outcome,
+    pub outcome: FusionFigures,
 }
 
 /// Verdict on a solution.
@@ -996,13 +1000,13 @@ pub struct FuseVerdict {
     pub evidence: Vec<Finding>,
     /// Cause of large innovations, where one was found.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub cause: Option<Cause>,
+    pub cause: Option<InnovationCause>,
 }
 
 /// Cause of large innovations.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Cause {
+pub enum InnovationCause {
     /// The clocks of IMU and GNSS differ.
     Clocks(ClocksApart),
     /// The antenna is elsewhere, or the fixes are a little late.
@@ -1044,7 +1048,7 @@ impl Initial {
 }
 
 /// Sources of a start that was found.
-fn how(start: &Start, found: &Found) -> Vec<String> {
+fn how(start: &Start, found: &AlignmentSummary) -> Vec<String> {
     let [.., roll, pitch, yaw] = values(&start.state);
     let [tilt_sigma, _, yaw_sigma] = start.sigma.att_sigma_deg;
     let level = match found.level {

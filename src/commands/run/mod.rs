@@ -152,11 +152,11 @@ pub(crate) struct PreparedRun<'a> {
     seed: u64,
     /// Without its outages.
     track: SharedTrack,
-    filter: OnceLock<Filter>,
+    filter: OnceLock<FilterTracks>,
 }
 
 /// A filter along its track, and the same with one step from mark to mark.
-struct Filter {
+struct FilterTracks {
     track: Track,
     merged: Track,
     belief: Belief,
@@ -421,7 +421,7 @@ impl PreparedRun<'_> {
     }
 
     /// The filter along its track, made once.
-    fn filter(&self) -> Result<&Filter> {
+    fn filter(&self) -> Result<&FilterTracks> {
         if self.filter.get().is_none() {
             // Another thread makes the same.
             drop(self.filter.set(self.make_filter()?));
@@ -429,7 +429,7 @@ impl PreparedRun<'_> {
         Ok(self.filter.get().expect("it has just been made"))
     }
 
-    fn make_filter(&self) -> Result<Filter> {
+    fn make_filter(&self) -> Result<FilterTracks> {
         let (scenario, outages) = (&self.origin.configuration, self.outages());
         let (model, request) = (&self.inputs.model, self.request);
         let file = &request.settings.file;
@@ -448,7 +448,7 @@ impl PreparedRun<'_> {
                 "raise it, or take the full filter (--filter full), which reduces nothing",
             )
         })?;
-        Ok(Filter {
+        Ok(FilterTracks {
             track,
             merged: merged.with_outages(&outages),
             belief,
@@ -610,7 +610,7 @@ pub fn navigate(
     context: &Context<'_>,
 ) -> Result<Navigation> {
     let track = scenario.track(&inputs.trajectory, &inputs.model, outages)?;
-    let filter = Filter {
+    let filter = FilterTracks {
         belief: scenario.belief(&inputs.model, outages, &track).refuse()?,
         merged: track.merged(),
         track,
@@ -623,11 +623,11 @@ fn with_runs(
     inputs: &NavigateInputs,
     scenario: &Scenario,
     outages: &[Outage],
-    Filter {
+    FilterTracks {
         track,
         merged,
         belief,
-    }: &Filter,
+    }: &FilterTracks,
     seed: u64,
     runs: Option<RunResult>,
     context: &Context<'_>,

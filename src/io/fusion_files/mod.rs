@@ -6,12 +6,12 @@ use super::logs::LogOptions;
 use super::recordings::timing::{UNITS, median_step, unit_of_step};
 use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
 use super::table::{Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table};
-use super::toml_file::Source;
+use super::toml_file::TomlSource;
 use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
 use chrono::{DateTime, NaiveDateTime};
 use glam::{DMat3, DVec3};
 use nav_sim_document::{Importance, Note};
-use nav_sim_logs::{Clock, Content, Fix, Stamp, in_seconds};
+use nav_sim_logs::{Clock, Content, LogFix, Stamp, in_seconds};
 use nav_sim_navigation::earth::{MAX_LATITUDE_DEG, ecef_to_geodetic, geodetic_to_ecef};
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, q_e_n};
@@ -463,7 +463,7 @@ fn of_log(path: &Path, topic: Option<&str>, imu_s: Option<(f64, f64)>) -> Result
     let (origin_s, name) = clock.map_or((0.0, String::new()), |c| {
         (c.origin_s, format!(", in {}", c.name))
     });
-    let fix = |(line, fix): (u64, Fix)| {
+    let fix = |(line, fix): (u64, LogFix)| {
         let place = DVec3::new(fix.lat_deg * DEG, fix.lon_deg * DEG, fix.h_m);
         let [sigma, v, v_sigma] =
             [fix.sd_ned_m, fix.v_ned_m_s, fix.sd_v_ned_m_s].map(|own| own.map(DVec3::from));
@@ -1090,7 +1090,7 @@ const MAX_SPEED_M_S: f64 = 1e4;
 /// Initial state of a drive: nav-sim fuse --initial
 #[derive(Deserialize, JsonSchema)]
 #[schemars(title = "Initial state", deny_unknown_fields)]
-struct Description {
+struct InitialTable {
     /// Time (s)
     t_s: f64,
     /// Latitude of the IMU (degrees)
@@ -1126,7 +1126,7 @@ struct Description {
 /// The JSON schema of such a file.
 #[must_use]
 pub(crate) fn initial_schema() -> serde_json::Value {
-    schemars::schema_for!(Description).to_value()
+    schemars::schema_for!(InitialTable).to_value()
 }
 
 /// Reads an initial state: time, position of the IMU, velocity (0 where it is not said), attitude of the
@@ -1136,11 +1136,11 @@ pub(crate) fn initial_schema() -> serde_json::Value {
 /// File, line, key and value of what is refused.
 pub(crate) fn read_initial(path: &Path) -> Result<Start, Failure> {
     let refused = |e| file_kind::unless(&[FileKind::Initial], path, e);
-    parse(&Source::read(path)?).map_err(refused)
+    parse(&TomlSource::read(path)?).map_err(refused)
 }
 
-fn parse(source: &Source) -> Result<Start, Failure> {
-    let d: Description = source.get()?;
+fn parse(source: &TomlSource) -> Result<Start, Failure> {
+    let d: InitialTable = source.get()?;
     let (roll, pitch, yaw) = (d.roll_deg.0 * DEG, d.pitch_deg.0 * DEG, d.yaw_deg.0 * DEG);
     let state = NavState {
         lat: d.lat_deg * DEG,
@@ -1169,11 +1169,11 @@ mod initial_tests {
     fn refusals_name_line_key_and_value() {
         let sound = "t_s = 0\nlat_deg = 46\nlon_deg = 6\nh_m = 400\nroll_deg = 0\npitch_deg = 0\nyaw_deg = 40\n";
         let refused = |text: &str| {
-            let e = parse(&Source::new("i.toml", text)).unwrap_err();
+            let e = parse(&TomlSource::new("i.toml", text)).unwrap_err();
             format!("{e} | {}", e.advice().unwrap_or_default())
         };
         assert_eq!(
-            parse(&Source::new("i.toml", sound)).unwrap().sigma,
+            parse(&TomlSource::new("i.toml", sound)).unwrap().sigma,
             InitialSettings::default()
         );
         for (old, new, expected) in [

@@ -33,7 +33,7 @@ struct Epoch {
 
 /// All of a log.
 #[derive(Default)]
-struct Log {
+struct NmeaLog {
     epochs: Vec<Epoch>,
     /// The midnight before the first sentence (Unix s) by the last date: before it has found the time, a receiver states any.
     midnight_s: Option<f64>,
@@ -51,7 +51,7 @@ pub(crate) fn is_nmea(text: &str) -> bool {
     lines.any(|line| body(line).is_ok_and(|body| body.split(',').next().is_some_and(is_address)))
 }
 
-impl Log {
+impl NmeaLog {
     /// A sentence, whatever a logger wrote before it in its line.
     fn sentence(&mut self, line: u64, text: &str, is_summed: bool) -> Result<(), &'static str> {
         let fields = fields(text, is_summed)?;
@@ -132,7 +132,7 @@ pub(super) fn fixes(
     unsaid: Option<&FixSigma>,
     imu_s: Option<(f64, f64)>,
 ) -> Result<Fixes, Error> {
-    let mut log = Log::default();
+    let mut log = NmeaLog::default();
     let lines = (1..).zip(text.lines().map(str::trim));
     let lines: Vec<(u64, &str)> = lines.filter(|(_, line)| !line.is_empty()).collect();
     let is_summed = lines.iter().any(|(_, line)| line.contains('*'));

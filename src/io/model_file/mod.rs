@@ -19,7 +19,7 @@
 
 use super::file_kind::FileKind;
 use super::recordings::facts;
-use super::toml_file::{OneOrEach, Source};
+use super::toml_file::{OneOrEach, TomlSource};
 use super::{Failure, atomic, file_kind};
 use crate::report::readable;
 use nav_sim_calibration::duration;
@@ -211,7 +211,7 @@ mod tests;
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Noise model")]
-struct Description {
+struct ModelTable {
     /// Version of the layout
     #[serde(rename = "schema")]
     #[schemars(range(min = SCHEMA, max = SCHEMA))]
@@ -358,7 +358,7 @@ struct LawTable {
 /// The JSON schema of a model file, for editors and checkers.
 #[must_use]
 pub(crate) fn schema() -> serde_json::Value {
-    schemars::schema_for!(Description).to_value()
+    schemars::schema_for!(ModelTable).to_value()
 }
 
 // Remarks of a calibration in the provenance of its model.
@@ -447,7 +447,7 @@ impl ModelFile {
 /// domains.
 pub fn read(path: &Path) -> Result<ModelFile, Failure> {
     let refused = |e| file_kind::unless(&[FileKind::Model], path, e);
-    parse(&Source::read(path)?).map_err(refused)
+    parse(&TomlSource::read(path)?).map_err(refused)
 }
 
 /// A model file's text, at the path that messages show.
@@ -455,11 +455,11 @@ pub fn read(path: &Path) -> Result<ModelFile, Failure> {
 /// # Errors
 /// As [`read`].
 pub fn from_text(path: &Path, text: &str) -> Result<ModelFile, Failure> {
-    parse(&Source::new(&path.display().to_string(), text))
+    parse(&TomlSource::new(&path.display().to_string(), text))
 }
 
-pub(super) fn parse(source: &Source) -> Result<ModelFile, Failure> {
-    let Description {
+pub(super) fn parse(source: &TomlSource) -> Result<ModelFile, Failure> {
+    let ModelTable {
         rate_hz,
         accel,
         gyro,
@@ -504,7 +504,7 @@ pub(super) fn parse(source: &Source) -> Result<ModelFile, Failure> {
 }
 
 fn read_sensor(
-    source: &Source,
+    source: &TomlSource,
     sensor: Sensor,
     table: &SensorTable,
     file: &mut ModelFile,
@@ -541,7 +541,7 @@ fn read_sensor(
 }
 
 fn read_axis(
-    source: &Source,
+    source: &TomlSource,
     key: &str,
     processes: &[ProcessTable],
     reading: Option<&Vec<ProcessTable>>,
@@ -565,7 +565,7 @@ fn read_axis(
 }
 
 fn read_processes(
-    source: &Source,
+    source: &TomlSource,
     key: &str,
     tables: &[ProcessTable],
     channel: Channel,
@@ -613,7 +613,7 @@ fn number(value: &Value) -> f64 {
 }
 
 fn read_process(
-    source: &Source,
+    source: &TomlSource,
     key: &str,
     values: &toml::Table,
     rate_hz: f64,
@@ -633,7 +633,7 @@ fn read_process(
 }
 
 fn read_laws(
-    source: &Source,
+    source: &TomlSource,
     sensor: Sensor,
     laws: &OneOrEach<LawAxes, Vec<LawTable>>,
     file: &ModelFile,

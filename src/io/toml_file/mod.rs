@@ -49,12 +49,12 @@ fn span_of(table: &DeTable<'_>, path: &str) -> (Range<usize>, bool) {
 
 /// A TOML text and the name it goes by in messages.
 #[derive(Debug)]
-pub(crate) struct Source {
+pub(crate) struct TomlSource {
     path: String,
     text: String,
 }
 
-impl Source {
+impl TomlSource {
     /// The text of a file.
     ///
     /// # Errors
@@ -245,7 +245,7 @@ mod tests;
 // A file against the schema of its type.
 
 struct Checker<'a> {
-    source: &'a Source,
+    source: &'a TomlSource,
     root: &'a Schema,
 }
 

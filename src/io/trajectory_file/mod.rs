@@ -886,7 +886,7 @@ impl Rows {
 
     /// The trajectory through some rows.
     fn stretch(&self, range: Range<usize>) -> Result<Trajectory, Error> {
-        use trajectory::Error as E;
+        use trajectory::TrajectoryError as E;
         let through = |samples: &[TrajectorySample]| {
             Trajectory::from_samples(samples).map_err(|source| {
                 let advice = match source {

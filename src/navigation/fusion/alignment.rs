@@ -10,7 +10,7 @@
 use super::outcome::{Finding, nis_bound, total_nis, used};
 use super::run::rates;
 use super::vehicle::{force, rate};
-use super::{Found, Heading, Levelling, Recorded, Settings, Solution, Start, fuse};
+use super::{AlignmentSummary, Heading, Levelling, Recorded, Settings, Solution, Start, fuse};
 use crate::earth::{gravity_down, moved, ned_difference};
 use crate::ekf::{Belief, InitialSettings};
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
@@ -57,7 +57,7 @@ pub fn coarse(
             SLOW.0
         )));
     };
-    let scene = Scene::new(&recorded.with_gnss(&gnss), settings, belief);
+    let scene = StartSearch::new(&recorded.with_gnss(&gnss), settings, belief);
     let first_s = courses[first].fix.t_s;
     let later = LATER_S
         .iter()
@@ -69,7 +69,7 @@ pub fn coarse(
         times.filter(|t_s| (from_s..to_s).contains(t_s)).count()
     };
     let leaves_most = |t_s: f64| fixes(first_s, t_s) <= fixes(t_s, imu_end_s);
-    let mut best: Option<Candidate> = None;
+    let mut best: Option<StartCandidate> = None;
     let mut tried_s = f64::NEG_INFINITY;
     for at in std::iter::once(first).chain(later) {
         if courses[at].fix.t_s <= tried_s || !leaves_most(courses[at].fix.t_s) {
@@ -103,7 +103,7 @@ pub fn towards(
 ) -> Result<Alignment, Refused> {
     let gnss = settings.kept(recorded.gnss);
     let courses = courses(&gnss, recorded.imu);
-    let scene = Scene::new(&recorded.with_gnss(&gnss), settings, belief);
+    let scene = StartSearch::new(&recorded.with_gnss(&gnss), settings, belief);
     let sigma = heading.sigma.hypot(settings.mounting_sigma_b.z);
     let start_at = |at: usize| {
         let scene = scene.at(&courses[at].fix);
@@ -115,7 +115,7 @@ pub fn towards(
         .find_map(start_at)
         .ok_or_else(|| Refused("no fix with IMU samples around it to level with".to_owned()))?;
     let agreement = scene.agreement(&start, TRIAL_S);
-    Ok(scene.finished(Candidate {
+    Ok(scene.finished(StartCandidate {
         start,
         decided: true,
         agreements: [agreement; 2],
@@ -123,7 +123,7 @@ pub fn towards(
 }
 
 /// A start that was tried on the fixes after it.
-struct Candidate {
+struct StartCandidate {
     start: Start,
     /// True if the opposite heading is refuted.
     decided: bool,
@@ -131,7 +131,7 @@ struct Candidate {
     agreements: [Agreement; 2],
 }
 
-impl Candidate {
+impl StartCandidate {
     fn agrees(&self) -> bool {
         self.agreements.iter().all(Agreement::holds)
     }
@@ -139,7 +139,7 @@ impl Candidate {
 
 /// A recording, and the filter that is tried on it.
 #[derive(Clone, Copy)]
-struct Scene<'a> {
+struct StartSearch<'a> {
     recorded: Recorded<'a>,
     settings: &'a Settings,
     belief: &'a Belief,
@@ -149,7 +149,7 @@ struct Scene<'a> {
     g: f64,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> StartSearch<'a> {
     fn new(recorded: &Recorded<'a>, settings: &'a Settings, belief: &'a Belief) -> Self {
         Self {
             recorded: *recorded,
@@ -168,7 +168,7 @@ impl<'a> Scene<'a> {
 
     /// The starts at a moving fix, the one whose levelling is known best first, in the direction that the fixes
     /// speak for.
-    fn candidates(&self, courses: &[Moving], at: usize) -> Vec<Candidate> {
+    fn candidates(&self, courses: &[Moving], at: usize) -> Vec<StartCandidate> {
         let moving = &courses[at];
         // the course is the heading of the vehicle; how the IMU sits in it is not better known than the mounting
         let heading_sigma = moving
@@ -180,9 +180,9 @@ impl<'a> Scene<'a> {
         let [forwards, backwards] =
             headings.map(|yaw| self.in_motion(&courses[at..], yaw, heading_sigma));
         let motion = forwards.zip(backwards).map(|(f, b)| [f, b]);
-        let mut levels: Vec<[Level; 2]> = [rest, motion].into_iter().flatten().collect();
+        let mut levels: Vec<[LevelAngles; 2]> = [rest, motion].into_iter().flatten().collect();
         levels.sort_by(|a, b| a[0].sigma.total_cmp(&b[0].sigma));
-        let tried = |levels: [Level; 2]| {
+        let tried = |levels: [LevelAngles; 2]| {
             self.opposite([0, 1].map(|i| {
                 let heading = (headings[i], heading_sigma);
                 self.start(moving, &levels[i], heading, [false, i == 1])
@@ -195,7 +195,7 @@ impl<'a> Scene<'a> {
     fn start(
         &self,
         moving: &Moving,
-        level: &Level,
+        level: &LevelAngles,
         (yaw, heading_sigma): (f64, f64),
         [is_given, is_reversing]: [bool; 2],
     ) -> Start {
@@ -223,7 +223,7 @@ impl<'a> Scene<'a> {
                 att_sigma_deg: [tilt, tilt, heading],
                 ..InitialSettings::default()
             },
-            found: Some(Found {
+            found: Some(AlignmentSummary {
                 level: level.from,
                 course_sigma_deg: heading,
                 is_given,
@@ -235,7 +235,7 @@ impl<'a> Scene<'a> {
 
     /// The alignment by a candidate. Its heading is widened where it is not the course: wind sets an aircraft off, currents a
     /// boat. The smoother, from all fixes of the first minute, says how far.
-    fn finished(&self, mut candidate: Candidate) -> Alignment {
+    fn finished(&self, mut candidate: StartCandidate) -> Alignment {
         let doubts = candidate.doubts();
         let start = &mut candidate.start;
         let settings = Settings {
@@ -289,7 +289,7 @@ impl<'a> Scene<'a> {
 
     /// Runs the filter from two opposite starts over the first minute, and longer while that does not tell them apart; the
     /// better one.
-    fn opposite(&self, starts: [Start; 2]) -> Candidate {
+    fn opposite(&self, starts: [Start; 2]) -> StartCandidate {
         let begin_s = starts[0].t_s;
         let end_s = self.recorded.gnss.last().map_or(begin_s, |f| f.t_s);
         let mut window_s = TRIAL_S;
@@ -307,7 +307,7 @@ impl<'a> Scene<'a> {
                 // forwards unless that is refuted
                 let better = usize::from(decided && gain > 0.0);
                 let [forwards, backwards] = starts;
-                return Candidate {
+                return StartCandidate {
                     start: if better == 0 { forwards } else { backwards },
                     decided,
                     agreements: [first[better], both[better]],
@@ -318,7 +318,7 @@ impl<'a> Scene<'a> {
     }
 }
 
-impl Candidate {
+impl StartCandidate {
     fn doubts(&self) -> Vec<(VerdictKind, Finding)> {
         let nis_per_component = self.agreements[0].nis;
         let contradicted = Finding::Start { nis_per_component };
@@ -551,7 +551,7 @@ const QUIET: f64 = 3.0;
 
 /// Roll and pitch at the first moving fix.
 #[derive(Clone, Copy)]
-struct Level {
+struct LevelAngles {
     /// Without yaw.
     angles: RollPitchYaw,
     /// Standard deviation of both (rad).
@@ -560,7 +560,7 @@ struct Level {
 }
 
 /// Statistics of a window in the vehicle's axes.
-struct Window {
+struct StaticWindow {
     end_s: f64,
     seconds: f64,
     /// Mean specific force (m/s²) and angular rate (rad/s).
@@ -570,14 +570,14 @@ struct Window {
     spread: (f64, f64),
 }
 
-fn window(samples: &[ImuIncrement], q_s_b: DQuat) -> Window {
+fn window(samples: &[ImuIncrement], q_s_b: DQuat) -> StaticWindow {
     let (seconds, [f, omega]) = rates(samples);
     let spread = |of: fn(&ImuIncrement) -> DVec3, about: DVec3| {
         mean(samples.iter().map(|s| (of(s) - about).length_squared())).sqrt()
     };
     let spread = (spread(force, f), spread(rate, omega));
     let end_s = samples.last().map_or(f64::NAN, |s| s.t_s);
-    Window {
+    StaticWindow {
         end_s,
         seconds,
         f: q_s_b * f,
@@ -591,7 +591,7 @@ pub fn moves(imu: &[ImuIncrement]) -> bool {
     window(imu, DQuat::IDENTITY).spread.0 >= STILL.0
 }
 
-impl Scene<'_> {
+impl StartSearch<'_> {
     /// The tilt's standard deviation with the biases and a levelling of age `age_s` (rad).
     fn tilt_sigma(&self, age_s: f64, own: f64) -> f64 {
         (self.bias[0] / self.g)
@@ -604,12 +604,12 @@ impl Scene<'_> {
     ///
     /// A window is judged by its own standard deviation: what GNSS lets the vehicle accelerate unseen falls with
     /// its length, the drift of the gyroscopes grows with its age.
-    fn at_rest(&self, before: &[Moving], moving: &Moving) -> Option<Level> {
+    fn at_rest(&self, before: &[Moving], moving: &Moving) -> Option<LevelAngles> {
         let to_s = moving.fix.t_s;
         let ends = (0..)
             .map(|k| to_s - 0.25 * f64::from(k))
             .take_while(|end| to_s - end <= MAX_AGE_S);
-        let windows: Vec<Window> = ends
+        let windows: Vec<StaticWindow> = ends
             .flat_map(|end| STILL_S.map(|length| self.calm(end, length)))
             .flatten()
             .collect();
@@ -625,7 +625,7 @@ impl Scene<'_> {
     }
 
     /// The window, when the IMU sees nothing happen in it.
-    fn calm(&self, end_s: f64, length_s: f64) -> Option<Window> {
+    fn calm(&self, end_s: f64, length_s: f64) -> Option<StaticWindow> {
         let samples = between(self.recorded.imu, end_s - length_s, end_s);
         let q_s_b = self.settings.q_s_b;
         let (first, second) = samples.split_at(samples.len() / 2);
@@ -646,7 +646,7 @@ impl Scene<'_> {
     }
 
     /// The levelling of a window at the time of the fix, unless GNSS contradicts its standing still.
-    fn carried(&self, w: &Window, before: &[Moving], moving: &Moving) -> Option<Level> {
+    fn carried(&self, w: &StaticWindow, before: &[Moving], moving: &Moving) -> Option<LevelAngles> {
         let (from, departed) = (w.end_s - w.seconds, w.end_s + DEPARTURE_S);
         let age_s = moving.fix.t_s - w.end_s;
         let (q, gained) = self.carry(w, moving.fix.t_s);
@@ -663,7 +663,7 @@ impl Scene<'_> {
             (stays(before, from, departed) && agrees).then(|| moving.sigma() / (age_s * self.g))?
         };
         let own = (w.spread.0 / self.g / 10.0).hypot(unseen);
-        Some(Level {
+        Some(LevelAngles {
             angles: RollPitchYaw::from_quat(q),
             sigma: self.tilt_sigma(age_s, own),
             from: Levelling::AtRest(w.end_s),
@@ -672,7 +672,7 @@ impl Scene<'_> {
 
     /// A levelling at rest carried on with the gyroscopes: the attitude from level axes whose first is the
     /// heading of the body then, and the velocity gained in them.
-    fn carry(&self, w: &Window, to_s: f64) -> (DQuat, DVec3) {
+    fn carry(&self, w: &StaticWindow, to_s: f64) -> (DQuat, DVec3) {
         let mut q = level(w.f, DVec3::Z * -self.g).to_quat();
         let mut gained = DVec3::ZERO;
         for s in between(self.recorded.imu, w.end_s, to_s) {
@@ -684,7 +684,7 @@ impl Scene<'_> {
 
     /// Levelling while it moves: the mean specific force after the fix is the change of the GNSS velocity
     /// less gravity, in the axes of this heading.
-    fn in_motion(&self, after: &[Moving], heading: f64, heading_sigma: f64) -> Option<Level> {
+    fn in_motion(&self, after: &[Moving], heading: f64, heading_sigma: f64) -> Option<LevelAngles> {
         let from = after.first()?;
         let near = after
             .iter()
@@ -702,7 +702,7 @@ impl Scene<'_> {
         let f_h = DQuat::from_rotation_z(-heading) * (a_n - DVec3::Z * self.g);
         let velocities = from.sigma().hypot(to.sigma()) / (seconds * self.g);
         let own = velocities.hypot(heading_sigma * a_n.truncate().length() / self.g);
-        Some(Level {
+        Some(LevelAngles {
             angles: level(dv / seconds, f_h),
             sigma: self.tilt_sigma(0.5 * seconds, own),
             from: Levelling::InMotion(seconds),

@@ -55,7 +55,7 @@ pub fn displaced(
     settings: &Settings,
 ) -> Option<Displaced> {
     let to_s = start.t_s + MOST_S;
-    let scene = Scene {
+    let scene = OffsetSearch {
         recorded: recorded.until(to_s),
         belief,
         start,
@@ -101,14 +101,14 @@ pub fn displaced(
 }
 
 /// Input of the repeated filter runs.
-struct Scene<'a> {
+struct OffsetSearch<'a> {
     recorded: Recorded<'a>,
     belief: &'a Belief,
     start: &'a Start,
     settings: &'a Settings,
 }
 
-impl Scene<'_> {
+impl OffsetSearch<'_> {
     /// The innovations of each fix that is used, with the antenna and the delay off by `x`.
     fn innovations(&self, x: &Vector4<f64>) -> Option<Vec<Option<FixRecord>>> {
         let gnss = earlier(self.recorded.gnss, x[3]);

@@ -1,13 +1,15 @@
 use super::*;
 use crate::earth::moved;
 use crate::rng::StreamKey;
-use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start, Turning};
+use crate::trajectory::profile::{
+    Bank, Length, Profile, ProfileStart, Segment, SegmentKind, Turning,
+};
 use crate::trajectory::{Trajectory, TrajectorySample};
 use rand_distr::{Distribution, StandardNormal};
 
 /// Figures of eight for 800 s at 12 m/s.
 fn drive() -> Trajectory {
-    let start = Start {
+    let start = ProfileStart {
         t_s: 0.0,
         lat: 0.8,
         lon: 0.2,
@@ -21,12 +23,12 @@ fn drive() -> Trajectory {
         ramp_s: None,
     };
     let turn = |degrees: f64| {
-        segment(Kind::Turn {
+        segment(SegmentKind::Turn {
             angle: degrees * DEG,
             by: Turning::Duration(30.0),
         })
     };
-    let straight = || segment(Kind::Straight(Length::Duration(10.0)));
+    let straight = || segment(SegmentKind::Straight(Length::Duration(10.0)));
     let segments = (0..10).flat_map(|_| [turn(270.0), straight(), turn(-270.0), straight()]);
     let profile = Profile {
         start,

@@ -65,8 +65,8 @@ pub use displaced::{
 };
 pub use gate::GATE_LEVEL;
 pub use outcome::{
-    Assessment, Drift, Ends, Finding, FixCounts, FromReference, FusionError, OutageDrift, Outcome,
-    Outliers, SmoothedOutage, SmoothedOutcome, assess, outcome,
+    EndError, Ends, Finding, FixCounts, FromReference, FusionAssessment, FusionError,
+    FusionFigures, OutageDrift, Outliers, SmoothedOutage, SmoothedOutcome, assess, outcome,
 };
 pub use run::{LONGEST_GAP_S, bridged, fuse};
 pub use vehicle::{
@@ -178,7 +178,7 @@ pub struct Start {
     /// Standard deviations of the state.
     pub sigma: InitialSettings,
     /// Method of the alignment; none where the state was given.
-    pub found: Option<Found>,
+    pub found: Option<AlignmentSummary>,
 }
 
 /// Heading at the start that is given.
@@ -194,7 +194,7 @@ pub struct Heading {
 
 /// Result of [`alignment::coarse`] beside the state.
 #[derive(Debug, Clone, Copy)]
-pub struct Found {
+pub struct AlignmentSummary {
     /// Source of roll and pitch.
     pub level: Levelling,
     /// Standard deviation of the course as a heading, or of the heading that was given (degrees).

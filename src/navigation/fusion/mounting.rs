@@ -125,13 +125,13 @@ const FEWEST: usize = 6;
 
 /// Sums over blocks of time.
 #[derive(Default)]
-struct Blocks {
+struct BlockSums {
     /// Number of the block, and the sum in it.
     sums: Vec<(i64, f64)>,
     weight: f64,
 }
 
-impl Blocks {
+impl BlockSums {
     /// Adds `value` of weight `weight` at a time, times in order.
     fn add(&mut self, t_s: f64, value: f64, weight: f64) {
         let block = (t_s / BLOCK_S).floor() as i64;
@@ -259,7 +259,7 @@ fn through(
     }
     // Three parts: what scatters over the drive, what the filter itself is wrong by all along, and what no
     // drive shows.
-    let scatter = DVec3::from_array(blocks.each_ref().map(Blocks::sigma));
+    let scatter = DVec3::from_array(blocks.each_ref().map(BlockSums::sigma));
     let sigma_b = (scatter.powf(2.0) + of_filter(&moments).powf(2.0) + UNSEEN.powf(2.0)).powf(0.5);
     agreeing(mean, rough.1.hypot(sigma_b.z))?;
     let q_s_b = (mean * rough.0).normalize();
@@ -331,7 +331,7 @@ fn mean(moments: &[Moment]) -> DQuat {
     let mut mean = moments.first().map_or(DQuat::IDENTITY, |m| m.q);
     // each step takes the curvature of rotations anew; five are enough from anywhere
     for _ in 0..5 {
-        let step = DVec3::from_array(deviations(moments, mean).each_ref().map(Blocks::mean));
+        let step = DVec3::from_array(deviations(moments, mean).each_ref().map(BlockSums::mean));
         mean = (DQuat::from_scaled_axis(step) * mean).normalize();
     }
     mean
@@ -363,8 +363,8 @@ fn deviation(moment: &Moment, mean: DQuat) -> DVec3 {
 }
 
 /// The deviations of all, in blocks.
-fn deviations(moments: &[Moment], mean: DQuat) -> [Blocks; 3] {
-    let mut blocks: [Blocks; 3] = std::array::from_fn(|_| Blocks::default());
+fn deviations(moments: &[Moment], mean: DQuat) -> [BlockSums; 3] {
+    let mut blocks: [BlockSums; 3] = std::array::from_fn(|_| BlockSums::default());
     for m in moments {
         let deviation = deviation(m, mean).to_array();
         for (i, sum) in blocks.iter_mut().enumerate() {
@@ -400,7 +400,7 @@ const SLOPE: f64 = 3.0 * DEG;
 const ROUGH: f64 = 20.0 * DEG;
 
 /// A stretch between two velocities.
-struct Stretch {
+struct VelocityChange {
     t_s: f64,
     /// Mean specific force in the axes of the IMU and along the track, in the middle of the stretch (m/s²).
     f_s: DVec3,
@@ -420,7 +420,7 @@ fn track_attitude(v_n: DVec3, sigma_down: f64) -> DQuat {
 /// The rotation from the IMU to the track, and the standard deviation of its yaw (rad).
 fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), Refused> {
     let stretches = stretches(recorded, settings);
-    let mut seen = Blocks::default();
+    let mut seen = BlockSums::default();
     stretches.iter().for_each(|s| seen.add(s.t_s, 0.0, 1.0));
     if seen.count() < FEWEST {
         // the sum of nothing is -0
@@ -431,7 +431,7 @@ fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), R
         return Err(too_slow(seconds));
     }
     let weights: f64 = stretches.iter().map(|s| s.weight).sum();
-    let mean = |of: fn(&Stretch) -> DVec3| {
+    let mean = |of: fn(&VelocityChange) -> DVec3| {
         stretches.iter().map(|s| of(s) * s.weight).sum::<DVec3>() / weights
     };
     let (mean_s, mean_track) = (mean(|s| s.f_s), mean(|s| s.f_track));
@@ -439,7 +439,7 @@ fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), R
     let level = DQuat::from_rotation_arc(mean_s.normalize(), mean_track.normalize());
     let up = mean_track.normalize();
     // less their means, so that neither a bias of the accelerometers nor a tilt counts as acceleration
-    let pair = |s: &Stretch| (level * (s.f_s - mean_s), s.f_track - mean_track);
+    let pair = |s: &VelocityChange| (level * (s.f_s - mean_s), s.f_track - mean_track);
     // Wahba's problem about one axis: both vectors projected across `up`, sums of their sine and cosine.
     let torque = |u: DVec3, w: DVec3| up.dot(u.cross(w));
     let held = |u: DVec3, w: DVec3| u.dot(w) - up.dot(u) * up.dot(w);
@@ -452,7 +452,7 @@ fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), R
     };
     let none = DQuat::IDENTITY;
     let turn = DQuat::from_axis_angle(up, sum(none, &torque).atan2(sum(none, &held)));
-    let mut torques = Blocks::default();
+    let mut torques = BlockSums::default();
     for s in &stretches {
         let (u, w) = pair(s);
         torques.add(s.t_s, torque(turn * u, w), s.weight);
@@ -469,7 +469,7 @@ fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), R
 }
 
 /// The stretches between fixes that have a course.
-fn stretches(recorded: &Recorded<'_>, settings: &Settings) -> Vec<Stretch> {
+fn stretches(recorded: &Recorded<'_>, settings: &Settings) -> Vec<VelocityChange> {
     let courses: Vec<Moving> = courses(recorded.gnss, recorded.imu)
         .into_iter()
         .filter(|m| m.speed() >= m.needed())
@@ -486,7 +486,7 @@ fn stretch(
     settings: &Settings,
     (from, from_s): (&Moving, f64),
     (to, to_s): (&Moving, f64),
-) -> Option<Stretch> {
+) -> Option<VelocityChange> {
     let seconds = to_s - from_s;
     let samples = between(recorded.imu, from_s, to_s);
     if !(APART_S.0..=APART_S.1).contains(&seconds) || samples.is_empty() {
@@ -503,7 +503,7 @@ fn stretch(
     let sigma_down = from.sigma_n.z.hypot(to.sigma_n.z) / 2.0;
     let to_track = track_attitude((from.v_n + to.v_n) / 2.0, sigma_down).inverse();
     let sigma = from.sigma().hypot(to.sigma()) / seconds;
-    Some(Stretch {
+    Some(VelocityChange {
         t_s: (from_s + to_s) / 2.0,
         f_s: to_middle * dv / covered,
         f_track: to_track * f_n,
@@ -518,7 +518,7 @@ mod blocks_tests {
     /// Of 400 values of ±1, neighbours as often alike as not, the mean has the standard deviation 1/√400.
     #[test]
     fn the_scatter_of_blocks_is_that_of_their_mean() {
-        let mut blocks = Blocks::default();
+        let mut blocks = BlockSums::default();
         for k in 0..400 {
             let value = if k % 4 < 2 { 1.0 } else { -1.0 };
             (0..10).for_each(|i| {
@@ -533,7 +533,7 @@ mod blocks_tests {
             blocks.sigma()
         );
         // neighbours that are all alike in pairs: half as many values
-        let mut pairs = Blocks::default();
+        let mut pairs = BlockSums::default();
         (0..400).for_each(|k| {
             pairs.add(
                 BLOCK_S * f64::from(k),

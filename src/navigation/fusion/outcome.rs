@@ -12,7 +12,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Distance at the end of an outage, and what the filter states of it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Drift {
+pub struct EndError {
     /// Horizontal distance (m).
     pub horizontal_m: f64,
     /// Difference down (m).
@@ -32,9 +32,9 @@ pub struct OutageDrift {
     /// True if a fix follows it.
     followed_by_fix: bool,
     /// Against the first fix after it (the last withheld one, when none follows).
-    pub end_from_fix: Option<Drift>,
+    pub end_from_fix: Option<EndError>,
     /// Against the reference at that time.
-    pub end_from_reference: Option<Drift>,
+    pub end_from_reference: Option<EndError>,
 }
 
 /// Innovations of the fixes that end outages and gaps, all together: the only ones that the filter was not led to.
@@ -72,7 +72,7 @@ pub struct Outliers {
 
 /// Figures of a solution.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Outcome {
+pub struct FusionFigures {
     /// Fixes.
     pub fixes: FixCounts,
     /// Mean NIS of the fixes used or rejected, divided by their number of components: 1 if all is as believed. A rejected
@@ -143,11 +143,11 @@ pub struct SmoothedOutage {
 }
 
 /// The figures of a solution with these outages.
-pub fn outcome(solution: &Solution, outages: &[Outage]) -> Outcome {
+pub fn outcome(solution: &Solution, outages: &[Outage]) -> FusionFigures {
     let outliers = outliers(solution);
     let rejected = outliers.as_ref().map_or(0, |outliers| outliers.t_s.len());
     let used = solution.fixes.iter().filter(|f| f.used).count();
-    Outcome {
+    FusionFigures {
         fixes: FixCounts {
             used,
             withheld: solution.fixes.len() - used - rejected,
@@ -292,7 +292,7 @@ fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
     let withheld = || solution.fixes.iter().filter(|f| outage.withholds(f.t_s));
     let after = solution.fixes.iter().find(|f| f.t_s + 1e-9 >= outage.end_s);
     let last = after.or(withheld().next_back());
-    let end_from_fix = last.map(|f| Drift {
+    let end_from_fix = last.map(|f| EndError {
         horizontal_m: f.innovation[0].hypot(f.innovation[1]),
         down_m: f.innovation[2],
         expected_sigma_m: f.sigma[0].hypot(f.sigma[1]),
@@ -300,7 +300,7 @@ fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
     let end_from_reference = last.and_then(|f| {
         let error = f.error?;
         let (horizontal_m, expected_sigma_m) = (horizontal(&error), f.horizontal_sigma_m);
-        Some(Drift {
+        Some(EndError {
             horizontal_m,
             down_m: error[2],
             expected_sigma_m,
@@ -393,7 +393,7 @@ pub enum Finding {
 
 /// VerdictKind and evidence.
 #[derive(Debug, Clone)]
-pub struct Assessment {
+pub struct FusionAssessment {
     /// The gravest of the findings.
     pub verdict: VerdictKind,
     /// Findings, the gravest first.
@@ -415,10 +415,10 @@ pub(super) fn nis_bound(components: usize) -> f64 {
 /// against the start, as the alignment found it, `withheld` the errors at the ends of withheld windows.
 pub fn assess(
     weighed: &Weighed,
-    outcome: &Outcome,
+    outcome: &FusionFigures,
     of_start: &[(VerdictKind, Finding)],
     withheld: Option<Withheld>,
-) -> Assessment {
+) -> FusionAssessment {
     let mut findings = of_start.to_vec();
     let of_fixes = weighed.judged();
     let correlated = correlated(weighed);
@@ -460,7 +460,7 @@ pub fn assess(
     let verdict = findings
         .first()
         .map_or(VerdictKind::Consistent, |(verdict, _)| *verdict);
-    Assessment { verdict, findings }
+    FusionAssessment { verdict, findings }
 }
 
 /// Returns true if the fixes contradict a solution.
@@ -561,7 +561,7 @@ fn far(fixes: &[&FixRecord]) -> Option<f64> {
 }
 
 /// Errors at the ends of outages and gaps that are larger than stated.
-fn ends_finding(outcome: &Outcome) -> Option<(VerdictKind, Finding)> {
+fn ends_finding(outcome: &FusionFigures) -> Option<(VerdictKind, Finding)> {
     let ends = outcome.ends?;
     let degrees = 2 * ends.count;
     let sum = degrees as f64 * ends.error_over_sigma.powi(2);
@@ -680,7 +680,7 @@ mod assessment_tests {
         }
     }
 
-    fn judged(solution: &Solution) -> Assessment {
+    fn judged(solution: &Solution) -> FusionAssessment {
         assess(&weighed(solution), &outcome(solution, &[]), &[], None)
     }
 

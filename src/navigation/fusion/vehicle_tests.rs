@@ -14,7 +14,7 @@ use crate::sensors::aiding::{AidingSettings, NhcSettings, OdometerSettings, Zupt
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{FilterPass, TruthSide};
-use crate::simulation::{Plan, Recording, record};
+use crate::simulation::{Plan, SimulatedRecording, record};
 use crate::trajectory::Trajectory;
 use glam::{DQuat, DVec3};
 use rand::SeedableRng;
@@ -49,7 +49,7 @@ fn nhc(mounting_sigma_deg: f64) -> AidingSettings {
 fn recorded(
     aiding: &AidingSettings,
     runs: u64,
-    mut then: impl FnMut(u64, &Recording, &Start, &Belief),
+    mut then: impl FnMut(u64, &SimulatedRecording, &Start, &Belief),
 ) {
     let (trajectory, model) = (town(), consumer());
     let aided = scenario(aiding.clone());

@@ -1,7 +1,7 @@
 //! Statistics of one outage.
 
 use super::estimate::{Estimate, PerState, SampleSize, quantile_interval, sample_quantile};
-use super::summary::{AccuracySummary, OutageSummary, Recovery, Spread};
+use super::summary::{AccuracySummary, OutageSummary, QuantileSummary, Recovery};
 use crate::linalg::mean;
 use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{FilterPass, Judged, NamedSource};
@@ -46,7 +46,7 @@ pub(super) fn outages(result: &RunResult, epochs: &[EpochMetrics]) -> Vec<Outage
             nees_end_std_error: nees.std_error,
             log_density_end: density.value,
             log_density_end_std_error: density.std_error,
-            horizontal_error_end_m: Spread {
+            horizontal_error_end_m: QuantileSummary {
                 p50: sample_quantile(&horizontal, 0.5),
                 p95: sample_quantile(&horizontal, 0.95),
                 p999: None,

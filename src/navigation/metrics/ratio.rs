@@ -23,7 +23,7 @@ pub struct EpochRow {
 
 /// The results of an experiment, as far as ratios need them.
 #[derive(Debug, Clone)]
-pub struct Measured {
+pub struct ExperimentResult {
     /// Epochs in time order.
     pub epochs: Vec<EpochRow>,
     /// Runs in run order.
@@ -81,11 +81,11 @@ pub struct OutageComparison {
 /// # Errors
 /// When epochs or outages differ.
 pub fn compare(
-    candidate: &Measured,
-    reference: &Measured,
+    candidate: &ExperimentResult,
+    reference: &ExperimentResult,
     paired: bool,
 ) -> Result<Vec<OutageComparison>, String> {
-    let differ = |what: &str, words: &dyn Fn(&Measured) -> String| {
+    let differ = |what: &str, words: &dyn Fn(&ExperimentResult) -> String| {
         let [own, other] = [candidate, reference].map(words);
         format!("the {what} differ: {own} against {other} of the reference")
     };
@@ -116,8 +116,8 @@ pub fn compare(
 }
 
 fn outage(
-    candidate: &Measured,
-    reference: &Measured,
+    candidate: &ExperimentResult,
+    reference: &ExperimentResult,
     index: usize,
     (start_s, end_s): (f64, f64),
     paired: bool,
@@ -193,12 +193,12 @@ type Records<'a> = Vec<&'a OutageRecord>;
 
 /// The records of one outage on both sides: of the runs that neither side lost when paired.
 fn records<'a>(
-    candidate: &'a Measured,
-    reference: &'a Measured,
+    candidate: &'a ExperimentResult,
+    reference: &'a ExperimentResult,
     outage: usize,
     paired: bool,
 ) -> (Records<'a>, Records<'a>) {
-    let kept = |e: &'a Measured| {
+    let kept = |e: &'a ExperimentResult| {
         e.runs
             .iter()
             .filter(|r| !r.diverged && r.outages.len() > outage)

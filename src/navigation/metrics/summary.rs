@@ -40,7 +40,7 @@ pub struct Summary {
     /// Outages in time order.
     pub outages: Vec<OutageSummary>,
     /// Normalised estimation error squared of position, velocity and attitude.
-    pub nees: Consistency,
+    pub nees: ConsistencySummary,
     /// Normalised innovation squared of the fixes.
     pub nis: Nis,
     /// Share of runs inside the filter's ellipsoid of position and attitude.
@@ -120,7 +120,7 @@ pub struct OutageSummary {
     /// Its Monte-Carlo standard error.
     pub log_density_end_std_error: f64,
     /// Horizontal error at the same instant.
-    pub horizontal_error_end_m: Spread,
+    pub horizontal_error_end_m: QuantileSummary,
     /// True if its errors are beyond linear theory by covariance analysis.
     pub beyond_linear: bool,
     /// Time until the error is back to what it was before.
@@ -133,7 +133,7 @@ pub struct OutageSummary {
 /// Quantiles of a distribution over runs, with distribution-free 95 % intervals (null: too few runs), widened by what the
 /// calibration of what makes the errors leaves open where its draws are there; of a covariance analysis that alone.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
-pub struct Spread {
+pub struct QuantileSummary {
     /// Median.
     pub p50: f64,
     /// 95 % quantile.
@@ -161,7 +161,7 @@ pub struct Recovery {
 
 /// Chi-square statistic with its band for a consistent filter.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
-pub struct Consistency {
+pub struct ConsistencySummary {
     /// Degrees of freedom: what a correct filter's mean is.
     pub dof: usize,
     /// Mean over epochs and runs.
@@ -260,10 +260,10 @@ fn count(epochs: &[EpochMetrics], windows: Option<f64>) -> f64 {
     SampleSize::of(epochs.iter().map(|e| e.count).max().unwrap_or(0), windows).independent
 }
 
-fn nees(epochs: &[EpochMetrics], windows: Option<f64>) -> Consistency {
+fn nees(epochs: &[EpochMetrics], windows: Option<f64>) -> ConsistencySummary {
     let band = chi_square_band(NEES_DOF, count(epochs, windows));
     let [mean, lower95, upper95, fraction_inside] = over_epochs(epochs, band, |e| e.nees.value);
-    Consistency {
+    ConsistencySummary {
         dof: NEES_DOF,
         mean,
         lower95,
@@ -457,7 +457,7 @@ impl ReductionQuality {
 
 /// The figure that a limit is set on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Figure {
+enum LimitedFigure {
     /// Median of the horizontal error at the end of an outage.
     P50,
     /// Its 95 % quantile.
@@ -472,7 +472,7 @@ enum Figure {
 /// `consistent`, a verdict.
 #[derive(Debug, Clone, Copy)]
 pub struct Requirement {
-    figure: Figure,
+    figure: LimitedFigure,
     limit: f64,
 }
 
@@ -510,7 +510,7 @@ impl FromStr for Requirement {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         if text.trim() == "consistent" {
             return Ok(Self {
-                figure: Figure::Consistent,
+                figure: LimitedFigure::Consistent,
                 limit: 1.0 + TOLERANCE,
             });
         }
@@ -518,9 +518,9 @@ impl FromStr for Requirement {
             let (name, limit) = name_and_limit(text)?;
             let state = name.strip_prefix("rmse_").unwrap_or(name);
             let figure = match name {
-                "p50_m" => Figure::P50,
-                "p95_m" => Figure::P95,
-                _ => Figure::Rmse(REPORTED_NAMES.iter().position(|known| *known == state)?),
+                "p50_m" => LimitedFigure::P50,
+                "p95_m" => LimitedFigure::P95,
+                _ => LimitedFigure::Rmse(REPORTED_NAMES.iter().position(|known| *known == state)?),
             };
             Some(Self { figure, limit })
         };
@@ -533,16 +533,16 @@ impl FromStr for Requirement {
 impl Requirement {
     /// Returns true for a figure that exists only with outages.
     pub const fn needs_outage(&self) -> bool {
-        matches!(self.figure, Figure::P50 | Figure::P95)
+        matches!(self.figure, LimitedFigure::P50 | LimitedFigure::P95)
     }
 
     /// Its name.
     pub fn name(&self) -> String {
         match self.figure {
-            Figure::P50 => "p50_m".to_owned(),
-            Figure::P95 => "p95_m".to_owned(),
-            Figure::Rmse(state) => format!("rmse_{}", REPORTED_NAMES[state]),
-            Figure::Consistent => "consistent".to_owned(),
+            LimitedFigure::P50 => "p50_m".to_owned(),
+            LimitedFigure::P95 => "p95_m".to_owned(),
+            LimitedFigure::Rmse(state) => format!("rmse_{}", REPORTED_NAMES[state]),
+            LimitedFigure::Consistent => "consistent".to_owned(),
         }
     }
 
@@ -550,7 +550,7 @@ impl Requirement {
     /// outage that is beyond linear theory on, position and velocity down are not in the analysis: the runs beside it decide, and
     /// without runs no limit is met. All other figures hold (docs/limits.md).
     pub fn check(&self, summary: &Summary) -> Met {
-        if self.figure == Figure::Consistent {
+        if self.figure == LimitedFigure::Consistent {
             let Verdict {
                 kind,
                 ratio,
@@ -571,12 +571,12 @@ impl Requirement {
         // Free of chance: a limit is then not kept or missed by the luck of the runs.
         let expected = summary.lincov.as_deref().unwrap_or(summary);
         let of_outage = |o: &OutageSummary| match self.figure {
-            Figure::P50 => o.horizontal_error_end_m.p50,
-            Figure::P95 => o.horizontal_error_end_m.p95,
-            Figure::Rmse(state) => o.rmse_end.0[state],
-            Figure::Consistent => o.verdict.ratio,
+            LimitedFigure::P50 => o.horizontal_error_end_m.p50,
+            LimitedFigure::P95 => o.horizontal_error_end_m.p95,
+            LimitedFigure::Rmse(state) => o.rmse_end.0[state],
+            LimitedFigure::Consistent => o.verdict.ratio,
         };
-        let is_down = matches!(self.figure, Figure::Rmse(state) if DOWN.contains(&state));
+        let is_down = matches!(self.figure, LimitedFigure::Rmse(state) if DOWN.contains(&state));
         let is_shifted = |o: &OutageSummary| o.beyond_linear;
         let shifted = expected
             .outages
@@ -591,7 +591,7 @@ impl Requirement {
         let worst = ends.max_by(|a, b| (a.1.is_nan().cmp(&b.1.is_nan())).then(a.1.total_cmp(&b.1)));
         let (outage, value) = match (worst, self.figure) {
             (Some((outage, value)), _) => (Some(outage), value),
-            (None, Figure::Rmse(state)) => (None, expected.accuracy.rmse_mean.0[state]),
+            (None, LimitedFigure::Rmse(state)) => (None, expected.accuracy.rmse_mean.0[state]),
             (None, _) => (None, f64::NAN),
         };
         let (is_kept, is_sampled) = (value <= self.limit, summary.runs > 0);
@@ -616,7 +616,7 @@ impl Requirement {
 impl fmt::Display for Requirement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.figure {
-            Figure::Consistent => f.write_str("consistent"),
+            LimitedFigure::Consistent => f.write_str("consistent"),
             _ => write!(f, "{}<={}", self.name(), self.limit),
         }
     }

@@ -182,7 +182,7 @@ pub(super) fn judged(
 ) -> (Verdict, Vec<OutageVerdict>) {
     let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
     let independent = SampleSize::of(kept.len() as u64, windows).independent;
-    let judge = Judge::of_runs(&kept, outages, windows, independent);
+    let judge = ConsistencyTest::of_runs(&kept, outages, windows, independent);
     let lost = (kept.len() < runs.len()).then_some(VerdictKind::Diverged);
     let kind = lost.unwrap_or_else(|| judge.kind(None));
     let basis = match windows {
@@ -204,7 +204,7 @@ pub(super) fn expected(
     beyond_linear: Option<usize>,
 ) -> (Verdict, Vec<OutageVerdict>) {
     let outages = record.outages.len();
-    let judge = Judge::of_runs(&[record], outages, None, f64::INFINITY);
+    let judge = ConsistencyTest::of_runs(&[record], outages, None, f64::INFINITY);
     let kind = match judge.kind(None) {
         VerdictKind::Consistent if beyond_linear.is_some() => VerdictKind::Doubtful,
         kind => kind,
@@ -294,7 +294,7 @@ impl Verdict {
             (_, Some(state)) => samples_of_state[state],
             _ => independent,
         };
-        let mut judge = Judge::new(&[&record], outages.len(), None, known.len(), samples);
+        let mut judge = ConsistencyTest::new(&[&record], outages.len(), None, known.len(), samples);
         // Slow errors that are small by chance leave fast ones, which look like many samples: one is sure.
         let tail = judge.tail;
         let few = judge.statistics.iter_mut();
@@ -349,7 +349,7 @@ impl Verdict {
             freedom,
             limits: ratio_limits(freedom, tail),
         };
-        let judge = Judge {
+        let judge = ConsistencyTest {
             statistics: vec![together],
             tail,
         };
@@ -415,14 +415,14 @@ fn ratio_limits((dof, samples): (usize, f64), tail: f64) -> (f64, f64) {
 }
 
 /// The statistics of some samples and what a right filter's are.
-struct Judge {
+struct ConsistencyTest {
     /// All states together and each of them, over the whole run and at the end of each outage.
     statistics: Vec<Statistic>,
     /// Probability that one of them is beyond a limit.
     tail: f64,
 }
 
-impl Judge {
+impl ConsistencyTest {
     /// For runs that all count alike.
     fn of_runs(
         runs: &[&RunRecord],

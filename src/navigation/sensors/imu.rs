@@ -131,7 +131,7 @@ fn check_recording(recording: &Recording, imu_hz: f64, needs: usize) -> Result<(
 /// The errors of up to eight runs, side by side.
 #[derive(Debug, Clone)]
 pub struct LaneErrors<'a> {
-    source: Source<'a>,
+    source: ErrorSource<'a>,
     /// For each sample, accelerometer (m/s²) and gyroscope (rad/s); the first `used` have been handed out.
     block: Vec<[Vec3; 2]>,
     used: usize,
@@ -139,7 +139,7 @@ pub struct LaneErrors<'a> {
 }
 
 #[derive(Debug, Clone)]
-enum Source<'a> {
+enum ErrorSource<'a> {
     /// One synthesizer for each channel.
     Synthesised(Box<[Synthesizer<LaneGenerator>; 6]>),
     /// For each run the rest of its window on the six channels, and the level from which that started (m/s² or rad/s).
@@ -159,7 +159,7 @@ impl<'a> LaneErrors<'a> {
         samples: usize,
     ) -> Self {
         let synthesised = |model_of: &dyn Fn(u64) -> &'a Model| {
-            Source::Synthesised(Box::new(Channel::ALL.map(|channel| {
+            ErrorSource::Synthesised(Box::new(Channel::ALL.map(|channel| {
                 let source = &*channel.to_string();
                 let keys = keys.iter().map(|key| StreamKey { source, ..*key });
                 let runs = keys.map(|key| (model_of(key.run).axis(channel), key));
@@ -184,7 +184,7 @@ impl<'a> LaneErrors<'a> {
                         (&all[start..start + samples], level)
                     })
                 };
-                Source::Recorded(keys.iter().map(window).collect())
+                ErrorSource::Recorded(keys.iter().map(window).collect())
             }
         };
         Self {
@@ -211,8 +211,10 @@ impl<'a> LaneErrors<'a> {
         self.block.resize(first + BLOCK, [Vec3::ZERO; 2]);
         for channel in Channel::ALL {
             match &mut self.source {
-                Source::Synthesised(channels) => channels[channel.index()].fill(&mut self.channel),
-                Source::Recorded(windows) => {
+                ErrorSource::Synthesised(channels) => {
+                    channels[channel.index()].fill(&mut self.channel)
+                }
+                ErrorSource::Recorded(windows) => {
                     self.channel.fill(Lanes::ZERO);
                     for (lane, window) in windows.iter_mut().enumerate() {
                         let (left, level) = &mut window[channel.index()];

@@ -11,7 +11,7 @@ pub(crate) use batch::reported_error;
 pub use gains::{Gains, GainsUsed, run_batch};
 pub(crate) use plan::samples_per;
 pub use plan::{Experiment, ExperimentError, Plan};
-pub use source::{Recording, record};
+pub use source::{SimulatedRecording, record};
 
 use serde::{Deserialize, Serialize};
 

@@ -27,7 +27,7 @@ pub const LIMITS: [f64; 4] = [350.0, 30.0, 35.0, 200.0];
 
 /// A stretch beyond a limit.
 #[derive(Debug, Clone, Copy)]
-pub struct Excess {
+pub struct LimitExcess {
     /// The quantity and its unit.
     pub quantity: (&'static str, &'static str),
     /// The limit.
@@ -42,7 +42,7 @@ pub struct Excess {
     pub end_s: f64,
 }
 
-impl fmt::Display for Excess {
+impl fmt::Display for LimitExcess {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (name, unit) = self.quantity;
         write!(
@@ -63,9 +63,9 @@ impl fmt::Display for Excess {
 
 /// The largest speed, acceleration, jerk and rate of a trajectory (SI), in the order of `Quantity::ALL`,
 /// and every stretch beyond the limits, in order of time.
-pub fn examine(trajectory: &Trajectory, limits: &[f64; 4]) -> ([f64; 4], Vec<Excess>) {
+pub fn examine(trajectory: &Trajectory, limits: &[f64; 4]) -> ([f64; 4], Vec<LimitExcess>) {
     let (mut largest, mut found) = ([0.0_f64; 4], Vec::new());
-    let mut open: [Option<Excess>; 4] = [None; 4];
+    let mut open: [Option<LimitExcess>; 4] = [None; 4];
     // Acceleration is linear between knots, so that its extremes are at knots.
     for &t_s in trajectory.knots() {
         for (i, value) in magnitudes(trajectory, t_s).into_iter().enumerate() {
@@ -74,7 +74,7 @@ pub fn examine(trajectory: &Trajectory, limits: &[f64; 4]) -> ([f64; 4], Vec<Exc
             // NaN lies beyond every limit: it is to be reported, not passed over.
             // A motion made to reach the limit exactly does so to rounding.
             if value.is_nan() || value > limit * (1.0 + 1e-6) {
-                let event = Excess {
+                let event = LimitExcess {
                     quantity: QUANTITIES[i],
                     limit,
                     worst: value,
@@ -94,7 +94,7 @@ pub fn examine(trajectory: &Trajectory, limits: &[f64; 4]) -> ([f64; 4], Vec<Exc
     (largest, found)
 }
 
-fn extend(event: &mut Excess, by: &Excess) {
+fn extend(event: &mut LimitExcess, by: &LimitExcess) {
     event.end_s = by.end_s;
     if by.worst > event.worst {
         (event.worst, event.worst_s) = (by.worst, by.worst_s);

@@ -62,7 +62,7 @@ pub struct ParameterRef {
 }
 
 /// Row of the table of kinds.
-struct Row {
+struct KindRow {
     code: &'static str,
     /// In the order of files: the shape, if it has one, before the amplitude.
     parameters: &'static [Parameter],
@@ -73,50 +73,50 @@ struct Row {
 }
 
 /// One row a kind, in the order of [`Kind::ALL`].
-const TABLE: [Row; 8] = [
-    Row {
+const TABLE: [KindRow; 8] = [
+    KindRow {
         code: "WN",
         parameters: &[Parameter::Sigma2],
         units: "({u})², per sample",
         power: 1,
     },
-    Row {
+    KindRow {
         code: "QN",
         parameters: &[Parameter::Q2],
         units: "({u})²",
         power: 1,
     },
-    Row {
+    KindRow {
         code: "AR1",
         parameters: &[Parameter::Phi, Parameter::Sigma2],
         units: "({u})², innovation variance per sample",
         power: 1,
     },
-    Row {
+    KindRow {
         code: "GM",
         parameters: &[Parameter::Beta, Parameter::S2],
         units: "1/s, ({u})²",
         power: 1,
     },
-    Row {
+    KindRow {
         code: "MA1",
         parameters: &[Parameter::Theta, Parameter::Sigma2],
         units: "({u})², innovation variance per sample",
         power: 1,
     },
-    Row {
+    KindRow {
         code: "FN",
         parameters: &[Parameter::B2],
         units: "({u})²",
         power: 1,
     },
-    Row {
+    KindRow {
         code: "RW",
         parameters: &[Parameter::Gamma2],
         units: "({u})², increment variance per sample",
         power: 1,
     },
-    Row {
+    KindRow {
         code: "DR",
         parameters: &[Parameter::Slope],
         units: "{u} per sample",
@@ -137,7 +137,7 @@ impl Kind {
         Self::Drift,
     ];
 
-    const fn row(self) -> &'static Row {
+    const fn row(self) -> &'static KindRow {
         &TABLE[self as usize]
     }
 

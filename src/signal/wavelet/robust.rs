@@ -438,7 +438,7 @@ pub struct QuantizationResponse {
 impl QuantizationResponse {
     /// For a rejection point and the consistency constant that belongs to it.
     pub(super) fn new(c: f64, a: f64) -> Self {
-        let law = Law::new();
+        let law = MixtureLaw::new();
         let gaussian = law.solve(0.0, c, a).1;
         let mut response = Self {
             factor: [0.0; NODES],
@@ -490,12 +490,12 @@ fn departure(series: &[f64; NODES], share: f64) -> (f64, f64) {
 }
 
 /// Law of √(1 − share)·Z + √share·Y: nodes and weights of the quadratures over Z and Y.
-struct Law {
+struct MixtureLaw {
     normal: Vec<(f64, f64)>,
     second_difference: Vec<(f64, f64)>,
 }
 
-impl Law {
+impl MixtureLaw {
     fn new() -> Self {
         // The trapezoidal rule is exact to rounding for a Gaussian weight; chi's fourth derivative jumps where that is 1e-5.
         let normal = (-64..=64).map(|i| {
@@ -626,13 +626,13 @@ impl Tuning {
             && low < middle
             && middle < high
         {
-            if Moments::new(middle).efficiency() < efficiency {
+            if TruncatedMoments::new(middle).efficiency() < efficiency {
                 low = middle;
             } else {
                 high = middle;
             }
         }
-        let moments = Moments::new(high);
+        let moments = TruncatedMoments::new(high);
         let a = moments.chi();
         Ok(Self {
             efficiency: moments.efficiency(),
@@ -673,12 +673,12 @@ impl Tuning {
 }
 
 /// E\[Z^2k; |Z| ≤ c\], k = 0 … 10.
-struct Moments {
+struct TruncatedMoments {
     c: f64,
     even: [f64; 11],
 }
 
-impl Moments {
+impl TruncatedMoments {
     fn new(c: f64) -> Self {
         let mut even = [erf(c / SQRT_2); 11];
         // By parts: E[Z^2k; |Z| ≤ c] = (2k − 1) E[Z^(2k−2); |Z| ≤ c] − 2 c^(2k−1) φ(c).
@@ -812,7 +812,7 @@ mod tuning_tests {
     /// Published by the R package wv, as its source computes them.
     #[test]
     fn constants_of_the_package_wv() {
-        let its = Moments::new(4.973362);
+        let its = TruncatedMoments::new(4.973362);
         assert_relative_eq!(its.chi(), 0.636724, max_relative = 1e-6);
         assert_relative_eq!(its.efficiency(), 0.727, max_relative = 1e-3);
     }
