@@ -3,7 +3,7 @@
 use nav_sim::io::datasheet::{Figure, catalogued};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::require::{
-    Course, Drift, IMU_PARAMETERS, IntensityBound, Limit, LimitQuantity, Margins, Need,
+    Course, Drift, IMU_PARAMETERS, ImuSearch, IntensityBound, Limit, LimitQuantity, Margins,
     RequireError,
 };
 use nav_sim::navigation::scenario::Scenario;
@@ -11,7 +11,8 @@ use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::navigation::trajectory::profile::{
-    Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
+    Acceleration, Bank, Length, Profile, ProfileStart as Start, Segment, SegmentKind as Kind,
+    Turning,
 };
 use nav_sim::signal::imu::Sensor;
 use nav_sim::signal::noise::{Composite, Model, Process};
@@ -77,7 +78,7 @@ fn the_imu_that_is_named_meets_the_limit_in_sampled_runs() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
     let course = Course::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
     let limits = limit(LimitQuantity::P95, 12.0);
-    let need = Need {
+    let need = ImuSearch {
         course: &course,
         scenario: &scenario,
         limits: &limits,
@@ -115,7 +116,7 @@ fn answers_are_monotone() {
         limit(LimitQuantity::P95, 30.0),
         limit(LimitQuantity::P95, 10.0),
     ];
-    let need = |k: usize| Need {
+    let need = |k: usize| ImuSearch {
         course: &course,
         scenario: &scenario,
         limits: &limits[k],
@@ -146,7 +147,7 @@ fn what_gnss_alone_misses_is_refused() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
     let course = Course::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
     let limits = limit(LimitQuantity::Rmse, 0.05);
-    let need = Need {
+    let need = ImuSearch {
         course: &course,
         scenario: &scenario,
         limits: &limits,
@@ -171,7 +172,7 @@ fn the_imu_that_is_named_keeps_the_limit_at_every_beginning() {
     let course = Course::new(&scenario, &trajectory, &outages).unwrap();
     for most in [3.0, 10.0] {
         let limits = limit(LimitQuantity::P95, most);
-        let need = Need {
+        let need = ImuSearch {
             course: &course,
             scenario: &scenario,
             limits: &limits,
@@ -206,7 +207,7 @@ fn the_imu_that_is_named_keeps_the_limit_in_the_steps_of_a_run() {
         }];
         let course = Course::new(&scenario, &trajectory, &outages).unwrap();
         let limits = limit(LimitQuantity::Rmse, 1.0 + 0.005 * length_s * length_s);
-        let need = Need {
+        let need = ImuSearch {
             course: &course,
             scenario: &scenario,
             limits: &limits,
@@ -313,7 +314,7 @@ fn a_curve_holds_the_ends_of_all_shorter_outages() {
     let course =
         |end_s: f64| Course::new(&scenario, &trajectory, &[Outage { end_s, ..OUTAGE }]).unwrap();
     let at_end = course(170.0);
-    let need = Need {
+    let need = ImuSearch {
         course: &at_end,
         scenario: &scenario,
         limits: &limits,

@@ -387,7 +387,7 @@ mod tests {
     use crate::imu::Sensor;
     use crate::noise::{Composite, Process};
     use crate::rng::StreamKey;
-    use crate::wavelet::AllanCurve;
+    use crate::wavelet::Curve;
     use crate::{Estimator, Scope, Weighting, fit};
     use rand::RngExt;
     use rand_distr::ChiSquared;
@@ -405,11 +405,11 @@ mod tests {
                 .iter()
                 .map(|l| composite.haar_wv(*l) + 1e-12)
                 .collect();
-            let curve = AllanCurve {
+            let curve = Curve {
                 edof: vec![100.0; 12],
                 levels,
                 wv,
-                ..AllanCurve::default()
+                ..Curve::default()
             };
             let spec = "2*AR1".parse().unwrap();
             let mut fit = fit(&curve, &spec, 1.0, Weighting::Edof).unwrap();
