@@ -2,7 +2,7 @@
 
 use crate::error;
 use crate::work::work;
-use nav_sim::app::Front;
+use nav_sim::app::Reporter;
 use nav_sim::io::contamination_file;
 use nav_sim::io::model_file::{self, ModelFile};
 use nav_sim::prelude::{AxisParameters, Channel, Composite, Horizon, Policy, Sensor};

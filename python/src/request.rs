@@ -2,7 +2,7 @@
 
 use crate::error;
 use crate::work::work;
-use nav_sim::app::{Answer as _, Answered, Context, Failure};
+use nav_sim::app::{Answer as _, Context, Failure, RenderedAnswer};
 use nav_sim::commands::batch::{BatchOutcome, BatchRequest};
 use nav_sim::document::Importance;
 use numpy::PyArray1;
@@ -67,7 +67,7 @@ const WIDTH: usize = 120;
 /// The answer to a request: as the command prints, draws and writes it.
 #[pyclass(frozen, module = "nav_sim._native")]
 pub(crate) struct Answer {
-    answered: Answered,
+    answered: RenderedAnswer,
     /// Directory of what came as arrays, which no text shows.
     hidden: String,
     /// Doubts about the input.
@@ -176,7 +176,7 @@ pub(crate) fn study_run(
     });
     let answer = match outcome.map_err(|e| error::of_failure(py, &e, ""))? {
         BatchOutcome::Merged(answer) => {
-            let answered = Answered {
+            let answered = RenderedAnswer {
                 json: serde_json::to_string(&*answer).unwrap_or_default(),
                 document: answer.document(),
                 files: Vec::new(),

@@ -1,7 +1,7 @@
 //! Jobs that leave Python free: other threads run, Ctrl-C ends them, progress is told.
 
 use crate::error;
-use nav_sim::app::Front;
+use nav_sim::app::Reporter;
 use nav_sim::document::{Importance, Note};
 use pyo3::prelude::*;
 use std::any::Any;
@@ -18,7 +18,7 @@ const SLICE: Duration = Duration::from_millis(50);
 ///
 /// Threads that work never touch Python: they count here, and the calling thread looks.
 #[derive(Debug, Default)]
-pub(crate) struct Meter {
+pub(crate) struct JobMonitor {
     done: AtomicU64,
     total: AtomicU64,
     is_stopped: AtomicBool,
@@ -30,7 +30,7 @@ pub(crate) struct Meter {
 /// Panic payload of a stopped job.
 struct Stopped;
 
-impl Front for Meter {
+impl Reporter for JobMonitor {
     fn note(&self, note: Note) {
         if note.importance == Importance::Warning {
             self.noted().push(note.text);
@@ -56,7 +56,7 @@ impl Front for Meter {
     }
 }
 
-impl Meter {
+impl JobMonitor {
     fn noted(&self) -> MutexGuard<'_, Vec<String>> {
         self.warnings.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -80,10 +80,10 @@ pub(crate) fn work<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
     threads: Option<usize>,
-    job: impl FnOnce(&Meter) -> T + Send + 'static,
+    job: impl FnOnce(&JobMonitor) -> T + Send + 'static,
 ) -> PyResult<T> {
     in_this_process(py)?;
-    let meter = Arc::new(Meter::default());
+    let meter = Arc::new(JobMonitor::default());
     let counted = Arc::clone(&meter);
     let (sender, receiver) = channel();
     std::thread::spawn(move || {
@@ -124,7 +124,11 @@ pub(crate) fn work<T: Send + 'static>(
     }
 }
 
-fn tell(progress: Option<&Bound<'_, PyAny>>, meter: &Meter, told: &mut (u64, u64)) -> PyResult<()> {
+fn tell(
+    progress: Option<&Bound<'_, PyAny>>,
+    meter: &JobMonitor,
+    told: &mut (u64, u64),
+) -> PyResult<()> {
     let reached = meter.reached();
     if let Some(progress) = progress.filter(|_| reached != *told && reached.1 > 0) {
         progress.call1(reached)?;

@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// Receives notes and progress: a terminal, Python, a test. `()` ignores them.
-pub trait Front: Sync {
+pub trait Reporter: Sync {
     /// A note.
     fn note(&self, note: Note);
 
@@ -27,13 +27,13 @@ pub trait Front: Sync {
     }
 }
 
-impl Front for () {
+impl Reporter for () {
     fn note(&self, _: Note) {}
 }
 
 /// The surroundings of a command: where notes and progress go, the seed that was given, and the time of its runs.
 pub struct Context<'a> {
-    front: &'a dyn Front,
+    front: &'a dyn Reporter,
     seed: Option<u64>,
     is_timed: bool,
     started: Mutex<Option<Instant>>,
@@ -48,7 +48,7 @@ pub const DEFAULT_SEED: u64 = 1;
 
 impl<'a> Context<'a> {
     /// A context with the seed of `--seed`, if it is given.
-    pub fn new(front: &'a dyn Front, seed: Option<u64>) -> Self {
+    pub fn new(front: &'a dyn Reporter, seed: Option<u64>) -> Self {
         Self {
             front,
             seed,

@@ -52,8 +52,9 @@ mod anticipated;
 
 pub use anticipated::Anticipated;
 pub use curve::{
-    Beginning, CalibrationError, CalibrationFault, Estimator, Group, Pool, Replicate, Scope, Trim,
-    WarmUp, average, grouped, implied, log_bias, median, replicates, robust_bias, trend, warm_up,
+    CalibrationError, CalibrationFault, Estimator, Group, Pool, RecordingWarmUp, Replicate, Scope,
+    Trim, WarmUp, average, grouped, implied, log_bias, median, replicates, robust_bias, trend,
+    warm_up,
 };
 pub use diagnosis::{
     Alarm, CommonCause, CommonFinding, Diagnosis, FEWEST_TO_COMPARE, RecordingVerdict, diagnose,
@@ -62,9 +63,10 @@ pub use fit::{Fit, Termination, Weighting, estimate, fit};
 pub use format::{duration, percent};
 pub use model::{ModelSpec, SpecError};
 pub use outcome::{
-    Advance, AxesDiffer, Bootstrap, CurveDeparture, FitRange, Goodness, Indistinct, Inference,
-    LevelSpread, Miss, ModelCandidate, ModelChoice, ModelRanking, Outcome, ParameterInterval,
-    ParameterSpread, Practical, PracticalIntervals, Settings, Undetermined, model_of, tau_s,
+    Advance, AxesDiffer, Bootstrap, CurveDeparture, FitRange, Goodness, IndistinctProcesses,
+    Inference, LevelSpread, ModelCandidate, ModelChoice, ModelRanking, Outcome, ParameterInterval,
+    ParameterSpread, Practical, PracticalIntervals, ScaleMisfit, Settings, Undetermined, model_of,
+    tau_s,
 };
 pub use pipeline::{calibrate, calibrate_telling, fit_curve, infer, infer_telling};
 pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};

@@ -263,7 +263,7 @@ pub struct Inference {
     /// Parameters that are known to differ between recordings; none where [`alike`](Self::alike) does not say that these differ.
     pub varying: Vec<ParameterSpread>,
     /// Alike processes that cannot be told apart, and the simpler model.
-    pub indistinct: Option<Indistinct>,
+    pub indistinct: Option<IndistinctProcesses>,
     /// Intervals of N, K and B.
     pub practical: PracticalIntervals,
 }
@@ -414,7 +414,7 @@ impl Goodness {
 
 /// Processes of one kind that cannot be told apart.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Indistinct {
+pub struct IndistinctProcesses {
     /// Their positions in the model.
     pub processes: Vec<usize>,
     /// The model with one of them less, which describes the curve as well.
@@ -478,7 +478,7 @@ const KNOWN: f64 = 0.1;
 
 /// A curve at one level, against the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Miss {
+pub struct ScaleMisfit {
     /// Level.
     pub level: u32,
     /// Wavelet variance of the data over that of the model.
@@ -499,24 +499,24 @@ pub struct CurveDeparture {
     /// Scales that count in the fit.
     pub scales: usize,
     /// Scales at which the model is off by more than four standard deviations.
-    pub missed: Vec<Miss>,
+    pub missed: Vec<ScaleMisfit>,
     /// Scale with the ratio furthest from 1, among those known to 10 % (among all, if none is).
-    pub furthest: Option<Miss>,
+    pub furthest: Option<ScaleMisfit>,
     /// The longest of these scales, where there are longer ones.
     pub known_to: Option<u32>,
     /// The scale with the ratio furthest from 1 of all that are missed, those that count in no fit included, where the model
     /// does not fit: by single scales, by all together or by the J-test.
-    pub misfit: Option<Miss>,
+    pub misfit: Option<ScaleMisfit>,
 }
 
 impl CurveDeparture {
-    fn of(all: &[Miss], goodness: Option<Goodness>) -> Self {
-        let beyond = |all: &[Miss], deviations: f64| -> Vec<Miss> {
-            let is_beyond = |m: &&Miss| m.deviations.abs() > deviations;
+    fn of(all: &[ScaleMisfit], goodness: Option<Goodness>) -> Self {
+        let beyond = |all: &[ScaleMisfit], deviations: f64| -> Vec<ScaleMisfit> {
+            let is_beyond = |m: &&ScaleMisfit| m.deviations.abs() > deviations;
             all.iter().filter(is_beyond).copied().collect()
         };
-        let fitted: Vec<Miss> = all.iter().filter(|m| m.is_fitted).copied().collect();
-        let known: Vec<Miss> = fitted.iter().filter(|m| m.is_known).copied().collect();
+        let fitted: Vec<ScaleMisfit> = all.iter().filter(|m| m.is_fitted).copied().collect();
+        let known: Vec<ScaleMisfit> = fitted.iter().filter(|m| m.is_known).copied().collect();
         let missed = beyond(&fitted, MISSED);
         let doubtful = furthest(&beyond(&fitted, DOUBTFUL));
         let is_rejected = match goodness {
@@ -539,12 +539,12 @@ impl CurveDeparture {
 
 /// Probability of scores at least as far off together, where the model holds: their squares as a chi-square of as many
 /// degrees of freedom as scales. That parameters were fitted makes it larger, that neighbours hang together smaller.
-fn chance(all: &[Miss]) -> f64 {
+fn chance(all: &[ScaleMisfit]) -> f64 {
     let squares: f64 = all.iter().map(|m| m.deviations * m.deviations).sum();
     ChiSquared::new(all.len().max(1) as f64).map_or(1.0, |law| law.sf(squares))
 }
 
-fn furthest(all: &[Miss]) -> Option<Miss> {
+fn furthest(all: &[ScaleMisfit]) -> Option<ScaleMisfit> {
     // In the logarithm half is as far from 1 as twice.
     all.iter()
         .copied()
@@ -559,14 +559,14 @@ impl Outcome {
         let data = curve.wv.iter().zip(&curve.edof).zip(implied);
         // Var ln nu is 2/eta by a curve's own noise, and what recordings differ by beside it.
         let known_to = |edof: &f64| 1.0 / (1.0 / edof + 0.5 * curve.differing);
-        let miss = |(level, ((nu, edof), implied)): (&u32, ((&f64, &f64), f64))| Miss {
+        let miss = |(level, ((nu, edof), implied)): (&u32, ((&f64, &f64), f64))| ScaleMisfit {
             level: *level,
             ratio: nu / implied,
             deviations: score(nu / implied, known_to(edof)),
             is_fitted: !curve.ignored.contains(level),
             is_known: (2.0 / edof).sqrt() <= KNOWN,
         };
-        let all: Vec<Miss> = curve.levels.iter().zip(data).map(miss).collect();
+        let all: Vec<ScaleMisfit> = curve.levels.iter().zip(data).map(miss).collect();
         CurveDeparture::of(&all, self.goodness())
     }
 
@@ -588,7 +588,7 @@ impl Outcome {
 
 #[cfg(test)]
 mod departure_tests {
-    use super::{CurveDeparture, Miss, chance};
+    use super::{CurveDeparture, ScaleMisfit, chance};
     use crate::fit::score;
     use crate::pipeline::fit_given;
     use crate::wavelet::Curve;
@@ -599,9 +599,9 @@ mod departure_tests {
     /// what speaks against the model is the scale where it is worst.
     #[test]
     fn scales_are_judged_together_and_told_as_far_as_they_are_known() {
-        let off = |deviations: f64| -> Vec<Miss> {
+        let off = |deviations: f64| -> Vec<ScaleMisfit> {
             (1..=12)
-                .map(|level| Miss {
+                .map(|level| ScaleMisfit {
                     level,
                     ratio: 1.0 - 0.05 * f64::from(level),
                     deviations,

@@ -1,7 +1,7 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
 use super::{Cli, Common, Failure, Session};
-use crate::app::{Answer, Front};
+use crate::app::{Answer, Reporter};
 use crate::commands::batch::{BatchOutcome, BatchRequest};
 use crate::io::atomic;
 use clap::{Parser, value_parser};

@@ -1,7 +1,7 @@
 //! The command line: what is parsed, and small commands; larger ones have files of their own.
 
 pub(crate) use crate::app::Failure;
-use crate::app::{Answer, Asked, Result};
+use crate::app::{Answer, Invocation, Result};
 use crate::commands::batch::Study;
 use crate::commands::trajectory::{TrajectoryArgs, TrajectoryCommand};
 use crate::commands::with_commands;
@@ -37,11 +37,11 @@ macro_rules! driven {
     ($($variant:ident: $command:path),* $(,)?) => {
         /// Commands that answer a question.
         #[derive(Subcommand)]
-        enum Driven {
-            $($variant(Asked<$command>)),*
+        enum AnswerCommand {
+            $($variant(Invocation<$command>)),*
         }
 
-        impl Driven {
+        impl AnswerCommand {
             fn run(&self, session: &Session) -> Result<(), Failure> {
                 match self {
                     $(Self::$variant(asked) => drive(asked, session)),*
@@ -56,7 +56,7 @@ with_commands!(driven);
 #[expect(clippy::large_enum_variant, reason = "there is one, once a process")]
 enum CliCommand {
     #[command(flatten)]
-    Driven(Driven),
+    Answer(AnswerCommand),
     Trajectory(TrajectoryArgs),
     Batch(batch::BatchArgs),
     Demo(demo::DemoArgs),
@@ -79,7 +79,7 @@ impl CliCommand {
 
     fn run(self, session: Session) -> Result<(), Failure> {
         let text = match self {
-            Self::Driven(driven) => return driven.run(&session),
+            CliCommand::Answer(driven) => return driven.run(&session),
             Self::Trajectory(args) => match args.command {
                 TrajectoryCommand::Generate(mut asked) => {
                     asked.request.rate_hz.get_or_insert(100.0);
@@ -408,7 +408,7 @@ fn init(args: &InitArgs, session: &Session) -> Result<String, Failure> {
 // Runs a command on a terminal: claims outputs, runs, shows, writes.
 
 /// Does a command.
-fn drive<C: crate::app::Command>(asked: &Asked<C>, session: &Session) -> Result<()> {
+fn drive<C: crate::app::Command>(asked: &Invocation<C>, session: &Session) -> Result<()> {
     let mut manifest = asked.manifest(session.common.seed)?;
     manifest.command.clone_from(&session.given);
     let claims = asked.claim(&manifest, session.common.force)?;

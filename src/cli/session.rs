@@ -2,7 +2,7 @@
 //! everything said to stderr.
 
 use super::Failure;
-use crate::app::{Answer, Context, Front};
+use crate::app::{Answer, Context, Reporter};
 use crate::failure::system_words;
 use crate::io::atomic::remove_unfinished;
 use crate::parse;
@@ -150,7 +150,7 @@ impl Session {
     }
 }
 
-impl Front for Session {
+impl Reporter for Session {
     fn note(&self, Note { importance, text }: Note) {
         match importance {
             // those of the commands of a demo are for --verbose, as their remarks are

@@ -11,7 +11,7 @@ use nav_sim_document::{
     window,
 };
 use nav_sim_navigation::fusion::judge::{
-    Doubt, Judgement, ReferenceOffset, StatedErrors, judge, rough_delay_s,
+    Judgement, ReferenceOffset, SetupFault, StatedErrors, judge, rough_delay_s,
 };
 use nav_sim_navigation::metrics::{DriveVerdict, VerdictKind};
 use nav_sim_navigation::sensors::outage::Outage;
@@ -187,28 +187,28 @@ fn summary(judgement: &Judgement, outages: &[(f64, f64)]) -> serde_json::Value {
 }
 
 /// Whatever else explains the errors, in a sentence with what to do.
-fn doubt(doubt: &Doubt) -> String {
+fn doubt(doubt: &SetupFault) -> String {
     match doubt {
-        Doubt::Apart { metres } => format!(
+        SetupFault::Apart { metres } => format!(
             "solution and reference are {} m apart: another origin, latitude and longitude exchanged, or another drive",
             readable(*metres)
         ),
-        Doubt::Height { metres } => format!(
+        SetupFault::Height { metres } => format!(
             "heights of the solution are {} m above the reference's all the time: one above sea level, one above the ellipsoid?",
             readable(*metres)
         ),
-        Doubt::Axes {
+        SetupFault::Axes {
             axes,
             angles_deg: [roll, pitch, yaw],
         } => format!(
             "the axes of {axes} are turned by roll {roll:.0}°, pitch {pitch:.0}°, yaw {yaw:.0}° in those of the reference: write both as front, right, down in north, east, down"
         ),
-        Doubt::Transformed { cause, times, left } => format!(
+        SetupFault::Transformed { cause, times, left } => format!(
             "{cause}? Errors are {} times their standard deviations as it is, {} times after that",
             readable(*times),
             readable(*left)
         ),
-        Doubt::Offset(found) => {
+        SetupFault::Offset(found) => {
             let (offset, sigma) = (found.offset, found.sigma);
             let (arm, arm_sigma) = (offset.lever_arm_m, sigma.lever_arm_m);
             let delay = format!(
@@ -274,7 +274,7 @@ fn page(judgement: &Judgement, outages: &[(f64, f64)]) -> Document {
     {
         let text = format!(
             "{}: less than the solution states",
-            doubt(&Doubt::Offset(found))
+            doubt(&SetupFault::Offset(found))
         );
         document.note(Importance::Remark, text);
     }

@@ -11,8 +11,8 @@ use crate::report::csv::merged;
 use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds, window};
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
-    Course, Drift, ImuParameters, ImuSearch, IntensityBound as Bound, Limit, LimitQuantity,
-    Margins, RequireError, Worst, evenly,
+    Drift, HardestLimit, ImuParameters, ImuSearch, IntensityBound as Bound, Limit, LimitQuantity,
+    Margins, OutagePlacements, RequireError, evenly,
 };
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::aiding::AidingSettings;
@@ -51,7 +51,7 @@ pub struct Require {
     model: Option<PathBuf>,
     /// Outage: a length in seconds (tried from every second on), START:END, or "longest" (needs MODEL)
     #[arg(long, value_name = "SECONDS")]
-    outage: Ask,
+    outage: OutageRequest,
     /// Earliest start of the outage in seconds [default: 300, less if the trajectory is short]
     #[arg(long, value_name = "SECONDS", value_parser = parse::non_negative)]
     start: Option<f64>,
@@ -74,7 +74,7 @@ pub struct Require {
 /// Stands for the units that are known by name.
 const BUILT_IN: &str = "built-in";
 
-impl FromStr for Ask {
+impl FromStr for OutageRequest {
     type Err = String;
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
@@ -109,7 +109,7 @@ impl Command for Require {
     }
 
     fn inputs(&self, mut given: Inputs) -> Result<Inputs> {
-        if let (Ask::Window(outage), Some(start_s)) = (self.outage, self.start) {
+        if let (OutageRequest::Window(outage), Some(start_s)) = (self.outage, self.start) {
             let Outage {
                 start_s: from,
                 end_s: to,
@@ -119,7 +119,7 @@ impl Command for Require {
                 "an outage of a length alone has an earliest start",
             );
         }
-        if self.model.is_none() && self.outage == Ask::Longest {
+        if self.model.is_none() && self.outage == OutageRequest::Longest {
             return refused(
                 "--outage longest needs a MODEL",
                 "without one, give a length in seconds",
@@ -198,7 +198,7 @@ impl Requirements {
         }
         let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
         let outages = match self.ask {
-            Ask::Longest => self.long_outages(),
+            OutageRequest::Longest => self.long_outages(),
             _ => self.outages(),
         };
         let judgement = self.judged(&scenario, &model).map_err(unusable)?;
@@ -235,7 +235,7 @@ impl Requirements {
         let columns = [("limit on", "quantity"), ("{outage_s} s", "points/*/value")];
         document.table(Table::of(&json, "/curves/*", &columns));
         let unmet = margins.filter(|margins| !margins.met).map(|margins| {
-            let Worst { limit, value, .. } = margins.worst;
+            let HardestLimit { limit, value, .. } = margins.worst;
             let [value, most] = [value, limit.most].map(|x| limit.quantity.shown(x));
             Failure::bound(format!(
                 "{} is {value}, the limit is {most}",
@@ -355,7 +355,7 @@ fn starts(outages: &[Outage]) -> String {
 }
 
 /// `p95_m 4.87 at the end of outage 300–360 s`
-fn in_words(worst: &Worst, outages: &[Outage]) -> String {
+fn in_words(worst: &HardestLimit, outages: &[Outage]) -> String {
     let outage = outages.get(worst.place).unwrap_or(&outages[0]);
     let place = window(outage.start_s, outage.end_s);
     format!(
@@ -413,7 +413,7 @@ fn bound(which: usize, found: &Bound) -> Value {
 
 /// The outage that is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Ask {
+pub enum OutageRequest {
     /// One of this length (s), from every second on.
     Length(f64),
     /// This one.
@@ -422,7 +422,7 @@ pub enum Ask {
     Longest,
 }
 
-impl Ask {
+impl OutageRequest {
     /// Shortest length (s).
     fn length_s(self) -> f64 {
         match self {
@@ -453,7 +453,7 @@ struct Requirements {
     trajectory: Trajectory,
     /// Limits of the errors at the outage's end.
     limits: Vec<Limit>,
-    ask: Ask,
+    ask: OutageRequest,
     first_s: f64,
 }
 
@@ -467,7 +467,7 @@ impl Requirements {
         scenario: Scenario,
         trajectory: Trajectory,
         limits: Vec<Limit>,
-        ask: Ask,
+        ask: OutageRequest,
         first_s: Option<f64>,
     ) -> Result<Self, Failure> {
         let span_s = (trajectory.start_s(), trajectory.end_s());
@@ -476,7 +476,7 @@ impl Requirements {
         let earlier = first_s.map_or("", |_| ", or an earlier --start");
         let first_s = first_s.unwrap_or(settled_s);
         let begins_s = match ask {
-            Ask::Window(outage) => outage.start_s,
+            OutageRequest::Window(outage) => outage.start_s,
             _ => first_s,
         };
         if begins_s < span_s.0 || begins_s + length_s > span_s.1 {
@@ -513,7 +513,7 @@ impl Requirements {
         };
         let imu = need.allocated()?;
         let model = imu.model(self.scenario.imu.rate_hz);
-        let worst = Worst::of(&self.limits, &course.drifts(scenario, &model)?)
+        let worst = HardestLimit::of(&self.limits, &course.drifts(scenario, &model)?)
             .expect("at least one limit and one place");
         let turn_on = |sensor| scenario.imu.turn_on_bias(sensor).unwrap_or(0.0);
         let [accel, gyro] = Sensor::ALL.map(turn_on);
@@ -604,13 +604,14 @@ impl Requirements {
     /// of that length.
     fn bridged(&self, scenario: &Scenario, model: &Model) -> Result<Bridged, RequireError> {
         let long = self.long_outages();
-        let curves = Course::new(scenario, &self.trajectory, &long)?.curves(scenario, model)?;
+        let curves =
+            OutagePlacements::new(scenario, &self.trajectory, &long)?.curves(scenario, model)?;
         let longest = self.longest_of(&curves);
         let length_s = match self.ask {
-            Ask::Longest => longest.length_s(),
+            OutageRequest::Longest => longest.length_s(),
             ask => ask.length_s(),
         };
-        let worst = Worst::of(&self.limits, &after(&curves, length_s));
+        let worst = HardestLimit::of(&self.limits, &after(&curves, length_s));
         Ok((curves, longest, worst))
     }
 
@@ -633,7 +634,7 @@ impl Requirements {
             };
             json!({ "quantity": quantity, "points": CURVE_S.map(point) })
         };
-        let (margins, shown) = if self.ask == Ask::Longest {
+        let (margins, shown) = if self.ask == OutageRequest::Longest {
             let shown = worst.map(|worst| {
                 let Outage { start_s, .. } = self.long_outages()[worst.place];
                 let end_s = start_s + outage.length_s();
@@ -784,7 +785,7 @@ impl Requirements {
     }
 
     /// The longest outage of which all places are within the limits, in whole seconds. The first place holds the longest.
-    fn longest_of(&self, curves: &[Vec<Drift>]) -> Longest {
+    fn longest_of(&self, curves: &[Vec<Drift>]) -> LongestOutage {
         let first = curves.first().map_or(&[][..], Vec::as_slice);
         let lengths: Vec<f64> = first.iter().map(|d| d.after_s).collect();
         let is_missed = |length_s: &f64| {
@@ -811,7 +812,7 @@ impl Requirements {
             Some(s) => format!("{} s", seconds(s)),
             None => at_least(),
         };
-        Longest {
+        LongestOutage {
             longest_s,
             at_least_s: longest_s.is_none().then_some(at_least_s),
             text,
@@ -835,7 +836,7 @@ impl Requirements {
     /// The places of the outage; those of one second where the longest is sought.
     fn outages(&self) -> Vec<Outage> {
         match self.ask {
-            Ask::Window(outage) => vec![outage],
+            OutageRequest::Window(outage) => vec![outage],
             ask => self.places(ask.length_s(), ask.length_s()),
         }
     }
@@ -858,7 +859,7 @@ impl Requirements {
         };
         let places = match self.ask {
             // Where the longest is sought every length is, at all places that leave room for it.
-            Ask::Longest => self.places(self.ask.length_s(), self.mean_length_s()),
+            OutageRequest::Longest => self.places(self.ask.length_s(), self.mean_length_s()),
             _ => self.outages(),
         };
         places.into_iter().map(lasting).collect()
@@ -872,8 +873,8 @@ impl Requirements {
         longest_s * (1.0 - 0.5 * longest_s / left_s)
     }
 
-    fn course(&self, outages: &[Outage]) -> Result<Course<'_>, ExperimentError> {
-        Course::new(&self.scenario, &self.trajectory, outages)
+    fn course(&self, outages: &[Outage]) -> Result<OutagePlacements<'_>, ExperimentError> {
+        OutagePlacements::new(&self.scenario, &self.trajectory, outages)
     }
 
     fn question(&self, outages: &[Outage]) -> Value {
@@ -910,7 +911,7 @@ fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
 
 /// The longest outage that keeps the limits.
 #[derive(Debug, Serialize)]
-struct Longest {
+struct LongestOutage {
     /// Its length (s).
     #[serde(skip_serializing_if = "Option::is_none")]
     longest_s: Option<f64>,
@@ -920,7 +921,7 @@ struct Longest {
     text: String,
 }
 
-impl Longest {
+impl LongestOutage {
     /// Length that is bridged (s).
     fn length_s(&self) -> f64 {
         self.longest_s.or(self.at_least_s).unwrap_or_default()
@@ -928,12 +929,12 @@ impl Longest {
 }
 
 /// Curves of errors, the longest outage within the limits, and the hardest limit.
-type Bridged = (Vec<Vec<Drift>>, Longest, Option<Worst>);
+type Bridged = (Vec<Vec<Drift>>, LongestOutage, Option<HardestLimit>);
 
 /// Result of a model against the limits.
 #[derive(Debug, Serialize)]
 struct LimitResult {
-    outage: Longest,
+    outage: LongestOutage,
     /// The quantity of each limit, at its worst place, after outages of growing length: of the places that allow them all.
     curves: Vec<Value>,
     /// The outage of the answer, where it is beyond linear theory.

@@ -1,7 +1,7 @@
 //! `nav-sim trajectory`: reference trajectories.
 
 use crate::app::inputs::ScenarioArgs;
-use crate::app::{Asked, Command, Context, Failure, Out, PlainAnswer, Result, inputs};
+use crate::app::{Command, Context, Failure, Invocation, Out, PlainAnswer, Result, inputs};
 use crate::io::trajectory_file::{self, parse_origin};
 use crate::parse;
 use crate::report::{gnss_csv, imu_csv, initial_toml};
@@ -41,8 +41,8 @@ Examples:
   nav-sim trajectory generate trajectories/land_vehicle.toml -o drive.csv
   nav-sim trajectory generate trajectories/fixed_wing.toml --rate-hz 10 -o flight.csv.gz
   nav-sim trajectory generate trajectories/figure_eight.toml --rate-hz 1")]
-    Generate(Asked<Convert>),
-    Check(Asked<CheckTrajectory>),
+    Generate(Invocation<Convert>),
+    Check(Invocation<CheckTrajectory>),
     /// Convert a trajectory file of any kind to a nav-sim table, or to TUM
     ///
     /// The rows are those of the input, or evenly spaced ones with --rate-hz. Local coordinates become latitude,
@@ -53,8 +53,8 @@ Examples:
   nav-sim trajectory convert trajectories/figure_eight.toml -o eight.csv
   nav-sim trajectory convert trajectories/fixed_wing.toml --rate-hz 20 -o denser.csv.gz
   nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 10 -o drive.tum")]
-    Convert(Asked<Convert>),
-    Record(Asked<Record>),
+    Convert(Invocation<Convert>),
+    Record(Invocation<Record>),
 }
 
 /// The trajectory of a command.

@@ -30,12 +30,12 @@ pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
     });
     let left = 10.0 + labels.fold(24.0, f64::max);
     for (i, panel, range) in shown {
-        let mut x = Ruler {
+        let mut x = AxisScale {
             range: x_range,
             is_log,
             pixels: (left, canvas.width - GAP),
         };
-        let mut y = Ruler {
+        let mut y = AxisScale {
             range,
             is_log: panel.y.is_log,
             pixels: (0.0, 0.0),
@@ -58,7 +58,7 @@ pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
 }
 
 /// Gives both rulers of a map one scale and returns its height.
-fn equalise(x: &mut Ruler, y: &mut Ruler, canvas: &Canvas) -> f64 {
+fn equalise(x: &mut AxisScale, y: &mut AxisScale, canvas: &Canvas) -> f64 {
     let width = x.pixels.1 - x.pixels.0;
     let spans = [x.range.1 - x.range.0, y.range.1 - y.range.0];
     let height = (width * spans[1] / spans[0]).clamp(0.4 * canvas.map, canvas.map);
@@ -217,7 +217,7 @@ fn y_range(panel: &Panel) -> Option<(f64, f64)> {
 // Ranges, ticks and their labels.
 
 /// From values to pixels along one axis.
-struct Ruler {
+struct AxisScale {
     /// First and last value shown.
     range: (f64, f64),
     is_log: bool,
@@ -225,7 +225,7 @@ struct Ruler {
     pixels: (f64, f64),
 }
 
-impl Ruler {
+impl AxisScale {
     fn at(&self, value: f64) -> f64 {
         let along = |v: f64| if self.is_log { v.log10() } else { v };
         let (low, high) = (along(self.range.0), along(self.range.1));
@@ -410,7 +410,7 @@ mod marks_tests {
 
     #[test]
     fn ends_of_the_range_are_ends_of_the_axis() {
-        let ruler = Ruler {
+        let ruler = AxisScale {
             range: (1.0, 100.0),
             is_log: true,
             pixels: (200.0, 0.0),
@@ -670,8 +670,8 @@ const MANY: usize = 150;
 
 /// Rulers of one panel.
 struct Frame {
-    x: Ruler,
-    y: Ruler,
+    x: AxisScale,
+    y: AxisScale,
     /// Points of a line that can be told apart.
     most: usize,
 }
@@ -846,7 +846,7 @@ mod axis_tests {
     use super::*;
 
     fn frame(is_log: bool) -> Frame {
-        let ruler = |is_log, pixels| Ruler {
+        let ruler = |is_log, pixels| AxisScale {
             range: (1.0, 11.0),
             is_log,
             pixels,

@@ -333,7 +333,7 @@ impl AtomicDir {
 /// Outputs that are this command's own until this is dropped.
 #[derive(Debug)]
 #[must_use = "another command may write there as soon as this is dropped"]
-pub(crate) struct Claim {
+pub(crate) struct OutputClaim {
     outputs: Vec<PathBuf>,
     marker: Option<Temporary>,
     /// True if a process was killed that had claimed the same.
@@ -343,7 +343,7 @@ pub(crate) struct Claim {
 /// Name of the marker in a directory of outputs; ending of the one beside an output.
 const MARKER: &str = ".claim";
 
-impl Claim {
+impl OutputClaim {
     /// True if another nav-sim may write there: the disk has no locks.
     pub(crate) fn is_shared(&self) -> bool {
         self.marker
@@ -390,7 +390,7 @@ impl Claim {
     }
 }
 
-impl Drop for Claim {
+impl Drop for OutputClaim {
     fn drop(&mut self) {
         let mut claimed = locked(&CLAIMED);
         self.outputs
@@ -423,18 +423,18 @@ pub(crate) fn claim_file<'a>(
     output: &Path,
     kind: &str,
     inputs: impl IntoIterator<Item = &'a Path>,
-) -> Result<Claim, Failure> {
+) -> Result<OutputClaim, Failure> {
     guard_inputs(output, inputs)?;
     drop(AtomicFile::open(output).map_err(|e| Failure::unwritable(output, e))?);
     if fs::metadata(output).is_ok_and(|m| !m.is_file()) {
-        return Ok(Claim {
+        return Ok(OutputClaim {
             outputs: Vec::new(),
             marker: None,
             is_left: false,
         });
     }
     let output_at = resolved(output);
-    let claim = Claim::new(output, &marker_beside(&output_at), vec![output_at.clone()])?;
+    let claim = OutputClaim::new(output, &marker_beside(&output_at), vec![output_at.clone()])?;
     remove_abandoned(&output_at);
     guard_others(output, kind)?;
     Ok(claim)
@@ -487,12 +487,12 @@ pub(crate) fn claim_directory<'a>(
     inputs: impl Iterator<Item = &'a Path> + Clone,
     force: bool,
     recognise: impl FnOnce(&str) -> DirectoryState,
-) -> Result<Claim, Failure> {
+) -> Result<OutputClaim, Failure> {
     for name in files {
         guard_inputs(&directory.join(name.as_ref()), inputs.clone())?;
     }
     AtomicDir::create(directory)?; // dropped at once
-    let claim = Claim::of_directory(directory, files)?;
+    let claim = OutputClaim::of_directory(directory, files)?;
     remove_abandoned(directory);
     remove_abandoned(&directory.join(INSIDE));
     let last = directory.join(files.last().map_or("", AsRef::as_ref));

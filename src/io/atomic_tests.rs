@@ -240,7 +240,7 @@ fn a_claim_without_a_lock_is_shared() {
     let dir = tempfile::tempdir().unwrap();
     let whole = claim_file(&dir.path().join("a.csv"), ".csv", []).unwrap();
     assert!(!whole.is_shared());
-    let unlocked = Claim {
+    let unlocked = OutputClaim {
         outputs: Vec::new(),
         marker: Some(Temporary::new(dir.path().join("b.claim"), None)),
         is_left: false,

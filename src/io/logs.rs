@@ -1,7 +1,7 @@
 //! Logs of robots, flight controllers and receivers ([`nav_sim_logs`]), among the files that are read.
 
 use super::{Failure, Place, source};
-use nav_sim_logs::{Damage, HEAD, Log, LogError, LogFault, LogFormat, Stamp, recognise};
+use nav_sim_logs::{HEAD, Log, LogError, LogFault, LogFormat, Stamp, Truncation, recognise};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -60,8 +60,8 @@ pub(crate) fn refused(path: &Path, error: LogError) -> Failure {
 }
 
 /// Warning of a cut at which the reading ended.
-pub(crate) fn cut_off(damage: &Damage) -> String {
-    let Damage {
+pub(crate) fn cut_off(damage: &Truncation) -> String {
+    let Truncation {
         error,
         read_bytes,
         file_bytes,

@@ -47,4 +47,4 @@ mod log;
 
 pub use channel::{Clock, Content, ImuReading, LogChannel, LogFix, Stamp, in_seconds};
 pub use input::{HEAD, LogError, LogFault, LogFormat, recognise};
-pub use log::{Damage, Log};
+pub use log::{Log, Truncation};

@@ -31,13 +31,13 @@ pub struct Log {
     path: PathBuf,
     kind: LogFormat,
     channels: Vec<LogChannel>,
-    damage: Option<Damage>,
+    damage: Option<Truncation>,
     read: Read,
 }
 
 /// End of a file that was cut off, at which the reading ended.
 #[derive(Debug)]
-pub struct Damage {
+pub struct Truncation {
     /// The error that it would have been.
     pub error: LogError,
     /// Bytes before it.
@@ -80,7 +80,7 @@ impl Log {
             Ok(()) => None,
             Err(error) => match error.cut() {
                 None => return Err(error),
-                Some(read_bytes) => Some(Damage {
+                Some(read_bytes) => Some(Truncation {
                     error,
                     read_bytes,
                     file_bytes,
@@ -112,7 +112,7 @@ impl Log {
 
     /// Cut at which the file is taken to end.
     #[must_use]
-    pub const fn damage(&self) -> Option<&Damage> {
+    pub const fn damage(&self) -> Option<&Truncation> {
         self.damage.as_ref()
     }
 

@@ -101,7 +101,7 @@ impl FromStr for Limit {
 
 /// The limit that is the hardest to keep, and where.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub struct Worst {
+pub struct HardestLimit {
     /// The limit.
     #[serde(flatten)]
     pub limit: Limit,
@@ -111,7 +111,7 @@ pub struct Worst {
     pub place: usize,
 }
 
-impl Worst {
+impl HardestLimit {
     /// Logarithm of limit over error: above 0 there is a reserve.
     pub fn margin(&self) -> f64 {
         // In logarithms limits of different units compare, and the margin is nearly linear in the logarithm
@@ -273,13 +273,13 @@ impl Drift {
 }
 
 /// A trajectory with an outage at several places, each alone.
-pub struct Course<'a> {
+pub struct OutagePlacements<'a> {
     trajectory: &'a Trajectory,
     track: Track,
     outages: Vec<Outage>,
 }
 
-impl<'a> Course<'a> {
+impl<'a> OutagePlacements<'a> {
     /// Linearises along the trajectory; of the scenario, receiver, barometer and start count. Outages may overlap.
     ///
     /// # Errors
@@ -345,7 +345,7 @@ impl<'a> Course<'a> {
         scenario: &Scenario,
         model: &Model,
         limits: &[Limit],
-    ) -> Result<Worst, BeliefError> {
+    ) -> Result<HardestLimit, BeliefError> {
         Ok(hardest(limits, &self.drifts(scenario, model)?))
     }
 
@@ -386,8 +386,8 @@ impl<'a> Course<'a> {
     }
 }
 
-fn hardest(limits: &[Limit], drifts: &[Drift]) -> Worst {
-    Worst::of(limits, drifts).expect("at least one limit and one place")
+fn hardest(limits: &[Limit], drifts: &[Drift]) -> HardestLimit {
+    HardestLimit::of(limits, drifts).expect("at least one limit and one place")
 }
 
 /// Outages of one length at `places` times, the first at `first_s`, evenly to the end of the trajectory.
@@ -528,7 +528,7 @@ pub enum IntensityBound {
 /// Requirements on an IMU.
 pub struct ImuSearch<'a> {
     /// The trajectory and the places of the outage.
-    pub course: &'a Course<'a>,
+    pub course: &'a OutagePlacements<'a>,
     /// Receiver, start and IMU rate.
     pub scenario: &'a Scenario,
     /// At least one.
@@ -623,7 +623,7 @@ impl ImuSearch<'_> {
         self.alone(imu, which, NONE)
     }
 
-    fn worst(&self, imu: &ImuParameters) -> Result<Worst, BeliefError> {
+    fn worst(&self, imu: &ImuParameters) -> Result<HardestLimit, BeliefError> {
         self.course.worst(
             self.scenario,
             &imu.model(self.scenario.imu.rate_hz),
@@ -671,7 +671,7 @@ impl ImuSearch<'_> {
     fn squares(
         &self,
         imu: &ImuParameters,
-    ) -> Result<(Worst, [f64; IMU_PARAMETERS + 1]), BeliefError> {
+    ) -> Result<(HardestLimit, [f64; IMU_PARAMETERS + 1]), BeliefError> {
         let worst = self.worst(imu)?;
         let (course, model) = (self.course, imu.model(self.scenario.imu.rate_hz));
         let belief = course.belief(self.scenario, &model)?;
@@ -703,9 +703,9 @@ pub struct Margins {
     pub met: bool,
     /// The hardest limit.
     #[serde(flatten)]
-    pub worst: Worst,
+    pub worst: HardestLimit,
     /// The same for an IMU without errors: what GNSS and start leave.
-    pub without_imu_errors: Worst,
+    pub without_imu_errors: HardestLimit,
 }
 
 /// Correlation time of the biases of an IMU that has next to none (s): any would do.
@@ -717,7 +717,7 @@ impl Margins {
     /// # Errors
     /// When the model has no such filter.
     pub fn of(
-        course: &Course<'_>,
+        course: &OutagePlacements<'_>,
         scenario: &Scenario,
         model: &Model,
         limits: &[Limit],

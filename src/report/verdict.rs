@@ -2,7 +2,7 @@
 
 use nav_sim_document::{Tone, readable, short_names, window};
 use nav_sim_navigation::metrics::{
-    ALL_STATES, Basis, Met, ReductionQuality, Summary, Verdict, VerdictKind,
+    ALL_STATES, Basis, ReductionQuality, RequirementResult, Summary, Verdict, VerdictKind,
 };
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 use serde::Deserialize;
@@ -228,7 +228,7 @@ pub(crate) fn verdict_counts(verdicts: &[(&str, &Value)]) -> (VerdictKind, Vec<S
 // Limits that errors must keep, in words.
 
 /// `required p95_m<=5: NOT MET, 7.41 m at the end of the outage 300–390 s`
-pub(crate) fn requirement_line(met: &Met, summary: &Summary) -> String {
+pub(crate) fn requirement_line(met: &RequirementResult, summary: &Summary) -> String {
     if met.name == "consistent" {
         let word = if met.met { "met" } else { "NOT MET" };
         return format!(

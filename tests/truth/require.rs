@@ -3,8 +3,8 @@
 use nav_sim::io::datasheet::{Figure, catalogued};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::require::{
-    Course, Drift, IMU_PARAMETERS, ImuSearch, IntensityBound, Limit, LimitQuantity, Margins,
-    RequireError,
+    Drift, IMU_PARAMETERS, ImuSearch, IntensityBound, Limit, LimitQuantity, Margins,
+    OutagePlacements, RequireError,
 };
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
@@ -76,7 +76,7 @@ fn limit(quantity: LimitQuantity, most: f64) -> [Limit; 1] {
 #[test]
 fn the_imu_that_is_named_meets_the_limit_in_sampled_runs() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
-    let course = Course::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
+    let course = OutagePlacements::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
     let limits = limit(LimitQuantity::P95, 12.0);
     let need = ImuSearch {
         course: &course,
@@ -111,7 +111,7 @@ fn the_imu_that_is_named_meets_the_limit_in_sampled_runs() {
 #[test]
 fn answers_are_monotone() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
-    let course = Course::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
+    let course = OutagePlacements::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
     let limits = [
         limit(LimitQuantity::P95, 30.0),
         limit(LimitQuantity::P95, 10.0),
@@ -145,7 +145,7 @@ fn answers_are_monotone() {
 #[test]
 fn what_gnss_alone_misses_is_refused() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
-    let course = Course::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
+    let course = OutagePlacements::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
     let limits = limit(LimitQuantity::Rmse, 0.05);
     let need = ImuSearch {
         course: &course,
@@ -169,7 +169,7 @@ fn the_imu_that_is_named_keeps_the_limit_at_every_beginning() {
         end_s: f64::from(start_s) + 20.0,
     };
     let outages: Vec<Outage> = (60..=160).map(begins).collect();
-    let course = Course::new(&scenario, &trajectory, &outages).unwrap();
+    let course = OutagePlacements::new(&scenario, &trajectory, &outages).unwrap();
     for most in [3.0, 10.0] {
         let limits = limit(LimitQuantity::P95, most);
         let need = ImuSearch {
@@ -205,7 +205,7 @@ fn the_imu_that_is_named_keeps_the_limit_in_the_steps_of_a_run() {
             start_s,
             end_s: start_s + length_s,
         }];
-        let course = Course::new(&scenario, &trajectory, &outages).unwrap();
+        let course = OutagePlacements::new(&scenario, &trajectory, &outages).unwrap();
         let limits = limit(LimitQuantity::Rmse, 1.0 + 0.005 * length_s * length_s);
         let need = ImuSearch {
             course: &course,
@@ -278,7 +278,7 @@ fn outages_beside_one_another_are_as_each_alone() {
             (end_s - 20.0, end_s),
         ];
         let outages = outages.map(|(start_s, end_s)| Outage { start_s, end_s });
-        let drifts = Course::new(&scenario, &trajectory, &outages)
+        let drifts = OutagePlacements::new(&scenario, &trajectory, &outages)
             .unwrap()
             .drifts(&scenario, &model)
             .unwrap();
@@ -311,8 +311,9 @@ fn outages_beside_one_another_are_as_each_alone() {
 fn a_curve_holds_the_ends_of_all_shorter_outages() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
     let limits = limit(LimitQuantity::P95, 20.0);
-    let course =
-        |end_s: f64| Course::new(&scenario, &trajectory, &[Outage { end_s, ..OUTAGE }]).unwrap();
+    let course = |end_s: f64| {
+        OutagePlacements::new(&scenario, &trajectory, &[Outage { end_s, ..OUTAGE }]).unwrap()
+    };
     let at_end = course(170.0);
     let need = ImuSearch {
         course: &at_end,
@@ -364,7 +365,7 @@ fn an_imu_without_errors_leaves_what_gnss_and_start_leave() {
         end_s: 20.0,
     }];
     let margins = |scenario: &Scenario| {
-        let course = Course::new(scenario, &trajectory, &start).unwrap();
+        let course = OutagePlacements::new(scenario, &trajectory, &start).unwrap();
         Margins::of(&course, scenario, &model, &limit(LimitQuantity::Rmse, 6.0)).unwrap()
     };
     scenario.initial.att_sigma_deg = [1e-3; 3];
@@ -428,7 +429,7 @@ fn flicker_noise(density: f64, floor: f64) -> Composite {
 #[test]
 fn a_datasheet_is_not_read_optimistically() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
-    let course = Course::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
+    let course = OutagePlacements::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
     let p95 = |model: &Model| course.drifts(&scenario, model).unwrap()[0].value(LimitQuantity::P95);
     for name in ["vn100", "adis16488"] {
         let sheet = catalogued(name).unwrap().unwrap();

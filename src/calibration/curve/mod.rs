@@ -10,4 +10,4 @@ pub use average::{
 };
 pub(crate) use average::{LARGEST_BIAS, MAD_TO_DEVIATION, falling_root, p_value};
 pub use sampling::implied;
-pub use stationarity::{Beginning, WarmUp, warm_up};
+pub use stationarity::{RecordingWarmUp, WarmUp, warm_up};

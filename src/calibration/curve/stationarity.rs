@@ -33,7 +33,7 @@ pub struct WarmUp {
 
 /// Recording that does not begin as it goes on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Beginning {
+pub struct RecordingWarmUp {
     /// The recording.
     pub recording: String,
     /// Its signals with a warm-up.

@@ -280,7 +280,7 @@ fn distance(contrasts: &[Contrast], file: usize, pass_over: bool) -> Option<Dist
 
 /// The largest distances of a file: against all others, and with one of them passed over (0 if too few).
 #[derive(Debug, Clone)]
-struct Furthest {
+struct LargestDistances {
     /// The two F.
     f: [f64; 2],
     /// The window of each, with the deviations there.
@@ -288,11 +288,11 @@ struct Furthest {
 }
 
 /// The largest distances of every file.
-fn furthest(table: &LogVarianceTable, noise: &[Noise], active: &[bool]) -> Vec<Furthest> {
+fn furthest(table: &LogVarianceTable, noise: &[Noise], active: &[bool]) -> Vec<LargestDistances> {
     let levels = noise.first().map_or(0, Noise::levels);
     let count = active.iter().filter(|on| **on).count();
     let mut all = vec![
-        Furthest {
+        LargestDistances {
             f: [0.0; 2],
             at: [None, None]
         };
@@ -534,7 +534,7 @@ fn most_abnormal(
             .fold(0.0, f64::max)
     };
     let file = (0..own.len()).max_by(|a, b| joint(&own[*a].f).total_cmp(&joint(&own[*b].f)))?;
-    let Furthest { f, at } = own.swap_remove(file);
+    let LargestDistances { f, at } = own.swap_remove(file);
     let kind = usize::from(f[1] / limits[1] > f[0] / limits[0]);
     let larger = draws.iter().filter(|d| joint(d) >= joint(&f)).count();
     let [plain, passed] = at;

@@ -52,7 +52,7 @@ impl Effort {
 /// Result of the search.
 pub(crate) struct SearchResult {
     /// The ends of all starts, best first; one at least.
-    pub(crate) ends: Vec<End>,
+    pub(crate) ends: Vec<LocalMinimum>,
     /// Combinations of shapes that were tried.
     pub(crate) combinations: usize,
 }
@@ -62,7 +62,7 @@ pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) 
     let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
     if dimensions.is_empty() {
         let cost = objective.solve(&[], None).cost();
-        let end = End {
+        let end = LocalMinimum {
             coordinates: Vec::new(),
             cost,
             termination: Termination::Linear,
@@ -87,7 +87,7 @@ pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) 
         // The grid first: of ends with the same cost the sort keeps that order, whatever is known.
         starts.splice(0..0, grid.starts(&choices, effort.starts));
     }
-    let mut ends: Vec<End> = starts
+    let mut ends: Vec<LocalMinimum> = starts
         .par_iter()
         .map(|start| {
             let end = descend(objective, start, &Precision::ROUGH);
@@ -784,7 +784,7 @@ nav_sim_signal::named!(
 );
 
 /// Local minimum to which a start led.
-pub(crate) struct End {
+pub(crate) struct LocalMinimum {
     pub(crate) coordinates: Vec<f64>,
     /// Σ residual², in units of the target's length.
     pub(crate) cost: f64,
@@ -821,7 +821,7 @@ impl Precision {
 }
 
 /// Descends from a start to the local minimum.
-fn descend(objective: &Objective, start: &[f64], precision: &Precision) -> End {
+fn descend(objective: &Objective, start: &[f64], precision: &Precision) -> LocalMinimum {
     let ranges: Vec<(f64, f64)> = objective.shaped().map(|(_, r)| (r.low, r.high)).collect();
     let descent = Descent {
         ranges: &ranges,
@@ -843,7 +843,7 @@ fn descend(objective: &Objective, start: &[f64], precision: &Precision) -> End {
             (gradient, newton.flatten().unwrap_or_else(|| at.curvature()))
         },
     );
-    End {
+    LocalMinimum {
         cost: found.value.cost(),
         termination: if found.has_converged {
             Termination::Converged

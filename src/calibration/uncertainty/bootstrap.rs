@@ -17,7 +17,8 @@ use crate::curve::sampling::{SamplingLaw, implied};
 use crate::curve::{Estimator, Group, LARGEST_BIAS, Replicate, average, median, p_value};
 use crate::fit::Fit;
 use crate::outcome::{
-    Advance, Bootstrap, Goodness, Indistinct, Inference, LevelSpread, Outcome, Settings, tau_s,
+    Advance, Bootstrap, Goodness, IndistinctProcesses, Inference, LevelSpread, Outcome, Settings,
+    tau_s,
 };
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Curve, RobustVariance, Status};
@@ -253,7 +254,7 @@ pub(crate) fn inference(
     if let Some((simple, processes, p_value)) = simpler(group, outcome, settings) {
         // By recursion: the simpler model may itself have processes that are not told apart.
         let intervals = inference(group, &simple, settings, bootstrap, &|_| {}).intervals;
-        let indistinct = Indistinct {
+        let indistinct = IndistinctProcesses {
             processes,
             spec: simple.spec,
             p_value,

@@ -21,7 +21,8 @@ use crate::fit::{Fit, refit};
 use crate::model::ModelSpec;
 use crate::noise::{Kind, Parameter, ParameterRef, Process};
 use crate::outcome::{
-    Bootstrap, Indistinct, Outcome, ParameterInterval, ParameterSpread, Settings, Undetermined,
+    Bootstrap, IndistinctProcesses, Outcome, ParameterInterval, ParameterSpread, Settings,
+    Undetermined,
 };
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
@@ -151,19 +152,19 @@ fn variance(drawn: &[Option<f64>]) -> Option<f64> {
 /// A scaled parameter of every replicate.
 struct Differences {
     /// By axis: the recordings, the values, and the variances of their noise.
-    axes: Vec<OfAxis>,
+    axes: Vec<AxisEstimates>,
     is_clipped: bool,
     share_of_freedom: f64,
 }
 
 #[derive(Default)]
-struct OfAxis {
+struct AxisEstimates {
     recordings: Vec<usize>,
     values: Vec<f64>,
     noise: Vec<f64>,
 }
 
-impl OfAxis {
+impl AxisEstimates {
     fn weights(&self, between: f64) -> Vec<f64> {
         let weight = |noise| 1.0 / (noise + between);
         self.noise.iter().map(weight).collect()
@@ -186,7 +187,7 @@ impl Differences {
     ) -> Self {
         let origins = origins(replicates);
         let count = origins.iter().map(|o| o.position + 1).max().unwrap_or(0);
-        let mut axes: Vec<OfAxis> = (0..count).map(|_| OfAxis::default()).collect();
+        let mut axes: Vec<AxisEstimates> = (0..count).map(|_| AxisEstimates::default()).collect();
         for ((origin, value), noise) in origins.iter().zip(values).zip(noise) {
             let axis = &mut axes[origin.position];
             axis.recordings.push(origin.recording);
@@ -203,7 +204,7 @@ impl Differences {
 
     /// Q where recordings differ by this standard deviation.
     fn square(&self, between: f64) -> f64 {
-        let of_axis = |axis: &OfAxis| -> f64 {
+        let of_axis = |axis: &AxisEstimates| -> f64 {
             axis.residuals(between * between, self.is_clipped)
                 .iter()
                 .map(|z| z * z)
@@ -397,7 +398,7 @@ fn probability(group: &Group, outcome: &Outcome, simple: &Outcome, settings: &Se
     p_value(observed, &gains)
 }
 
-impl Indistinct {
+impl IndistinctProcesses {
     /// The intervals of the larger model: none of those that cannot be told apart, the simpler model's of the others.
     pub(crate) fn adopt(&self, outcome: &Outcome, intervals: &mut [ParameterInterval]) {
         let removed = self.processes.last().copied().unwrap_or(usize::MAX);

@@ -9,8 +9,8 @@ pub use results::StudyAnswer;
 
 use crate::app::inputs::merge;
 use crate::app::{
-    Answer, Asked, Command, Context, Failure, Front, Input, Manifest, Refuse, Result, argument,
-    is_path, is_repeated, refused,
+    Answer, Command, Context, Failure, Input, Invocation, Manifest, Refuse, Reporter, Result,
+    argument, is_path, is_repeated, refused,
 };
 use crate::commands::run::{PreparedRun, Run, Shared, block_of, columns};
 use crate::io::file_kind::{self, FileKind};
@@ -376,7 +376,7 @@ pub(crate) struct StudyCell {
     /// Its place on each axis.
     labels: Labels,
     /// The command.
-    asked: Asked<Run>,
+    asked: Invocation<Run>,
     /// Seed of all random numbers.
     seed: u64,
     /// The manifest before the run: what its key is made of.
@@ -529,7 +529,7 @@ struct RunValidator {
 impl RunValidator {
     fn new(beside: &Path) -> Self {
         Self {
-            command: Asked::<Run>::augment_args(clap::Command::new(Run::NAME)),
+            command: Invocation::<Run>::augment_args(clap::Command::new(Run::NAME)),
             beside: beside.to_owned(),
             taken: HashMap::new(),
             inputs: HashMap::new(),
@@ -588,7 +588,7 @@ impl RunValidator {
                 }
                 request.insert(path.to_owned(), value.clone());
                 !(is_nested || is_one_path && list.is_some())
-                    && named_request(&request).is_ok_and(|r| Asked::<Run>::named(&r).is_ok())
+                    && named_request(&request).is_ok_and(|r| Invocation::<Run>::named(&r).is_ok())
             }
             None => nested(path, value.clone()).try_into::<Scenario>().is_ok(),
         };
@@ -653,7 +653,7 @@ impl RunValidator {
                 None => {}
             }
         }
-        let asked = Asked::<Run>::named(&named_request(&run)?)?;
+        let asked = Invocation::<Run>::named(&named_request(&run)?)?;
         let scenario = asked.request.scenario()?;
         let mut inputs = Vec::new();
         for (role, path) in asked.inputs()? {
@@ -947,7 +947,7 @@ fn work(
     own: &[&RunBlock<'_>],
     context: &Context<'_>,
 ) -> Result<Failures> {
-    let (mut failures, front) = (Failures::new(), OfCells(context, Mutex::default()));
+    let (mut failures, front) = (Failures::new(), CellReporter(context, Mutex::default()));
     let shared = Shared::default();
     let todo: Vec<&&RunBlock<'_>> = own.iter().filter(|unit| !place.has_unit(unit)).collect();
     context.begin("runs", todo.iter().map(|unit| unit.cost()).sum());
@@ -972,7 +972,7 @@ fn compute(
     unit: &RunBlock<'_>,
     shared: &Shared,
     context: &Context<'_>,
-    front: &OfCells<'_>,
+    front: &CellReporter<'_>,
 ) -> Result<Failures> {
     let mut failures = Failures::new();
     let Some(_lock) = place.lock(unit)? else {
@@ -1024,9 +1024,9 @@ fn compute(
 }
 
 /// Passes each warning of the cells on once; what they remark is for `--verbose`.
-struct OfCells<'a>(pub &'a Context<'a>, pub Mutex<HashSet<String>>);
+struct CellReporter<'a>(pub &'a Context<'a>, pub Mutex<HashSet<String>>);
 
-impl Front for OfCells<'_> {
+impl Reporter for CellReporter<'_> {
     fn note(&self, note: Note) {
         let Note { importance, text } = note;
         if importance != Importance::Warning {
@@ -1041,7 +1041,7 @@ impl Front for OfCells<'_> {
     }
 }
 
-fn context_of<'a>(cell: &StudyCell, front: &'a OfCells<'_>) -> Context<'a> {
+fn context_of<'a>(cell: &StudyCell, front: &'a CellReporter<'_>) -> Context<'a> {
     Context::new(front, Some(cell.seed)).reading(cell.manifest.inputs.clone())
 }
 
@@ -1084,7 +1084,7 @@ fn assemble(
             None => whole = Some(part),
         }
     }
-    let front = OfCells(context, Mutex::default());
+    let front = CellReporter(context, Mutex::default());
     let context = context_of(cell, &front);
     let run = cell.asked.request.prepare(&Shared::default(), &context)?;
     write_cell(place, cell, run, whole, &context)?;

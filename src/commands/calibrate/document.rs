@@ -8,8 +8,8 @@ use crate::report::csv::merged;
 use crate::report::curves::{FittedCurve, band, curve, recording_names, sensor_name};
 use crate::report::{in_order, some};
 use nav_sim_calibration::{
-    Beginning, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Miss, ModelCandidate,
-    ModelRanking, Outcome, ParameterInterval, ParameterSpread, RecordingVerdict, Settings,
+    CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, ModelCandidate, ModelRanking, Outcome,
+    ParameterInterval, ParameterSpread, RecordingVerdict, RecordingWarmUp, ScaleMisfit, Settings,
     TurnOnFinding, TurnOnSpread, Undetermined, WIDEST, duration, percent, tau_s,
 };
 use nav_sim_document::{
@@ -389,15 +389,15 @@ pub(crate) fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> 
 }
 
 /// The recordings whose beginnings change a wavelet variance notably, and what to leave out.
-fn beginnings(found: &[Beginning]) -> Option<String> {
+fn beginnings(found: &[RecordingWarmUp]) -> Option<String> {
     const NOTABLE: f64 = 0.05;
-    let matters = |b: &&Beginning| {
+    let matters = |b: &&RecordingWarmUp| {
         let mut changes = b.signals.iter().map(|w| w.change);
         changes.any(|c| c.is_none_or(|ratio| ratio.ln().abs() > NOTABLE))
     };
-    let told: Vec<&Beginning> = found.iter().filter(matters).collect();
+    let told: Vec<&RecordingWarmUp> = found.iter().filter(matters).collect();
     let names = recording_names(told.iter().map(|b| b.recording.as_str()));
-    let line = |(b, name): (&&Beginning, String)| match b.skip_s {
+    let line = |(b, name): (&&RecordingWarmUp, String)| match b.skip_s {
         Some(s) => format!("{name} --skip-s {s}"),
         None => format!("{name} never settles"),
     };
@@ -702,7 +702,7 @@ fn fit_json(outcome: &Outcome, all: &[Outcome], settings: &Settings) -> Value {
     let labelled = |processes: &[usize]| -> Vec<&str> {
         processes.iter().map(|i| labels[*i].as_str()).collect()
     };
-    let miss = |m: &Miss| json!({ "tau_s": tau_s(m.level, rate_hz), "ratio": m.ratio, "deviations": m.deviations });
+    let miss = |m: &ScaleMisfit| json!({ "tau_s": tau_s(m.level, rate_hz), "ratio": m.ratio, "deviations": m.deviations });
     let missed: Vec<Value> = outcome.departure().missed.iter().map(miss).collect();
     let law = |found: &ParameterSpread| {
         let of = json!({

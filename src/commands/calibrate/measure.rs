@@ -7,9 +7,9 @@ use crate::io::recordings::{FileReport, ReadOptions, Report};
 use crate::io::{curve_file, recordings};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
-    self, Advance, Beginning, Bootstrap, CalibrationError, Diagnosis, Estimator, Group, Outcome,
-    Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve, infer_telling,
-    replicates, turn_on, warm_up,
+    self, Advance, Bootstrap, CalibrationError, Diagnosis, Estimator, Group, Outcome,
+    RecordingWarmUp, Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve,
+    infer_telling, replicates, turn_on, warm_up,
 };
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::names::UnknownName;
@@ -78,7 +78,7 @@ impl EstimatorChoice {
 pub(crate) struct MeasuredRecordings {
     pub report: Report,
     pub replicates: Vec<(Channel, Replicate)>,
-    pub beginnings: Vec<Beginning>,
+    pub beginnings: Vec<RecordingWarmUp>,
     pub settings: Settings,
 }
 
@@ -93,7 +93,7 @@ pub struct Calibration {
     /// Settings of the fit.
     pub settings: Settings,
     /// The recordings that do not begin as they go on.
-    pub beginnings: Vec<Beginning>,
+    pub beginnings: Vec<RecordingWarmUp>,
     /// Turn-on bias from the recordings' means, for each estimator and sensor.
     pub turn_on: Vec<TurnOnSpread>,
     /// Each recording against the others.
@@ -245,8 +245,8 @@ fn one_switching_on(report: &Report, measured: &mut [(Channel, Replicate)]) {
 }
 
 /// The recordings that do not begin as they go on after what was skipped.
-fn beginnings(looks: &[MeasuredRecording], skipped_s: f64, rate_hz: f64) -> Vec<Beginning> {
-    let beginning = |look: &MeasuredRecording| Beginning {
+fn beginnings(looks: &[MeasuredRecording], skipped_s: f64, rate_hz: f64) -> Vec<RecordingWarmUp> {
+    let beginning = |look: &MeasuredRecording| RecordingWarmUp {
         recording: look.recording.clone(),
         signals: look.warm_ups.clone(),
         skip_s: longest(&look.warm_ups).map(|n| (skipped_s + n as f64 / rate_hz).ceil()),

@@ -204,7 +204,7 @@ pub type Unit = Vec<(Channel, Replicate)>;
 /// All recordings and how models are made of them. Estimators and model of the settings count nothing: those of the
 /// candidates do.
 #[derive(Debug)]
-pub struct Laboratory {
+pub struct CalibrationSet {
     /// The recordings.
     pub units: Vec<Unit>,
     /// Settings of the fits.
@@ -214,7 +214,7 @@ pub struct Laboratory {
 /// The groups of recordings that were calibrated, their fits, and how these were made.
 type Calibrated = (Vec<Group>, Vec<Outcome>, Settings);
 
-impl Laboratory {
+impl CalibrationSet {
     /// Calibrates a candidate on all recordings but one, before any inflation. An estimator of single recordings takes
     /// that after the one left out (the first, where none is), so that each is taken once.
     ///
@@ -347,7 +347,7 @@ impl Drive {
     /// trajectory.
     pub fn leave_out(
         &self,
-        laboratory: &Laboratory,
+        laboratory: &CalibrationSet,
         k: usize,
         mut recordings: Vec<Recording>,
         candidates: &[Candidate],
@@ -372,7 +372,7 @@ impl Drive {
     /// Noise model in each candidate's filter, calibrated from all recordings but one.
     fn beliefs(
         &self,
-        laboratory: &Laboratory,
+        laboratory: &CalibrationSet,
         without: usize,
         candidates: &[Candidate],
     ) -> Result<Vec<Belief>, Failure> {

@@ -17,7 +17,7 @@ use crate::io::recordings::{self, FileReport, Gaps};
 use crate::parse;
 use crate::report::csv::merged;
 use crate::report::{self, six_digits, some};
-use candidates::{Candidate, Drive, Fold, Inflation, Laboratory, Unit};
+use candidates::{CalibrationSet, Candidate, Drive, Fold, Inflation, Unit};
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, model_of};
 use nav_sim_document::{Document, Importance, Table, Tone, readable, window};
 use nav_sim_navigation::ekf::FilterStates;
@@ -158,7 +158,7 @@ impl Command for Choose {
             );
         }
         let units = units(&measured);
-        let laboratory = Laboratory {
+        let laboratory = CalibrationSet {
             units,
             settings: measured.settings,
         };

@@ -21,9 +21,9 @@ use nav_sim_navigation::fusion::mounting::{self, Mounting};
 use nav_sim_navigation::fusion::{
     AlignmentSummary, ClocksApart, Correlation, Displaced, Finding, FixRecord, FusionAssessment,
     FusionError, FusionFigures, Heading, Levelling, OwnNoise, Recorded, Row, Settings, Solution,
-    Start, Weighed, WheelSpeed, Withheld, aid_innovations, assess, check_clocks, clocks_apart,
-    displaced, earlier, fuse, fuse_correlated, interval_s, outcome, own_noise, predicts_as_well,
-    rest_of_origin, rough_origin, vehicle_velocities, wheel_ratio, withheld,
+    Start, WeightedSolution, WheelSpeed, Withheld, aid_innovations, assess, check_clocks,
+    clocks_apart, displaced, earlier, fuse, fuse_correlated, interval_s, outcome, own_noise,
+    predicts_as_well, rest_of_origin, rough_origin, vehicle_velocities, wheel_ratio, withheld,
 };
 use nav_sim_navigation::gnss::{FixSigma, GnssFix};
 use nav_sim_navigation::linalg::median;
@@ -1160,7 +1160,7 @@ fn vehicle(solution: &Solution, settings: &AidingSettings) -> Option<Value> {
 }
 
 /// Errors of fixes that last: the correlation of their innovations, standard deviations as stated, and the filter's answer.
-fn fix_correlation(weighed: &Weighed) -> Option<Value> {
+fn fix_correlation(weighed: &WeightedSolution) -> Option<Value> {
     let [white, of_velocity] = weighed.whiteness;
     let (white, [pos_sigma_factor, vel_sigma_factor]) = (white?, weighed.sigma_factors);
     Some(json!({
@@ -1355,7 +1355,7 @@ mod request_tests {
             let found = [DVec3::X, DVec3::Y, DVec3::Z].map(|v| (q * v).round());
             assert_eq!(found, [x, y, DVec3::NEG_Z], "{name}");
         }
-        let asked = crate::app::Asked::<Fuse>::of(["imu.csv", "gnss.csv", "m.toml"]).unwrap();
+        let asked = crate::app::Invocation::<Fuse>::of(["imu.csv", "gnss.csv", "m.toml"]).unwrap();
         let settings = asked.request.settings();
         assert_eq!(settings.q_s_b, DQuat::IDENTITY);
     }

@@ -67,7 +67,7 @@ pub struct Datasheet {
 
 /// A model made of a datasheet, and what to say of it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Made {
+pub struct DatasheetModel {
     /// The model.
     pub file: ModelFile,
     /// Assumptions and contradictions to report.
@@ -131,7 +131,7 @@ impl Datasheet {
     ///
     /// # Errors
     /// When a figure is beyond what a process can have.
-    pub fn model_file(&self, rate_hz: f64) -> Result<Made, ParameterError> {
+    pub fn model_file(&self, rate_hz: f64) -> Result<DatasheetModel, ParameterError> {
         let mut doubts = Vec::new();
         let mut noise = |sensor| self.noise(sensor, rate_hz, &mut doubts);
         let (accel, gyro) = (noise(Sensor::Accel)?, noise(Sensor::Gyro)?);
@@ -145,7 +145,7 @@ impl Datasheet {
         };
         file.turn_on = (turn_on != TurnOn::default()).then_some(turn_on);
         file.provenance = Some(self.provenance(&doubts));
-        Ok(Made { file, doubts })
+        Ok(DatasheetModel { file, doubts })
     }
 
     fn noise(

@@ -5,7 +5,9 @@ use super::file_kind::{self, FileKind};
 use super::logs::LogOptions;
 use super::recordings::timing::{UNITS, median_step, unit_of_step};
 use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
-use super::table::{Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table};
+use super::table::{
+    Column, DefaultUnit, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table,
+};
 use super::toml_file::TomlSource;
 use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
 use chrono::{DateTime, NaiveDateTime};
@@ -1225,12 +1227,12 @@ static SPEED_QUANTITIES: [Quantity; 5] = [
     Quantity::time(OF_CLOCK),
     Quantity::time(STAMP),
     Quantity::time(OF_RECEIVER),
-    Quantity::new("t_s", "timeus", NONE, Bare::Is(1e-6)),
+    Quantity::new("t_s", "timeus", NONE, DefaultUnit::Is(1e-6)),
     Quantity::new(
         "speed",
         "speed velocity vel v wheel wheel_speed odometer odo forward forward_speed",
         SPEED,
-        Bare::Unknown,
+        DefaultUnit::Unknown,
     ),
 ];
 

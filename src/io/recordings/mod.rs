@@ -8,8 +8,8 @@ use super::file_kind::{self, FileKind};
 use super::input::listed;
 use super::logs::LogOptions;
 use super::table::{
-    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, Column, Dictionary, INSTANCE, NO_COLUMN, Quantity,
-    SENSOR_LOGGER, TICKS, TIME, Table, Units, is_oxts, unreadable,
+    ACCELERATION, ANGLE, ANGULAR_RATE, Column, DefaultUnit, Dictionary, INSTANCE, NO_COLUMN,
+    Quantity, SENSOR_LOGGER, TICKS, TIME, Table, Units, is_oxts, unreadable,
 };
 use super::{Failure, Place, help, table};
 use crate::report::six_digits;
@@ -76,7 +76,7 @@ pub(crate) const OF_CLOCK: &str =
 /// Time of a receiver, of the week or not: the last to be taken, because it may be that of its last fix.
 pub(crate) const OF_RECEIVER: &str = "tow gps_tow gpstow time_of_week gps_time_of_week sow gps_sow seconds_of_week second_of_week gps_seconds_of_week gps_seconds gps_time gpstime gps_timestamp";
 
-const fn time(stems: &'static str, bare: Bare, rank: u8) -> Quantity {
+const fn time(stems: &'static str, bare: DefaultUnit, rank: u8) -> Quantity {
     Quantity {
         rank: Some(rank),
         ..Quantity::new("t_s", stems, TIME, bare)
@@ -91,17 +91,17 @@ const fn signal(
 ) -> [Quantity; 3] {
     let any = Quantity {
         axis: name.split_at(name.len() - 1).1,
-        ..Quantity::new(name, free, rate, Bare::Unknown)
+        ..Quantity::new(name, free, rate, DefaultUnit::Unknown)
     };
     let is_si = Quantity {
         stems: si,
-        bare: Bare::Is(1.0),
+        bare: DefaultUnit::Is(1.0),
         ..any
     };
     let is_increment = Quantity {
         stems: increment,
         units: per_sample,
-        bare: Bare::Not,
+        bare: DefaultUnit::Not,
         per_sample: true,
         ..any
     };
@@ -119,18 +119,18 @@ const fn gyro(name: &'static str) -> [Quantity; 3] {
 /// Quantities of a recording. A packet counter starts again at 0 after 65535.
 static QUANTITIES: [[Quantity; 3]; 10] = [
     [
-        time(STAMP, Bare::Unknown, 0),
-        time(OF_CLOCK, Bare::Unknown, 1),
-        time(OF_RECEIVER, Bare::Unknown, 2),
+        time(STAMP, DefaultUnit::Unknown, 0),
+        time(OF_CLOCK, DefaultUnit::Unknown, 1),
+        time(OF_RECEIVER, DefaultUnit::Unknown, 2),
     ],
     [
-        time("timeus", Bare::Is(1e-6), 1),
-        time("timems itow", Bare::Is(1e-3), 1),
-        time(SENSOR_LOGGER, Bare::Is(1.0), 1),
+        time("timeus", DefaultUnit::Is(1e-6), 1),
+        time("timems itow", DefaultUnit::Is(1e-3), 1),
+        time(SENSOR_LOGGER, DefaultUnit::Is(1.0), 1),
     ],
     [
-        time("timestamp*", Bare::Not, 1),
-        time(TICKS, Bare::Unknown, 3),
+        time("timestamp*", DefaultUnit::Not, 1),
+        time(TICKS, DefaultUnit::Unknown, 3),
         Quantity::number("counter", "packetcounter packet_counter"),
     ],
     [Quantity::number(INSTANCE, "i"); 3],

@@ -12,8 +12,8 @@ use nav_sim_logs::npy::Array;
 use nav_sim_logs::{Clock, Content, LogChannel, LogFormat, in_seconds, npy};
 pub(crate) use quantity::find;
 pub(crate) use quantity::{
-    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, TIME,
-    Units, normalised,
+    ACCELERATION, ANGLE, ANGULAR_RATE, DefaultUnit, LATITUDE, LONGITUDE, NONE, Quantity, SPEED,
+    TIME, Units, normalised,
 };
 use std::borrow::Cow;
 use std::fmt::Display;

@@ -168,7 +168,7 @@ impl<'a> StartSearch<'a> {
 
     /// The starts at a moving fix, the one whose levelling is known best first, in the direction that the fixes
     /// speak for.
-    fn candidates(&self, courses: &[Moving], at: usize) -> Vec<StartCandidate> {
+    fn candidates(&self, courses: &[MovingFix], at: usize) -> Vec<StartCandidate> {
         let moving = &courses[at];
         // the course is the heading of the vehicle; how the IMU sits in it is not better known than the mounting
         let heading_sigma = moving
@@ -194,7 +194,7 @@ impl<'a> StartSearch<'a> {
     /// The start at a fix; whether its heading is given, and whether it is opposite to the course.
     fn start(
         &self,
-        moving: &Moving,
+        moving: &MovingFix,
         level: &LevelAngles,
         (yaw, heading_sigma): (f64, f64),
         [is_given, is_reversing]: [bool; 2],
@@ -379,12 +379,12 @@ const ACCELERATION: f64 = 2.0;
 
 /// Carrier of the IMU, by its motion.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Pace {
+pub(super) enum CarrierSpeed {
     Fast,
     Slow,
 }
 
-impl Pace {
+impl CarrierSpeed {
     /// The speed from which a course is a heading, where velocities are known as well as `sigma` (m/s).
     pub(super) fn needed(self, sigma: f64) -> f64 {
         let (least, sigmas) = if self == Self::Fast { FAST } else { SLOW };
@@ -402,16 +402,16 @@ impl Pace {
 }
 
 /// A fix with its velocity and the standard deviations of it (m/s).
-pub(super) struct Moving {
+pub(super) struct MovingFix {
     pub fix: GnssFix,
     pub v_n: DVec3,
     pub sigma_n: DVec3,
     /// Half the time between the two positions it comes from: it is as old as that (s); 0 as measured.
     lag_s: f64,
-    pub pace: Pace,
+    pub pace: CarrierSpeed,
 }
 
-impl Moving {
+impl MovingFix {
     pub(super) fn speed(&self) -> f64 {
         self.v_n.truncate().length()
     }
@@ -448,38 +448,39 @@ impl Moving {
 }
 
 /// The velocities within the IMU recording.
-pub(super) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<Moving> {
+pub(super) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<MovingFix> {
     let first = imu.first().map_or(f64::INFINITY, |s| s.t_s - s.dt_s);
     let last = imu.last().map_or(f64::NEG_INFINITY, |s| s.t_s);
-    let inside = |m: &Moving| m.fix.t_s >= first && m.fix.t_s < last;
+    let inside = |m: &MovingFix| m.fix.t_s >= first && m.fix.t_s < last;
     let velocity = |(i, fix): (usize, &GnssFix)| match fix.velocity {
-        Some(velocity) => Some(Moving {
+        Some(velocity) => Some(MovingFix {
             fix: *fix,
             v_n: velocity.v_n(),
             sigma_n: velocity.sigma_n(),
             lag_s: 0.0,
-            pace: Pace::Fast,
+            pace: CarrierSpeed::Fast,
         }),
         None => {
             let earlier = gnss[..i].partition_point(|f| f.t_s <= fix.t_s - BASELINE_S.0 + 1e-6);
             derived(&gnss[earlier.checked_sub(1)?], fix)
         }
     };
-    let mut all: Vec<Moving> = gnss
+    let mut all: Vec<MovingFix> = gnss
         .iter()
         .enumerate()
         .filter_map(velocity)
         .filter(inside)
         .collect();
     if first_fast(&all, f64::NEG_INFINITY).is_none() {
-        all.iter_mut().for_each(|moving| moving.pace = Pace::Slow);
+        all.iter_mut()
+            .for_each(|moving| moving.pace = CarrierSpeed::Slow);
     }
     all
 }
 
 /// Fixes one after the other that are at least `apart_s` apart, with when their velocities were (s).
-pub(super) fn steps(courses: &[Moving], apart_s: f64) -> Vec<[(&Moving, f64); 2]> {
-    let when = |m: &Moving| m.fix.t_s - m.lag_s;
+pub(super) fn steps(courses: &[MovingFix], apart_s: f64) -> Vec<[(&MovingFix, f64); 2]> {
+    let when = |m: &MovingFix| m.fix.t_s - m.lag_s;
     let mut all = Vec::new();
     let mut first = 0;
     while let Some(from) = courses.get(first) {
@@ -495,7 +496,7 @@ pub(super) fn steps(courses: &[Moving], apart_s: f64) -> Vec<[(&Moving, f64); 2]
 
 /// The first fix from `from_s` on whose course is a heading. One fix alone may be an outlier, and among
 /// thousands at rest one is five standard deviations off: the next must move as well.
-fn first_fast(courses: &[Moving], from_s: f64) -> Option<usize> {
+fn first_fast(courses: &[MovingFix], from_s: f64) -> Option<usize> {
     let fast = |i: usize| {
         let supported = courses
             .get(i + 1)
@@ -506,8 +507,8 @@ fn first_fast(courses: &[Moving], from_s: f64) -> Option<usize> {
 }
 
 /// The fix that comes nearest to moving fast enough: when (s), its speed and standard deviation (m/s).
-fn nearest_to_fast(courses: &[Moving]) -> Option<(f64, f64, f64)> {
-    let share = |m: &Moving| m.speed() / m.needed();
+fn nearest_to_fast(courses: &[MovingFix]) -> Option<(f64, f64, f64)> {
+    let share = |m: &MovingFix| m.speed() / m.needed();
     let nearest = courses
         .iter()
         .max_by(|a, b| share(a).total_cmp(&share(b)))?;
@@ -515,7 +516,7 @@ fn nearest_to_fast(courses: &[Moving]) -> Option<(f64, f64, f64)> {
 }
 
 /// The mean velocity between two fixes; none where they are too far apart in time.
-fn derived(before: &GnssFix, fix: &GnssFix) -> Option<Moving> {
+fn derived(before: &GnssFix, fix: &GnssFix) -> Option<MovingFix> {
     let dt = fix.t_s - before.t_s;
     if dt > BASELINE_S.1 {
         return None;
@@ -524,12 +525,12 @@ fn derived(before: &GnssFix, fix: &GnssFix) -> Option<Moving> {
     let lag_s = 0.5 * dt;
     let variance = (fix.pos_sigma_n.powf(2.0) + before.pos_sigma_n.powf(2.0)) / (dt * dt);
     let sigma_n = (variance + DVec3::splat((ACCELERATION * lag_s).powi(2))).powf(0.5);
-    Some(Moving {
+    Some(MovingFix {
         fix: *fix,
         v_n,
         sigma_n,
         lag_s,
-        pace: Pace::Fast,
+        pace: CarrierSpeed::Fast,
     })
 }
 
@@ -604,7 +605,7 @@ impl StartSearch<'_> {
     ///
     /// A window is judged by its own standard deviation: what GNSS lets the vehicle accelerate unseen falls with
     /// its length, the drift of the gyroscopes grows with its age.
-    fn at_rest(&self, before: &[Moving], moving: &Moving) -> Option<LevelAngles> {
+    fn at_rest(&self, before: &[MovingFix], moving: &MovingFix) -> Option<LevelAngles> {
         let to_s = moving.fix.t_s;
         let ends = (0..)
             .map(|k| to_s - 0.25 * f64::from(k))
@@ -646,12 +647,17 @@ impl StartSearch<'_> {
     }
 
     /// The levelling of a window at the time of the fix, unless GNSS contradicts its standing still.
-    fn carried(&self, w: &StaticWindow, before: &[Moving], moving: &Moving) -> Option<LevelAngles> {
+    fn carried(
+        &self,
+        w: &StaticWindow,
+        before: &[MovingFix],
+        moving: &MovingFix,
+    ) -> Option<LevelAngles> {
         let (from, departed) = (w.end_s - w.seconds, w.end_s + DEPARTURE_S);
         let age_s = moving.fix.t_s - w.end_s;
         let (q, gained) = self.carry(w, moving.fix.t_s);
         let unseen = if moving.fix.velocity.is_some() {
-            let seen: Vec<&Moving> = before
+            let seen: Vec<&MovingFix> = before
                 .iter()
                 .filter(|m| (from..=departed).contains(&m.fix.t_s))
                 .collect();
@@ -684,7 +690,12 @@ impl StartSearch<'_> {
 
     /// Levelling while it moves: the mean specific force after the fix is the change of the GNSS velocity
     /// less gravity, in the axes of this heading.
-    fn in_motion(&self, after: &[Moving], heading: f64, heading_sigma: f64) -> Option<LevelAngles> {
+    fn in_motion(
+        &self,
+        after: &[MovingFix],
+        heading: f64,
+        heading_sigma: f64,
+    ) -> Option<LevelAngles> {
         let from = after.first()?;
         let near = after
             .iter()
@@ -711,7 +722,7 @@ impl StartSearch<'_> {
 }
 
 /// Returns true if velocities are zero to within their standard deviations, each and on average.
-fn slow(seen: &[&Moving]) -> bool {
+fn slow(seen: &[&MovingFix]) -> bool {
     let n = seen.len() as f64;
     let mean = seen
         .iter()
@@ -720,13 +731,13 @@ fn slow(seen: &[&Moving]) -> bool {
         .length()
         / n;
     let sigma = (seen.iter().map(|m| m.sigma().powi(2)).sum::<f64>()).sqrt() / n;
-    let each = |m: &&Moving| m.speed() < 0.3_f64.max(4.0 * m.sigma());
+    let each = |m: &&MovingFix| m.speed() < 0.3_f64.max(4.0 * m.sigma());
     !seen.is_empty() && seen.iter().all(each) && mean < 0.2_f64.max(4.0 * sigma)
 }
 
 /// Returns true if the fixes in a stretch of time stay within four standard deviations of the
 /// first.
-fn stays(fixes: &[Moving], from: f64, to: f64) -> bool {
+fn stays(fixes: &[MovingFix], from: f64, to: f64) -> bool {
     let within: Vec<&GnssFix> = fixes
         .iter()
         .map(|m| &m.fix)

@@ -322,7 +322,7 @@ impl Whiteness {
 
 /// A solution and the fixes that it believes.
 #[derive(Debug, Clone)]
-pub struct Weighed {
+pub struct WeightedSolution {
     /// The solution.
     pub solution: Solution,
     /// The solution with standard deviations as stated, where they are not.
@@ -333,7 +333,7 @@ pub struct Weighed {
     pub sigma_factors: [f64; 2],
 }
 
-impl Weighed {
+impl WeightedSolution {
     /// The solution whose innovations tell what the fixes are worth.
     pub fn judged(&self) -> &Solution {
         self.as_stated.as_ref().unwrap_or(&self.solution)
@@ -357,7 +357,7 @@ pub fn fuse_correlated(
     start: &Start,
     settings: &Settings,
     (reference, correlation): (Option<&Reference>, Correlation),
-) -> Result<Weighed, FusionError> {
+) -> Result<WeightedSolution, FusionError> {
     let ungated = Settings {
         gate: None,
         ..settings.clone()
@@ -400,7 +400,7 @@ pub fn fuse_correlated(
             (solution, Some(stated))
         }
     };
-    Ok(Weighed {
+    Ok(WeightedSolution {
         solution,
         as_stated,
         whiteness,

@@ -139,7 +139,7 @@ fn another_clock_and_another_point_are_found() {
             .collect();
         for (k, rows) in [early, ahead].iter().enumerate() {
             let judgement = judged(rows, &reference);
-            let [Doubt::Offset(found)] = judgement.doubts[..] else {
+            let [SetupFault::Offset(found)] = judgement.doubts[..] else {
                 panic!("{:?}", judgement.doubts)
             };
             let (off, sigma) = (found.offset, found.sigma);
@@ -224,7 +224,7 @@ fn simple_transformations_are_named() {
     for (cause, change) in cases {
         let judgement = changed(1.0, change);
         let [
-            Doubt::Transformed {
+            SetupFault::Transformed {
                 cause: found, left, ..
             },
         ] = judgement.doubts[..]
@@ -245,7 +245,7 @@ fn simple_transformations_are_named() {
         );
         for block in 0..3 {
             let judgement = changed(1.0, &|row| sigmas(row, block, &|s| s / scale));
-            let is_named = |d: &Doubt| matches!(d, Doubt::Transformed { .. });
+            let is_named = |d: &SetupFault| matches!(d, SetupFault::Transformed { .. });
             assert!(
                 !judgement.doubts.iter().any(is_named),
                 "{scale}, {block}: {:?}",
@@ -318,13 +318,15 @@ fn frames_and_units_are_named() {
     assert!(
         high.doubts
             .iter()
-            .any(|d| matches!(d, Doubt::Height { metres } if (metres - 47.0).abs() < 1.0)),
+            .any(|d| matches!(d, SetupFault::Height { metres } if (metres - 47.0).abs() < 1.0)),
         "{:?}",
         high.doubts
     );
     let flu = changed(&|row| row.state.q_b_n *= DQuat::from_rotation_x(180.0 * DEG));
     assert!(
-        flu.doubts.iter().any(|d| matches!(d, Doubt::Axes { .. })),
+        flu.doubts
+            .iter()
+            .any(|d| matches!(d, SetupFault::Axes { .. })),
         "{:?}",
         flu.doubts
     );
@@ -337,7 +339,7 @@ fn frames_and_units_are_named() {
         radians
             .doubts
             .iter()
-            .any(|d| matches!(d, Doubt::Transformed { .. })),
+            .any(|d| matches!(d, SetupFault::Transformed { .. })),
         "{:?}",
         radians.doubts
     );

@@ -61,12 +61,12 @@ mod withheld;
 
 pub use clocks::{ClocksApart, clocks_apart, earlier, rest_of_origin, rough_origin};
 pub use displaced::{
-    Correlation, Displaced, Weighed, Whiteness, displaced, fuse_correlated, interval_s,
+    Correlation, Displaced, WeightedSolution, Whiteness, displaced, fuse_correlated, interval_s,
 };
 pub use gate::GATE_LEVEL;
 pub use outcome::{
-    EndError, Ends, Finding, FixCounts, FromReference, FusionAssessment, FusionError,
-    FusionFigures, OutageDrift, Outliers, SmoothedOutage, SmoothedOutcome, assess, outcome,
+    EndError, Finding, FixCounts, FromReference, FusionAssessment, FusionError, FusionFigures,
+    OutageDrift, OutageEnds, Outliers, SmoothedOutage, SmoothedOutcome, assess, outcome,
 };
 pub use run::{LONGEST_GAP_S, bridged, fuse};
 pub use vehicle::{

@@ -6,7 +6,9 @@
 //! the yaw. Then the fusion filter propagates the attitude of the IMU through the whole drive with
 //! its biases estimated, and the mounting is the mean rotation from it to the track (`refined`).
 
-use super::alignment::{Alignment, Moving, Pace, between, carried, coarse, courses, steps};
+use super::alignment::{
+    Alignment, CarrierSpeed, MovingFix, between, carried, coarse, courses, steps,
+};
 use super::outcome::{is_contradicted, nis_per_component};
 use super::{Recorded, Row, Settings, fuse};
 use crate::earth::gravity_down;
@@ -206,7 +208,7 @@ fn agreeing(mean: DQuat, sigma: f64) -> Result<(), Refused> {
 }
 
 /// An instant in motion.
-struct Moment {
+struct MotionSample {
     t_s: f64,
     /// Takes the axes of the vehicle as it was mounted so far to those of the track.
     q: DQuat,
@@ -244,8 +246,8 @@ fn through(
     }
     let pace = courses(recorded.gnss, recorded.imu)
         .first()
-        .map_or(Pace::Fast, |moving| moving.pace);
-    let mut moments: Vec<Moment> = solution
+        .map_or(CarrierSpeed::Fast, |moving| moving.pace);
+    let mut moments: Vec<MotionSample> = solution
         .rows
         .windows(3)
         .filter_map(|w| moment([&w[0], &w[1], &w[2]], pace))
@@ -273,7 +275,7 @@ fn through(
 }
 
 /// The vehicle beside its track at a row that moves fast enough for a course.
-fn moment([before, row, after]: [&Row; 3], pace: Pace) -> Option<Moment> {
+fn moment([before, row, after]: [&Row; 3], pace: CarrierSpeed) -> Option<MotionSample> {
     let (v_n, speed) = (row.state.v_n, row.state.v_n.truncate().length());
     let of_velocity = row.sigma[3].max(row.sigma[4]);
     if speed < pace.needed(of_velocity) {
@@ -294,7 +296,7 @@ fn moment([before, row, after]: [&Row; 3], pace: Pace) -> Option<Moment> {
     let others = DVec3::new(lean, lean.hypot(row.sigma[5] / speed), slip);
     let q = track_attitude(v_n, row.sigma[5]).inverse() * row.state.q_b_n;
     let sigma = (of_filter.powf(2.0) + AT_A_TIME.powf(2.0) + others.powf(2.0)).powf(0.5);
-    Some(Moment {
+    Some(MotionSample {
         t_s: row.t_s,
         q,
         sigma,
@@ -305,10 +307,11 @@ fn moment([before, row, after]: [&Row; 3], pace: Pace) -> Option<Moment> {
 
 /// Turns the track around where the vehicle goes backwards. Most of the way is assumed to be
 /// forwards.
-fn turn_to_front(moments: &mut [Moment]) -> Result<(), Refused> {
-    let is_against = |m: &Moment| (m.q * DVec3::X).x < 0.0;
-    let way =
-        |of: &dyn Fn(&&Moment) -> bool| moments.iter().filter(of).map(|m| m.way_m).sum::<f64>();
+fn turn_to_front(moments: &mut [MotionSample]) -> Result<(), Refused> {
+    let is_against = |m: &MotionSample| (m.q * DVec3::X).x < 0.0;
+    let way = |of: &dyn Fn(&&MotionSample) -> bool| {
+        moments.iter().filter(of).map(|m| m.way_m).sum::<f64>()
+    };
     let (against, all) = (way(&|m| is_against(m)), way(&|_| true));
     let share = against.min(all - against) / all;
     if share > UNDECIDED {
@@ -327,7 +330,7 @@ fn turn_to_front(moments: &mut [Moment]) -> Result<(), Refused> {
 }
 
 /// The rotation about which the moments deviate by nothing on average.
-fn mean(moments: &[Moment]) -> DQuat {
+fn mean(moments: &[MotionSample]) -> DQuat {
     let mut mean = moments.first().map_or(DQuat::IDENTITY, |m| m.q);
     // each step takes the curvature of rotations anew; five are enough from anywhere
     for _ in 0..5 {
@@ -339,7 +342,7 @@ fn mean(moments: &[Moment]) -> DQuat {
 
 /// Refuses a carrier that banks into its turns: an aircraft, whose track says little of its
 /// attitude.
-fn upright(moments: &[Moment], mean: DQuat) -> Result<(), Refused> {
+fn upright(moments: &[MotionSample], mean: DQuat) -> Result<(), Refused> {
     let square = moments
         .iter()
         .map(|m| deviation(m, mean).x.powi(2))
@@ -357,13 +360,13 @@ fn upright(moments: &[Moment], mean: DQuat) -> Result<(), Refused> {
 }
 
 /// The deviation of a moment from a rotation, about the track's axes (rad).
-fn deviation(moment: &Moment, mean: DQuat) -> DVec3 {
+fn deviation(moment: &MotionSample, mean: DQuat) -> DVec3 {
     let q = moment.q * mean.inverse();
     (if q.w < 0.0 { -q } else { q }).to_scaled_axis()
 }
 
 /// The deviations of all, in blocks.
-fn deviations(moments: &[Moment], mean: DQuat) -> [BlockSums; 3] {
+fn deviations(moments: &[MotionSample], mean: DQuat) -> [BlockSums; 3] {
     let mut blocks: [BlockSums; 3] = std::array::from_fn(|_| BlockSums::default());
     for m in moments {
         let deviation = deviation(m, mean).to_array();
@@ -375,7 +378,7 @@ fn deviations(moments: &[Moment], mean: DQuat) -> [BlockSums; 3] {
 }
 
 /// The filter's own standard deviations on average: its errors last, and are not less for being looked at often.
-fn of_filter(moments: &[Moment]) -> DVec3 {
+fn of_filter(moments: &[MotionSample]) -> DVec3 {
     let weights: DVec3 = moments.iter().map(|m| m.sigma.powf(-2.0)).sum();
     let sums: DVec3 = moments
         .iter()
@@ -470,7 +473,7 @@ fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), R
 
 /// The stretches between fixes that have a course.
 fn stretches(recorded: &Recorded<'_>, settings: &Settings) -> Vec<VelocityChange> {
-    let courses: Vec<Moving> = courses(recorded.gnss, recorded.imu)
+    let courses: Vec<MovingFix> = courses(recorded.gnss, recorded.imu)
         .into_iter()
         .filter(|m| m.speed() >= m.needed())
         .collect();
@@ -484,8 +487,8 @@ fn stretches(recorded: &Recorded<'_>, settings: &Settings) -> Vec<VelocityChange
 fn stretch(
     recorded: &Recorded<'_>,
     settings: &Settings,
-    (from, from_s): (&Moving, f64),
-    (to, to_s): (&Moving, f64),
+    (from, from_s): (&MovingFix, f64),
+    (to, to_s): (&MovingFix, f64),
 ) -> Option<VelocityChange> {
     let seconds = to_s - from_s;
     let samples = between(recorded.imu, from_s, to_s);

@@ -1,8 +1,8 @@
 //! Figures of a fusion: fixes used, consistency, errors at the ends of outages. They serialize as `summary.json` has them.
 
 use super::{
-    AidInnovations, FixRecord, Nine, Row, RowError, Solution, Weighed, Withheld, aid_innovations,
-    horizontal,
+    AidInnovations, FixRecord, Nine, Row, RowError, Solution, WeightedSolution, Withheld,
+    aid_innovations, horizontal,
 };
 use crate::linalg::{by_value, mean, median};
 use crate::metrics::{DriveVerdict, NormalisedErrors, PerState, Verdict, VerdictKind};
@@ -39,7 +39,7 @@ pub struct OutageDrift {
 
 /// Innovations of the fixes that end outages and gaps, all together: the only ones that the filter was not led to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Ends {
+pub struct OutageEnds {
     /// Number of outages and gaps.
     pub count: usize,
     /// Root mean square of the horizontal error over its standard deviation: 1 if right.
@@ -84,7 +84,7 @@ pub struct FusionFigures {
     /// Errors at the end of each outage.
     pub outages: Vec<OutageDrift>,
     /// The ends of all outages and gaps, where there are any.
-    pub ends: Option<Ends>,
+    pub ends: Option<OutageEnds>,
     /// Differences of the rows from the reference, where one reaches them.
     pub reference: Option<FromReference>,
     /// Figures of the smoothed solution, where there is one.
@@ -180,7 +180,7 @@ pub(super) const APART: (f64, f64) = (10.0, 5.0);
 
 /// The fixes that nothing was used before for so long. Their horizontal innovations are two normal numbers each, and the
 /// sum of m of their squares, normalised, is chi-square of 2m degrees.
-fn ends(solution: &Solution) -> Option<Ends> {
+fn ends(solution: &Solution) -> Option<OutageEnds> {
     let known: Vec<&FixRecord> = solution.fixes.iter().filter(|f| f.used).collect();
     let steps = known.windows(2).map(|w| w[1].t_s - w[0].t_s);
     let apart_s = APART.0.max(APART.1 * median(steps)?);
@@ -192,7 +192,7 @@ fn ends(solution: &Solution) -> Option<Ends> {
     let (count, sum) = (of_ends.len(), of_ends.iter().sum::<f64>());
     let degrees = 2.0 * count as f64;
     let p_value = ChiSquared::new(degrees).ok()?.sf(sum);
-    Some(Ends {
+    Some(OutageEnds {
         count,
         error_over_sigma: (sum / degrees).sqrt(),
         p_value,
@@ -381,7 +381,7 @@ pub enum Finding {
         nis_per_component: f64,
     },
     /// Errors at the ends of outages and gaps.
-    Ends(Ends),
+    Ends(OutageEnds),
     /// Errors against the reference.
     Reference {
         /// Verdict on them.
@@ -414,7 +414,7 @@ pub(super) fn nis_bound(components: usize) -> f64 {
 /// Judges a solution: its fixes with standard deviations as stated, its errors as believed. `of_start` is what speaks
 /// against the start, as the alignment found it, `withheld` the errors at the ends of withheld windows.
 pub fn assess(
-    weighed: &Weighed,
+    weighed: &WeightedSolution,
     outcome: &FusionFigures,
     of_start: &[(VerdictKind, Finding)],
     withheld: Option<Withheld>,
@@ -473,7 +473,7 @@ pub(super) fn is_contradicted(solution: &Solution, of_start: &[(VerdictKind, Fin
 }
 
 /// Errors that last: standard deviations as stated are then too small.
-fn correlated(weighed: &Weighed) -> Option<(VerdictKind, Finding)> {
+fn correlated(weighed: &WeightedSolution) -> Option<(VerdictKind, Finding)> {
     let lag_1 = weighed.correlation()?;
     let [pos_sigma_factor, vel_sigma_factor] = weighed.sigma_factors;
     let verdict = match pos_sigma_factor.max(vel_sigma_factor) > 1.0 {
@@ -684,8 +684,8 @@ mod assessment_tests {
         assess(&weighed(solution), &outcome(solution, &[]), &[], None)
     }
 
-    fn weighed(solution: &Solution) -> Weighed {
-        Weighed {
+    fn weighed(solution: &Solution) -> WeightedSolution {
+        WeightedSolution {
             solution: solution.clone(),
             as_stated: None,
             whiteness: [crate::fusion::Whiteness::of(&solution.fixes), None],
@@ -792,7 +792,7 @@ mod assessment_tests {
                 .any(|(kind, _)| *kind == VerdictKind::Undecided),
             "{found:?}"
         );
-        let answered = Weighed {
+        let answered = WeightedSolution {
             sigma_factors: [1.0, 4.3],
             ..weighed(&all)
         };

@@ -142,7 +142,7 @@ fn the_scale_of_a_wheel_is_found() {
 }
 
 /// What the filter makes of the outage with and without the constraint.
-struct Ends {
+struct OutageEnds {
     /// Sum of the squared horizontal errors (m²).
     errors: f64,
     /// Sum of what the filter states of them (m²).
@@ -153,9 +153,9 @@ struct Ends {
     smoothed: f64,
 }
 
-fn ends(aiding: &AidingSettings, runs: u64) -> Ends {
+fn ends(aiding: &AidingSettings, runs: u64) -> OutageEnds {
     let reference = town().into();
-    let mut sums = Ends {
+    let mut sums = OutageEnds {
         errors: 0.0,
         stated: 0.0,
         nis: 0.0,

@@ -26,8 +26,8 @@ pub use outage::{Budget, EpochMetrics, epochs};
 pub use ratio::{EpochRow, ExperimentResult, OutageComparison, StateRatio, compare};
 pub(crate) use summary::name_and_limit;
 pub use summary::{
-    AccuracySummary, ConsistencySummary, Coverage, Met, Nis, OutageSummary, QuantileSummary,
-    Recovery, ReductionQuality, Requirement, Summary, TOLERANCE,
+    AccuracySummary, ConsistencySummary, Coverage, Nis, OutageSummary, QuantileSummary, Recovery,
+    ReductionQuality, Requirement, RequirementResult, Summary, TOLERANCE,
 };
 pub use verdict::{
     ALL_STATES, Basis, DriveVerdict, NormalisedErrors, OutageVerdict, StateName, Verdict,

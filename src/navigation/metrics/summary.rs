@@ -59,7 +59,7 @@ pub struct Summary {
     pub is_contradicted: bool,
     /// Requirements, each with its result.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub require: Vec<Met>,
+    pub require: Vec<RequirementResult>,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands references")]
@@ -481,7 +481,7 @@ const DOWN: [usize; 2] = [2, 5];
 
 /// Requirement with its result and margin.
 #[derive(Debug, Clone, Serialize)]
-pub struct Met {
+pub struct RequirementResult {
     /// The figure.
     pub name: String,
     /// The most it may be.
@@ -549,7 +549,7 @@ impl Requirement {
     /// Compares the limit with the expectation of the covariance analysis where there is one, else with the runs. From the first
     /// outage that is beyond linear theory on, position and velocity down are not in the analysis: the runs beside it decide, and
     /// without runs no limit is met. All other figures hold (docs/limits.md).
-    pub fn check(&self, summary: &Summary) -> Met {
+    pub fn check(&self, summary: &Summary) -> RequirementResult {
         if self.figure == LimitedFigure::Consistent {
             let Verdict {
                 kind,
@@ -559,7 +559,7 @@ impl Requirement {
                 ..
             } = summary.verdict;
             let (name, met) = (self.name(), kind == VerdictKind::Consistent);
-            return Met {
+            return RequirementResult {
                 name,
                 limit: self.limit,
                 value: ratio,
@@ -602,7 +602,7 @@ impl Requirement {
         };
         let beyond_linear = shifted.filter(|_| decides);
         let met = is_kept && (is_sampled || beyond_linear.is_none());
-        Met {
+        RequirementResult {
             name: self.name(),
             limit: self.limit,
             value,

@@ -89,7 +89,7 @@ pub fn both(
         let scale = 0.5 / pyramid.half as f64;
         let (sums, half) = (&pyramid.sums, pyramid.half);
         let count = sums.len() - half;
-        let begin = Begin::new(count, |t| (sums[t + half] - sums[t]).powi(2), tuning);
+        let begin = IterationStart::new(count, |t| (sums[t + half] - sums[t]).powi(2), tuning);
         squares.resize(count, 0.0);
         let mut first = [0.0; 3];
         // The first sums of the equation in the pass that makes the squares: of long records memory costs more than numbers.
@@ -116,21 +116,21 @@ pub fn both(
 
 /// The M-estimate of the mean of the given squares of zero-mean Gaussian numbers.
 pub(crate) fn m_scale(squares: &[f64], tuning: &Tuning) -> RobustVariance {
-    let begin = Begin::new(squares.len(), |t| squares[t], tuning);
+    let begin = IterationStart::new(squares.len(), |t| squares[t], tuning);
     let c2 = tuning.c() * tuning.c();
     let first = biweight_sums(squares, 1.0 / (c2 * begin.start));
     begin.solve(squares, first, tuning)
 }
 
 /// Starting point of the iteration.
-struct Begin {
+struct IterationStart {
     /// At most 4096 evenly spaced squares; all of a short vector.
     sample: Vec<f64>,
     /// The M-estimate of more of them, or their squared MAD.
     start: f64,
 }
 
-impl Begin {
+impl IterationStart {
     fn new(count: usize, square: impl Fn(usize) -> f64, tuning: &Tuning) -> Self {
         const SIZE: usize = 4096;
         let spaced = |most: usize| -> Vec<f64> {
