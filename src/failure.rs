@@ -248,7 +248,7 @@ impl Failure {
     }
 
     /// The same, where a file that was found in a directory is passed over for that reason.
-    pub(crate) fn passing_over(self, reason: &'static str) -> Self {
+    pub(crate) fn skipped_as(self, reason: &'static str) -> Self {
         Self {
             passed_over: Some(reason),
             ..self
@@ -256,7 +256,7 @@ impl Failure {
     }
 
     /// Reason for which the file is passed over, if it was found in a directory.
-    pub(crate) const fn passed_over(&self) -> Option<&'static str> {
+    pub(crate) const fn skip_reason(&self) -> Option<&'static str> {
         self.passed_over
     }
 
@@ -302,7 +302,7 @@ impl Failure {
     }
 
     /// With further advice for commands that have no such option.
-    pub(crate) fn or_without(self, (option, text): (&'static str, &'static str)) -> Self {
+    pub(crate) fn or_hint_without(self, (option, text): (&'static str, &'static str)) -> Self {
         self.or(Some((option, false)), text)
     }
 

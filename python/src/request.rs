@@ -98,10 +98,12 @@ impl Answer {
         py.detach(|| {
             let document = &self.answered.document;
             let text = document.terminal(WIDTH);
-            let spoken = document.spoken(false).map(|note| match note.importance {
-                Importance::Warning => format!("\nwarning: {}", note.text),
-                _ => format!("\nnote: {}", note.text),
-            });
+            let spoken = document
+                .shown_notes(false)
+                .map(|note| match note.importance {
+                    Importance::Warning => format!("\nwarning: {}", note.text),
+                    _ => format!("\nnote: {}", note.text),
+                });
             self.shown(&(text.trim_end().to_owned() + &spoken.collect::<String>()))
         })
     }

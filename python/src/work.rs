@@ -50,7 +50,7 @@ impl Reporter for JobMonitor {
         self.done.fetch_add(steps, Ordering::Relaxed);
     }
 
-    fn go_on(&self) -> bool {
+    fn should_continue(&self) -> bool {
         let is_early = self.deadline.get().is_none_or(|end| Instant::now() < *end);
         is_early && !self.is_stopped.load(Ordering::Relaxed)
     }
@@ -109,7 +109,7 @@ pub(crate) fn work<T: Send + 'static>(
     loop {
         match py.detach(next) {
             Ok(Ok(outcome)) => {
-                tell(progress, &meter, &mut told)?;
+                report_progress(progress, &meter, &mut told)?;
                 return Ok(outcome);
             }
             Ok(Err(panic)) => return Err(defect(py, panic.as_ref())),
@@ -117,14 +117,14 @@ pub(crate) fn work<T: Send + 'static>(
             Err(RecvTimeoutError::Timeout) => {
                 let heard = py
                     .check_signals()
-                    .and_then(|()| tell(progress, &meter, &mut told));
+                    .and_then(|()| report_progress(progress, &meter, &mut told));
                 heard.inspect_err(|_| meter.is_stopped.store(true, Ordering::Relaxed))?;
             }
         }
     }
 }
 
-fn tell(
+fn report_progress(
     progress: Option<&Bound<'_, PyAny>>,
     meter: &JobMonitor,
     told: &mut (u64, u64),

@@ -177,7 +177,7 @@ impl PlainAnswer {
     }
 
     /// The same with a bound that may not be met.
-    pub(crate) fn judged(self, unmet: Option<Failure>) -> Self {
+    pub(crate) fn with_unmet(self, unmet: Option<Failure>) -> Self {
         Self { unmet, ..self }
     }
 }

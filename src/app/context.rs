@@ -22,7 +22,7 @@ pub trait Reporter: Sync {
     fn end(&self) {}
 
     /// False to stop; called from any thread, several times a second, by jobs that can be resumed.
-    fn go_on(&self) -> bool {
+    fn should_continue(&self) -> bool {
         true
     }
 }
@@ -146,8 +146,8 @@ impl<'a> Context<'a> {
     }
 
     /// False to stop.
-    pub fn go_on(&self) -> bool {
-        self.front.go_on()
+    pub fn should_continue(&self) -> bool {
+        self.front.should_continue()
     }
 
     /// The seed of `--seed`, if it is given.

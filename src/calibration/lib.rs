@@ -68,6 +68,6 @@ pub use outcome::{
     ParameterSpread, Practical, PracticalIntervals, ScaleMisfit, Settings, Undetermined, model_of,
     tau_s,
 };
-pub use pipeline::{calibrate, calibrate_telling, fit_curve, infer, infer_telling};
+pub use pipeline::{calibrate, calibrate_with_progress, fit_curve, infer, infer_with_progress};
 pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};
 pub use uncertainty::{ALIKE_LEVEL, Scattering, WIDEST, derived_interval, figures_with_intervals};

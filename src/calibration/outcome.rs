@@ -18,7 +18,7 @@ pub fn model_of<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>, rate_hz: f6
     };
     outcomes
         .into_iter()
-        .for_each(|outcome| outcome.put_into(&mut model));
+        .for_each(|outcome| outcome.apply_to(&mut model));
     model
 }
 
@@ -56,7 +56,7 @@ pub struct Outcome {
 
 impl Outcome {
     /// Gives its noise to the axes of a model that it is for.
-    pub fn put_into(&self, model: &mut Model) {
+    pub fn apply_to(&self, model: &mut Model) {
         for channel in self.scope.channels() {
             model.axes[channel.index()] = self.fit.composite.clone();
         }

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 /// # Errors
 /// When a trim leaves no replicate, or a curve is too short for the model.
 pub fn calibrate(groups: &[Group], settings: &Settings) -> Result<Vec<Outcome>, CalibrationError> {
-    calibrate_telling(groups, settings, &|_| {})
+    calibrate_with_progress(groups, settings, &|_| {})
 }
 
 /// Calibrates like [`calibrate`] and reports progress: `advance` receives the number of steps done
@@ -23,7 +23,7 @@ pub fn calibrate(groups: &[Group], settings: &Settings) -> Result<Vec<Outcome>, 
 ///
 /// # Errors
 /// The same as [`calibrate`].
-pub fn calibrate_telling(
+pub fn calibrate_with_progress(
     groups: &[Group],
     settings: &Settings,
     advance: Advance<'_>,
@@ -130,12 +130,12 @@ pub fn infer(
     settings: &Settings,
     bootstrap: Bootstrap,
 ) {
-    infer_telling(groups, outcomes, settings, bootstrap, &|_| {});
+    infer_with_progress(groups, outcomes, settings, bootstrap, &|_| {});
 }
 
 /// Runs [`infer`] and reports progress: `advance` receives the number of draws done since its last
 /// call.
-pub fn infer_telling(
+pub fn infer_with_progress(
     groups: &[Group],
     outcomes: &mut [Outcome],
     settings: &Settings,

@@ -117,7 +117,7 @@ struct Trials {
 impl Trials {
     /// Candidates that the ranking lists, however far they are: the chosen one, and those that only the
     /// J-test refused.
-    fn told(&self, chosen: usize) -> Vec<usize> {
+    fn listed(&self, chosen: usize) -> Vec<usize> {
         let rejected = self.whole.iter().map(|(i, _)| *i);
         rejected.chain([chosen]).collect()
     }
@@ -164,7 +164,7 @@ impl CandidateSet<'_> {
         let mut trials = Trials::default();
         let chosen = self.take(best, &ranked, &mut trials);
         stage_done();
-        for tested in trials.told(chosen) {
+        for tested in trials.listed(chosen) {
             if !ranked.iter().any(|(i, _)| *i == tested) {
                 ranked.push((tested, self.optimism(tested, &curves)));
             }

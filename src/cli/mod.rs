@@ -68,7 +68,7 @@ enum CliCommand {
 
 impl CliCommand {
     /// True if the command itself ends in good order at a signal.
-    const fn heeds_signals(&self) -> bool {
+    const fn handles_signals(&self) -> bool {
         matches!(self, Self::Batch(_))
     }
 
@@ -168,7 +168,7 @@ fn end(e: &clap::Error) -> ! {
     if let (ErrorKind::UnknownArgument, Some(word)) = (e.kind(), e.get(ContextKind::InvalidArg)) {
         let path = PathBuf::from(word.to_string());
         if path.is_file() {
-            failure = file_kind::unless(&[], &path, failure);
+            failure = file_kind::or_wrong_kind(&[], &path, failure);
         }
     }
     Session::default().failure(&failure);
@@ -206,7 +206,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
         .try_get_matches_from(&words)
         .unwrap_or_else(|e| end(&e));
     let Cli { common, command } = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
-    if !command.heeds_signals() {
+    if !command.handles_signals() {
         interrupt::watch(session(&common), command.advice_at_signals());
     }
     let threads = common.threads.map_or(0, usize::from); // 0: one per core

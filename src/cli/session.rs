@@ -109,7 +109,7 @@ impl Session {
             _ if self.common.verbose => document.verbose(WIDTH),
             _ => document.terminal(WIDTH),
         });
-        for note in document.spoken(self.common.verbose) {
+        for note in document.shown_notes(self.common.verbose) {
             match note.importance {
                 Importance::Warning => self.note(note.clone()),
                 _ => self.say(format!("note: {}", note.text)),
@@ -195,7 +195,7 @@ impl Reporter for Session {
         *self.running() = None;
     }
 
-    fn go_on(&self) -> bool {
+    fn should_continue(&self) -> bool {
         self.go_on.as_ref().is_none_or(|go_on| go_on())
     }
 }

@@ -85,18 +85,18 @@ impl Command for CheckFiles {
             }
         };
         let document = Document::new("Files", Tone::Good, lines);
-        Ok(PlainAnswer::new(files.into(), document).judged(unmet))
+        Ok(PlainAnswer::new(files.into(), document).with_unmet(unmet))
     }
 }
 
-fn tell(notes: &[Note], context: &Context<'_>) {
+fn report_notes(notes: &[Note], context: &Context<'_>) {
     for Note { importance, text } in notes {
         context.note(*importance, text);
     }
 }
 
 fn drive(imu: &ImuFile, context: &Context<'_>) -> String {
-    tell(&imu.remarks, context);
+    report_notes(&imu.remarks, context);
     let (samples, rate_hz) = (imu.samples.len(), imu.rate_hz);
     format!("an IMU recording of {samples} samples at {rate_hz:.2} Hz, for fuse")
 }
@@ -152,7 +152,7 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
             };
             let (fixes, notes) =
                 read.or_else(|e| read_gnss(path, Some(&given), None, None).map_err(|_| e))?;
-            tell(&notes, context);
+            report_notes(&notes, context);
             return Ok(format!("{} GNSS fixes{unsaid}", fixes.len()));
         }
         FileKind::Imu => return Ok(drive(&read_imu(path, None, None)?, context)),

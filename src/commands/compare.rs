@@ -7,7 +7,7 @@ use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::report::csv::{csv, flat, merged};
 use crate::report::verdict::{SPOKEN, axis_of, tone, verdict_counts};
-use crate::report::{in_order, some};
+use crate::report::{first_names, in_order};
 use nav_sim_document::{
     Cell, Chart, ChartAxis, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
     window,
@@ -403,7 +403,8 @@ impl Comparison {
         };
         let costs: Vec<String> = others.iter().filter_map(cost).collect();
         (!costs.is_empty()).then(|| {
-            let (reference, costs, state) = (self.name_of_reference(), some(&costs), SPOKEN[state]);
+            let (reference, costs, state) =
+                (self.name_of_reference(), first_names(&costs), SPOKEN[state]);
             format!("against {reference}: {costs} of the uncertainty of {state}")
         })
     }
@@ -418,7 +419,7 @@ impl Comparison {
             }
             names => format!(
                 "the runs and the calibrations, of {} of the runs alone",
-                some(names)
+                first_names(names)
             ),
         };
         format!("95 % intervals (±) of {covered}")

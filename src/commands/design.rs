@@ -228,7 +228,7 @@ fn destination_quantiles(
 ) -> Result<Vec<DesignedQuantile>> {
     outcomes
         .iter()
-        .for_each(|outcome| outcome.put_into(&mut inputs.model));
+        .for_each(|outcome| outcome.apply_to(&mut inputs.model));
     let draws = DrawsFile::of(outcomes, rate_hz);
     inputs.model_draws = draws.and_then(|draws| draws.draws(&inputs.model));
     let found = navigate(inputs, scenario, outages, 0, &Context::default())?;

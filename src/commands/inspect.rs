@@ -95,7 +95,7 @@ pub struct InspectedChannel {
 /// # Errors
 /// When the file is not a log that is read, or is damaged before its end.
 pub fn inspect(path: &Path, stamp: Stamp) -> Result<Inspection> {
-    let log = logs::open(path).map_err(|e| file_kind::unless(&[FileKind::Log], path, e))?;
+    let log = logs::open(path).map_err(|e| file_kind::or_wrong_kind(&[FileKind::Log], path, e))?;
     let channels = log
         .channels()
         .iter()

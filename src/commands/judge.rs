@@ -147,7 +147,7 @@ impl Command for Judge {
         ];
         Ok(PlainAnswer::new(summary, document)
             .with(files)
-            .judged(unmet))
+            .with_unmet(unmet))
     }
 }
 

@@ -132,12 +132,12 @@ impl Command for Require {
     fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let asked = self.requirements(context)?;
         match (&self.model, &self.catalogue) {
-            (Some(path), _) => asked.given(path, self.vehicle.is_some(), context),
+            (Some(path), _) => asked.judge_imu(path, self.vehicle.is_some(), context),
             (None, Some(directory)) => asked.ranked(&match directory.as_os_str() == BUILT_IN {
                 true => asked.catalogue()?,
                 false => asked.units_of(directory, context)?,
             }),
-            (None, None) => asked.needed().map_err(|e| {
+            (None, None) => asked.required_imu().map_err(|e| {
                 let hint = match e {
                     RequireError::Loose { .. } => "a smaller limit, or a longer outage",
                     _ => "a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)",
@@ -183,7 +183,12 @@ impl Require {
 
 impl Requirements {
     /// Judges a given IMU against the limits.
-    fn given(&self, path: &Path, has_vehicle: bool, context: &Context<'_>) -> Result<PlainAnswer> {
+    fn judge_imu(
+        &self,
+        path: &Path,
+        has_vehicle: bool,
+        context: &Context<'_>,
+    ) -> Result<PlainAnswer> {
         let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
         let file = inputs::model(path, context)?;
         let mut scenario = self.scenario.clone();
@@ -201,7 +206,7 @@ impl Requirements {
             OutageRequest::Longest => self.long_outages(),
             _ => self.outages(),
         };
-        let judgement = self.judged(&scenario, &model).map_err(unusable)?;
+        let judgement = self.judge_model(&scenario, &model).map_err(unusable)?;
         let margins = judgement.margins.as_ref();
         let is_good = margins.map_or(judgement.outage.length_s() > 0.0, |margins| margins.met);
         let mut document = Document::new(
@@ -242,7 +247,7 @@ impl Requirements {
                 limit.quantity
             ))
         });
-        Ok(PlainAnswer::new(json, document).judged(unmet))
+        Ok(PlainAnswer::new(json, document).with_unmet(unmet))
     }
 
     fn verdict(&self, judgement: &LimitResult, outages: &[Outage]) -> Vec<String> {
@@ -501,7 +506,7 @@ impl Requirements {
     ///
     /// # Errors
     /// When no IMU keeps the limits, or trajectory and rates do not fit together.
-    fn needed(&self) -> Result<PlainAnswer, RequireError> {
+    fn required_imu(&self) -> Result<PlainAnswer, RequireError> {
         let outages = self.outages();
         let course = self.course(&outages)?;
         let scenario = &self.with_stated_turn_on();
@@ -553,8 +558,8 @@ impl Requirements {
             figures.push(json!({
                 "figure": name,
                 "allocated": allocated,
-                "alone": bound(i, &need.quite_alone(&imu, i)?),
-                "others_10_times_better": bound(i, &need.alone(&imu, i, 0.1)?),
+                "alone": bound(i, &need.limit_with_others_perfect(&imu, i)?),
+                "others_10_times_better": bound(i, &need.limit_of(&imu, i, 0.1)?),
             }));
         }
         file.provenance = Some(provenance);
@@ -619,7 +624,7 @@ impl Requirements {
     ///
     /// # Errors
     /// When the model has no filter.
-    fn judged(&self, scenario: &Scenario, model: &Model) -> Result<LimitResult, RequireError> {
+    fn judge_model(&self, scenario: &Scenario, model: &Model) -> Result<LimitResult, RequireError> {
         let (curves, outage, worst) = self.bridged(scenario, model)?;
         // of one set of starts: with fewer starts for longer outages the worst of them would fall
         let lasts = |length_s: &u32| !after(&curves, f64::from(*length_s)).is_empty();
@@ -708,7 +713,7 @@ impl Requirements {
     /// When a model has no filter, with its name, or the longest outage is asked for.
     fn ranked(&self, units: &[CatalogueUnit]) -> Result<PlainAnswer> {
         let ranked = |unit: &CatalogueUnit| {
-            let judged = self.judged(&unit.scenario, &unit.model);
+            let judged = self.judge_model(&unit.scenario, &unit.model);
             let mut judgement = judged.refuse_within(&unit.name)?;
             let is_complete = unit.not_stated.is_empty();
             let mut kept = "not met";
@@ -781,7 +786,7 @@ impl Requirements {
         let columns = [("unit", "unit"), ("not stated", "missing")];
         document.table(Table::of(&json, "/units/*", &columns));
         document.text(RULE);
-        Ok(PlainAnswer::new(json, document).judged(unmet))
+        Ok(PlainAnswer::new(json, document).with_unmet(unmet))
     }
 
     /// The longest outage of which all places are within the limits, in whole seconds. The first place holds the longest.

@@ -315,12 +315,14 @@ fn reaches(
 }
 
 fn find(name: &str, rate_hz: f64) -> Result<Contamination> {
-    contamination_file::find(name, rate_hz).map_err(|e| match contamination_file::meant(name) {
-        _ if Path::new(name).exists() => e,
-        Some(meant) => e.hint(format!("did you mean \"{meant}\"?")),
-        None => {
-            let known = contamination_file::names().join(", ");
-            e.hint(format!("give a file or one of {known}"))
+    contamination_file::find(name, rate_hz).map_err(|e| {
+        match contamination_file::nearest_preset(name) {
+            _ if Path::new(name).exists() => e,
+            Some(meant) => e.hint(format!("did you mean \"{meant}\"?")),
+            None => {
+                let known = contamination_file::names().join(", ");
+                e.hint(format!("give a file or one of {known}"))
+            }
         }
     })
 }

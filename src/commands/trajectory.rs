@@ -261,7 +261,7 @@ impl Command for CheckTrajectory {
         let unmet = (!missed.is_empty()).then(|| Failure::bound(message).hint(hints.join("; ")));
         let lines = [path, closes].into_iter().chain(table);
         let document = Document::new("Trajectory", Tone::Good, lines);
-        Ok(PlainAnswer::new(json, document).judged(unmet))
+        Ok(PlainAnswer::new(json, document).with_unmet(unmet))
     }
 }
 

@@ -103,7 +103,7 @@ impl Command for Tune {
         });
         Ok(PlainAnswer::new(found.json(), found.document())
             .with(tuned)
-            .judged(unmet))
+            .with_unmet(unmet))
     }
 }
 

@@ -222,7 +222,7 @@ impl Document {
     }
 
     /// The notes that a terminal shows, the most important first; all of them to those who ask for more.
-    pub fn spoken(&self, is_verbose: bool) -> impl Iterator<Item = &Note> {
+    pub fn shown_notes(&self, is_verbose: bool) -> impl Iterator<Item = &Note> {
         let is_spoken = move |note: &&Note| is_verbose || note.importance < Importance::Detail;
         self.notes()
             .iter()
@@ -275,9 +275,12 @@ mod terminal_tests {
             text.ends_with("  12\n  … 27 more rows (--verbose)\n") && text.lines().count() <= 18,
             "{text}"
         );
-        let spoken: Vec<&str> = document.spoken(false).map(|n| n.text.as_str()).collect();
+        let spoken: Vec<&str> = document
+            .shown_notes(false)
+            .map(|n| n.text.as_str())
+            .collect();
         assert_eq!(spoken, ["last said, first told", "remark 0", "remark 1"]);
-        assert_eq!(document.spoken(true).count(), 7);
+        assert_eq!(document.shown_notes(true).count(), 7);
         assert!(document.verbose(100).contains("\n  39\n"));
     }
 }

@@ -36,7 +36,7 @@ const LAYOUT: &str = "a curve is a CSV with the columns tau_samples,wv,edof (tau
 pub(crate) fn read(path: &Path) -> Result<Vec<NamedCurve>, Failure> {
     let text = source::text(path).map_err(|e| Failure::io(path, e))?;
     parse(&path.display().to_string(), &text)
-        .map_err(|e| file_kind::unless(&[FileKind::Curve], path, e.or_hint(LAYOUT)))
+        .map_err(|e| file_kind::or_wrong_kind(&[FileKind::Curve], path, e.or_hint(LAYOUT)))
 }
 
 fn parse(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {

@@ -62,7 +62,7 @@ impl FileKind {
 }
 
 /// The refusal of a file that was expected to be of other kinds.
-pub(crate) fn unless(expected: &[FileKind], path: &Path, refusal: Failure) -> Failure {
+pub(crate) fn or_wrong_kind(expected: &[FileKind], path: &Path, refusal: Failure) -> Failure {
     // of what is known no better, the reader's own advice says more
     let is_vague = |kind: &FileKind| *kind == FileKind::Other && refusal.advice().is_some();
     let is_other = |kind: &FileKind| !(expected.contains(kind) || is_vague(kind));

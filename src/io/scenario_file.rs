@@ -11,7 +11,7 @@ use std::path::Path;
 /// # Errors
 /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
 pub(crate) fn read(path: &Path) -> Result<Scenario, Failure> {
-    let refused = |e| file_kind::unless(&[FileKind::Scenario, FileKind::Study], path, e);
+    let refused = |e| file_kind::or_wrong_kind(&[FileKind::Scenario, FileKind::Study], path, e);
     from_source(&TomlSource::read(path)?).map_err(refused)
 }
 

@@ -590,7 +590,7 @@ impl ImuSearch<'_> {
     ///
     /// # Errors
     /// When the model has no filter.
-    pub fn alone(
+    pub fn limit_of(
         &self,
         imu: &ImuParameters,
         which: usize,
@@ -615,12 +615,12 @@ impl ImuSearch<'_> {
     ///
     /// # Errors
     /// When the model has no filter.
-    pub fn quite_alone(
+    pub fn limit_with_others_perfect(
         &self,
         imu: &ImuParameters,
         which: usize,
     ) -> Result<IntensityBound, BeliefError> {
-        self.alone(imu, which, NONE)
+        self.limit_of(imu, which, NONE)
     }
 
     fn worst(&self, imu: &ImuParameters) -> Result<HardestLimit, BeliefError> {

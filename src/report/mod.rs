@@ -28,7 +28,7 @@ pub(crate) fn json(value: &impl serde::Serialize) -> String {
 }
 
 /// The first of these names, and how many more there are.
-pub(crate) fn some(names: &[String]) -> String {
+pub(crate) fn first_names(names: &[String]) -> String {
     const NAMED: usize = 3;
     let shown = names[..names.len().min(NAMED)].join(", ");
     match names.len().saturating_sub(NAMED) {

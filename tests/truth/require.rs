@@ -128,8 +128,8 @@ fn answers_are_monotone() {
         "{loose:?} {tight:?}"
     );
     for i in 0..IMU_PARAMETERS {
-        let beside = need(0).alone(&loose, i, 0.1).unwrap();
-        let alone = need(0).quite_alone(&loose, i).unwrap();
+        let beside = need(0).limit_of(&loose, i, 0.1).unwrap();
+        let alone = need(0).limit_with_others_perfect(&loose, i).unwrap();
         let (IntensityBound::AtMost(beside), IntensityBound::AtMost(alone)) = (beside, alone)
         else {
             panic!("{beside:?} {alone:?}")

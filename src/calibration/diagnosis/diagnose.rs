@@ -161,23 +161,25 @@ fn common(pieces: &[AxisReplicates<'_>], settings: &Settings) -> Vec<CommonFindi
             .into_iter()
             .filter(|e| e.alarms(e.gaussian.abs()))
             .collect::<Vec<_>>();
-        findings.extend(seen(CommonCause::CoarseSteps, &differ, |e| e.gaussian));
+        findings.extend(finding_at(CommonCause::CoarseSteps, &differ, |e| {
+            e.gaussian
+        }));
     } else if found.iter().all(|e| !e.alarms(e.gaussian.abs())) {
         // Outliers raise the classical variance by anything; that they make up for the allowance, no more and no less, at
         // every scale is not to be expected.
-        findings.extend(seen(CommonCause::GaussianQuantization, &found, |e| {
+        findings.extend(finding_at(CommonCause::GaussianQuantization, &found, |e| {
             e.quantizer - e.gaussian
         }));
     } else {
         // Outliers of the finer scales explain what coarser steps show.
-        findings.extend(seen(CommonCause::Outliers, &found, |e| e.quantizer));
+        findings.extend(finding_at(CommonCause::Outliers, &found, |e| e.quantizer));
     }
     findings.extend(drifts(pieces, settings.rate_hz));
     findings
 }
 
 /// The finding of scales at which a logarithm is far from 0.
-fn seen(
+fn finding_at(
     cause: CommonCause,
     scales: &[RobustExcess],
     log: impl Fn(&RobustExcess) -> f64,

@@ -154,7 +154,7 @@ impl<'a> CurveSampler<'a> {
                 nu * ratio * (1.0 + bias)
             };
             let levels = levels.take(replicate.levels()).enumerate();
-            like(replicate, levels.map(drawn).collect())
+            with_variances(replicate, levels.map(drawn).collect())
         };
         let pairs = self.replicates.iter().zip(ratios).zip(edof);
         let replicates: Vec<Replicate> = pairs.map(drawn_replicate).collect();
@@ -194,7 +194,7 @@ impl<'a> CurveSampler<'a> {
 }
 
 /// A replicate of the same length with other variances, classical where that replicate's are.
-pub(crate) fn like(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
+pub(crate) fn with_variances(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
     let status = |j: usize| match replicate.robust.get(j).map(|robust| robust.status) {
         Some(Status::Coarse) => Status::Coarse,
         _ => Status::Ok,
@@ -347,7 +347,7 @@ mod goodness_tests;
 
 #[cfg(test)]
 mod inference_tests {
-    use super::{like, *};
+    use super::{with_variances, *};
     use crate::imu::{Axis, Channel, Sensor};
     use crate::noise::{Composite, Kind, Model, Process, VirtualImu};
     use crate::wavelet::{Tuning, classical};
@@ -404,7 +404,7 @@ mod inference_tests {
                 trend: f64::NAN,
                 mean: f64::NAN,
             };
-            (CHANNEL, like(&template, nu))
+            (CHANNEL, with_variances(&template, nu))
         };
         grouped(
             replicates.iter().enumerate().map(recording).collect(),

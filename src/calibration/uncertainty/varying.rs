@@ -495,7 +495,10 @@ mod indistinct_tests {
                 trend: f64::NAN,
                 mean: f64::NAN,
             };
-            (channel, crate::uncertainty::bootstrap::like(&template, nu))
+            (
+                channel,
+                crate::uncertainty::bootstrap::with_variances(&template, nu),
+            )
         };
         let groups = [grouped((0..count).map(recording).collect(), Pool::Axes).remove(0)];
         let mut outcomes = calibrate(&groups, &settings("WN+2*AR1")).unwrap();

@@ -16,7 +16,7 @@ use crate::commands::run::{PreparedRun, Run, Shared, block_of, columns};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::toml_file::TomlSource;
 use crate::io::{atomic, input, source};
-use crate::report::{in_order, some};
+use crate::report::{first_names, in_order};
 use clap::Args;
 use indexmap::IndexMap;
 use nav_sim_document::{Importance, Note};
@@ -185,7 +185,7 @@ impl BatchRequest {
                 .or_hint_if(failure.advice()));
         }
         let left = left();
-        if left > 0 && !context.go_on() {
+        if left > 0 && !context.should_continue() {
             let is_resumable = left < todo;
             return Ok(BatchOutcome::Stopped { is_resumable, left });
         }
@@ -199,7 +199,7 @@ impl BatchRequest {
             "{} of {} cells are missing: {}",
             missing.len(),
             cells.len(),
-            some(&missing)
+            first_names(&missing)
         ));
         Ok(BatchOutcome::Partial(missing))
     }
@@ -396,7 +396,7 @@ impl Study {
         } else {
             let source = TomlSource::read(path)?;
             let kinds = [FileKind::Study, FileKind::Scenario];
-            let refused = |e| file_kind::unless(&kinds, path, e);
+            let refused = |e| file_kind::or_wrong_kind(&kinds, path, e);
             let study: Self = source.get().map_err(refused)?;
             Self {
                 source: Some(source).filter(|_| set.is_empty()),
@@ -953,7 +953,7 @@ fn work(
     context.begin("runs", todo.iter().map(|unit| unit.cost()).sum());
     let at_once = |unit: &RunBlock<'_>| (128 * context.threads() as u64 / unit.runs.max(8)).max(1);
     let mut rest = todo.as_slice();
-    while let (Some(first), true) = (rest.first(), context.go_on()) {
+    while let (Some(first), true) = (rest.first(), context.should_continue()) {
         let (now, later) = rest.split_at(rest.len().min(at_once(first) as usize));
         let computed = now
             .par_iter()

@@ -7,7 +7,7 @@ use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::io::atomic::{AtomicDir, guard_others};
 use crate::report::csv::{csv, flat};
 use crate::report::verdict::{tone, verdict_counts};
-use crate::report::{json, some};
+use crate::report::{first_names, json};
 use indexmap::IndexMap;
 use nav_sim_document::{
     Chart, ChartAxis, Colour, Document, Importance, Panel, Series, Table, Tone,
@@ -217,7 +217,13 @@ impl StudyAnswer {
     /// Cells that are missing (exit code 75), if there are any.
     pub(crate) fn incomplete(&self) -> Option<Failure> {
         let missing = &self.missing;
-        let message = || format!("{} cells are missing: {}", missing.len(), some(missing));
+        let message = || {
+            format!(
+                "{} cells are missing: {}",
+                missing.len(),
+                first_names(missing)
+            )
+        };
         (!self.complete).then(|| {
             Failure::stopped(message()).hint("the same command without --merge computes them")
         })
@@ -276,7 +282,10 @@ impl Answer for StudyAnswer {
         if !names.is_empty() {
             document.note(
                 Importance::Warning,
-                format!("runs diverged in {}; they are in no number", some(&names)),
+                format!(
+                    "runs diverged in {}; they are in no number",
+                    first_names(&names)
+                ),
             );
         }
         let columns = [

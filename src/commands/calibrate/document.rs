@@ -6,7 +6,7 @@ use crate::commands::export::ExportQuantity;
 use crate::io::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn, known};
 use crate::report::csv::merged;
 use crate::report::curves::{FittedCurve, band, curve, recording_names, sensor_name};
-use crate::report::{in_order, some};
+use crate::report::{first_names, in_order};
 use nav_sim_calibration::{
     CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, ModelCandidate, ModelRanking, Outcome,
     ParameterInterval, ParameterSpread, RecordingVerdict, RecordingWarmUp, ScaleMisfit, Settings,
@@ -381,7 +381,7 @@ pub(crate) fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> 
             });
         return Some(format!("{count} recordings, none abnormal{differ}"));
     }
-    let named = some(&abnormal);
+    let named = first_names(&abnormal);
     Some(format!(
         "{} of {count} recordings are abnormal: {named}",
         abnormal.len()
@@ -402,7 +402,7 @@ fn beginnings(found: &[RecordingWarmUp]) -> Option<String> {
         None => format!("{name} never settles"),
     };
     let lines: Vec<String> = told.iter().zip(names).map(line).collect();
-    (!lines.is_empty()).then(|| some(&lines))
+    (!lines.is_empty()).then(|| first_names(&lines))
 }
 
 /// `accel.x`, with the estimator where there are several.
@@ -777,8 +777,8 @@ fn intervals(outcome: &Outcome) -> &[ParameterInterval] {
 }
 
 /// The noise of a fit, with its intervals.
-fn put_into(file: &mut ModelFile, outcome: &Outcome) {
-    outcome.put_into(&mut file.model);
+fn apply_to(file: &mut ModelFile, outcome: &Outcome) {
+    outcome.apply_to(&mut file.model);
     let labels = outcome.fit.composite.labels();
     for channel in outcome.scope.channels() {
         file.missing.retain(|c| *c != channel);
@@ -837,7 +837,7 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
         let floor = minimum.map_or(none, |m| format!("floor at {}", duration(m.tau_s)));
         let b = minimum.map(|m| m.deviation);
         let k = practical.walk_is_observed().then_some(pair.walk);
-        let unit = |quantity: ExportQuantity| quantity.sheet(sensor);
+        let unit = |quantity: ExportQuantity| quantity.data_sheet_unit(sensor);
         let (n, to) = (Some(pair.density), to.unwrap_or_default());
         put(
             "N".to_owned(),
@@ -977,10 +977,10 @@ impl Calibration {
                     Variation::new(composite, &labels[of.process], of.parameter.name(), law).ok()
                 })
                 .collect();
-            put_into(&mut file, outcome);
+            apply_to(&mut file, outcome);
             if let Some(reading) = &outcome.reading {
                 let empty = || Box::new(ModelFile::empty(rate_hz));
-                put_into(file.reading.get_or_insert_with(empty), reading);
+                apply_to(file.reading.get_or_insert_with(empty), reading);
             }
             for channel in outcome.scope.channels() {
                 spread.axes[channel.index()].clone_from(&laws);

@@ -9,7 +9,7 @@ use crate::report::CurvesFile;
 use nav_sim_calibration::{
     self, Advance, Bootstrap, CalibrationError, Diagnosis, Estimator, Group, Outcome,
     RecordingWarmUp, Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve,
-    infer_telling, replicates, turn_on, warm_up,
+    infer_with_progress, replicates, turn_on, warm_up,
 };
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::names::UnknownName;
@@ -150,7 +150,7 @@ impl Calibration {
         advance: Advance<'_>,
     ) -> Self {
         if let Some(bootstrap) = bootstrap {
-            infer_telling(&groups, &mut outcomes, &settings, bootstrap, advance);
+            infer_with_progress(&groups, &mut outcomes, &settings, bootstrap, advance);
         }
         let of_estimator = |e: &Estimator| {
             let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == *e).collect();

@@ -40,7 +40,7 @@ use crate::report::curves::SignalCurves;
 use measure::{Curves, calibrate_curves, read_curves};
 use nav_sim_calibration::{
     Bootstrap, Estimator, ModelChoice, ModelSpec, Pool, Replicate, Settings, Trim, Weighting,
-    calibrate_telling, grouped,
+    calibrate_with_progress, grouped,
 };
 use nav_sim_document::Document;
 use nav_sim_signal::imu::Channel;
@@ -201,7 +201,7 @@ impl Command for Calibrate {
                 let fits = (groups.len() * settings.estimators.len()) as u64;
                 context.begin("steps of the fits", fits * steps);
                 let advance = |steps| context.advance(steps);
-                let outcomes = calibrate_telling(&groups, &settings, &advance)?;
+                let outcomes = calibrate_with_progress(&groups, &settings, &advance)?;
                 let made = Calibration::new(groups, outcomes, settings, bootstrap, &advance);
                 context.end();
                 Calibration { beginnings, ..made }

@@ -60,7 +60,7 @@ impl Candidate {
 
     /// Default candidates: the three averages with N2; and with AWV the other common practices,
     /// from all states to the rule of thumb and single recordings.
-    pub(crate) fn usual() -> Vec<Self> {
+    pub(crate) fn default_set() -> Vec<Self> {
         let n2 = |estimator| Self::new(estimator, ModelSpec::n2());
         let two_slopes = |estimator| Self::new(estimator, white_and_walk());
         vec![
@@ -171,7 +171,10 @@ mod candidate_tests {
 
     #[test]
     fn names_tell_candidates_apart() {
-        let mut names: Vec<String> = Candidate::usual().iter().map(ToString::to_string).collect();
+        let mut names: Vec<String> = Candidate::default_set()
+            .iter()
+            .map(ToString::to_string)
+            .collect();
         assert_eq!(
             (names[0].as_str(), names[7].as_str()),
             ("awv N2, 15", "avlr WN+RW, 15")

@@ -16,7 +16,7 @@ use crate::commands::calibrate::{
 use crate::io::recordings::{self, FileReport, Gaps};
 use crate::parse;
 use crate::report::csv::merged;
-use crate::report::{self, six_digits, some};
+use crate::report::{self, first_names, six_digits};
 use candidates::{CalibrationSet, Candidate, Drive, Fold, Inflation, Unit};
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, model_of};
 use nav_sim_document::{Document, Importance, Table, Tone, readable, window};
@@ -267,7 +267,7 @@ impl Choose {
             ..
         } = self;
         if estimator.is_empty() && model.is_empty() && filter.is_empty() && inflate.is_empty() {
-            return Ok(Candidate::usual());
+            return Ok(Candidate::default_set());
         }
         let models = model.iter().map(|m| m.parse().map_err(unknown_model));
         let models: Vec<ModelChoice> = models.collect::<Result<_>>()?;
@@ -342,7 +342,10 @@ impl Ranking {
             ),
         }];
         if self.tells && !self.tied.is_empty() {
-            lines.push(format!("cannot be told from it: {}", some(&self.tied)));
+            lines.push(format!(
+                "cannot be told from it: {}",
+                first_names(&self.tied)
+            ));
         }
         lines.push(format!(
             "its horizontal error at the ends of outages: {} m, believed {} m, NEES {} (9 if right)",

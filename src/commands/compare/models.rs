@@ -5,7 +5,7 @@ use crate::commands::calibrate::figure_of;
 use crate::commands::export::ExportQuantity;
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::{self, ModelFile};
-use crate::report::some;
+use crate::report::first_names;
 use nav_sim_calibration::figures_with_intervals;
 use nav_sim_document::{Document, Table, Tone, readable};
 use nav_sim_signal::imu::{Axis, Channel};
@@ -30,7 +30,7 @@ fn estimates((file, draws): &(ModelFile, Option<Draws>), channel: Channel) -> Ve
     ];
     let mut all: Vec<Estimate> = Vec::new();
     for (k, (quantity, (value, ends))) in quantities.into_iter().zip(figures).enumerate() {
-        let (unit, factor) = quantity.sheet(channel.sensor);
+        let (unit, factor) = quantity.data_sheet_unit(channel.sensor);
         let ends = ends.map(|ends| ends.map(|end| end * factor));
         all.extend(value.map(|x| (["N", "K", "B"][k].to_owned(), unit, x * factor, ends)));
     }
@@ -129,7 +129,7 @@ pub(super) fn compare(paths: [&Path; 2], context: &Context<'_>) -> Result<PlainA
             Tone::Doubtful,
             format!(
                 "changed: {}; {rest} others within their intervals",
-                some(&changed)
+                first_names(&changed)
             ),
         ),
     };

@@ -308,7 +308,7 @@ pub(crate) enum ExportQuantity {
 
 impl ExportQuantity {
     /// Unit of data sheets, and the factor from SI to it.
-    pub(crate) const fn sheet(self, sensor: Sensor) -> (&'static str, f64) {
+    pub(crate) const fn data_sheet_unit(self, sensor: Sensor) -> (&'static str, f64) {
         const ROOT_HOUR: f64 = 60.0;
         match (self, sensor) {
             (Self::Density, Sensor::Accel) => ("m/s/sqrt(h)", ROOT_HOUR),
@@ -321,7 +321,7 @@ impl ExportQuantity {
     }
 
     fn text(self, x: f64, sensor: Sensor) -> String {
-        let (unit, factor) = self.sheet(sensor);
+        let (unit, factor) = self.data_sheet_unit(sensor);
         format!("{} {unit}", readable(x * factor))
     }
 }

@@ -522,7 +522,7 @@ impl<'a> RecordedDrive<'a> {
         let stated = &self.model.model;
         let mut noise = own_noise(&self.imu, self.imu_rate_hz, stated);
         let mut own = stated.clone();
-        noise.iter().for_each(|noise| noise.put_into(&mut own));
+        noise.iter().for_each(|noise| noise.apply_to(&mut own));
         let lengths: Vec<f64> = settings
             .outages
             .iter()
@@ -1170,7 +1170,7 @@ fn fix_correlation(weighed: &WeightedSolution) -> Option<Value> {
         "is_correlated": weighed.correlation().is_some(),
         "pos_sigma_factor": pos_sigma_factor,
         "vel_sigma_factor": vel_sigma_factor,
-        "nis_as_stated": outcome(weighed.judged(), &[]).nis_per_component,
+        "nis_as_stated": outcome(weighed.with_stated_sigmas(), &[]).nis_per_component,
     }))
 }
 

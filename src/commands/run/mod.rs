@@ -401,7 +401,13 @@ pub(crate) fn columns(
     );
     let plan = Plan::new(&experiment)?;
     let progress = |done| context.advance(done * runs.len() as u64);
-    let results = monte_carlo::run_range(&plan, first, count, &|| context.go_on(), &progress);
+    let results = monte_carlo::run_range(
+        &plan,
+        first,
+        count,
+        &|| context.should_continue(),
+        &progress,
+    );
     Ok(results.map(|results| results.into_iter().map(Some).collect()))
 }
 

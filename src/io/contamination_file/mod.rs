@@ -71,14 +71,14 @@ pub fn find(name_or_path: &str, rate_hz: f64) -> Result<Contamination, Failure> 
         Some((name, text)) => parse(&TomlSource::new(name, text), rate_hz),
         None => {
             let path = Path::new(name_or_path);
-            let refused = |e| file_kind::unless(&[FileKind::Contamination], path, e);
+            let refused = |e| file_kind::or_wrong_kind(&[FileKind::Contamination], path, e);
             parse(&TomlSource::read(path)?, rate_hz).map_err(refused)
         }
     }
 }
 
 /// The name of a preset that was meant by what is neither a preset nor a file.
-pub(crate) fn meant(name: &str) -> Option<&'static str> {
+pub(crate) fn nearest_preset(name: &str) -> Option<&'static str> {
     nearest(name, names())
 }
 
@@ -440,7 +440,7 @@ mod tests {
                 .is_ok()
             );
         }
-        assert_eq!(meant("section5-2"), Some("section5-I"));
+        assert_eq!(nearest_preset("section5-2"), Some("section5-I"));
     }
 }
 

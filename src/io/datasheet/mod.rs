@@ -813,7 +813,7 @@ pub fn measured(path: &Path, rate_hz: Option<f64>) -> Result<(Datasheet, Option<
             "no figure of Kalibr (gyroscope_noise_density, …) or imu_utils (gyr_n, … of avg-axis)";
         let refused = Failure::contents(&name, Place::Within, message)
             .hint("give the figures with their units: --arw, --gyro-bias, --gyro-rrw, --vrw, --accel-bias, --accel-rrw");
-        return Err(file_kind::unless(&[], path, refused));
+        return Err(file_kind::or_wrong_kind(&[], path, refused));
     }
     Ok((sheet, rate_hz))
 }

@@ -358,7 +358,7 @@ pub(crate) fn read_gnss(
 ) -> Result<(Vec<GnssFix>, Vec<Note>), Error> {
     use FileKind as K;
     read_fixes(path, unsaid, clock_s, topic)
-        .map_err(|e| file_kind::unless(&[K::Gnss, K::Trajectory, K::Log], path, e))
+        .map_err(|e| file_kind::or_wrong_kind(&[K::Gnss, K::Trajectory, K::Log], path, e))
 }
 
 fn read_fixes(
@@ -1137,7 +1137,7 @@ pub(crate) fn initial_schema() -> serde_json::Value {
 /// # Errors
 /// File, line, key and value of what is refused.
 pub(crate) fn read_initial(path: &Path) -> Result<Start, Failure> {
-    let refused = |e| file_kind::unless(&[FileKind::Initial], path, e);
+    let refused = |e| file_kind::or_wrong_kind(&[FileKind::Initial], path, e);
     parse(&TomlSource::read(path)?).map_err(refused)
 }
 
@@ -1248,7 +1248,7 @@ const SPEEDS: Dictionary<'_> = Dictionary::new(
 pub(crate) fn read_wheel(path: &Path) -> Result<Vec<WheelSpeed>, Error> {
     let table = table::read(path, &SPEEDS)?;
     let columns = table.columns(["t_s", "speed"]);
-    let [time, speed] = columns.map_err(|e| file_kind::unless(&[], path, e))?;
+    let [time, speed] = columns.map_err(|e| file_kind::or_wrong_kind(&[], path, e))?;
     if speed.factor.is_none() {
         return Err(table.no_unit(speed));
     }

@@ -446,7 +446,7 @@ impl ModelFile {
 /// When the file cannot be read, is not TOML, has unknown keys, lacks some, or has values outside their
 /// domains.
 pub fn read(path: &Path) -> Result<ModelFile, Failure> {
-    let refused = |e| file_kind::unless(&[FileKind::Model], path, e);
+    let refused = |e| file_kind::or_wrong_kind(&[FileKind::Model], path, e);
     parse(&TomlSource::read(path)?).map_err(refused)
 }
 

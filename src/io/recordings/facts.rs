@@ -194,7 +194,7 @@ pub(super) fn repair(
 fn missing(table: &Table, row: usize, text: &str) -> Failure {
     Failure::contents(&table.path, table.line(row), text)
         .or_option(help::GAPS)
-        .or_without(help::GAPS_ELSEWHERE)
+        .or_hint_without(help::GAPS_ELSEWHERE)
 }
 
 impl Repair {
@@ -270,7 +270,7 @@ impl Repair {
             let text = first.map_or_else(String::new, |(s, r)| repeated(s, r, rate_hz));
             return Err(Failure::contents(&table.path, Place::Within, text)
                 .or_option(("axes", "take one sensor at a time, each at its own rate: --axes accel, then --axes gyro"))
-                .or_without(("axes", "wv and calibrate take one sensor at a time: --axes accel, then --axes gyro")));
+                .or_hint_without(("axes", "wv and calibrate take one sensor at a time: --axes accel, then --axes gyro")));
         }
         table.keep(firsts);
         self.rows_per_sample = *rows_per_sample;

@@ -173,7 +173,7 @@ pub(crate) fn load(
 ) -> Result<Table, Failure> {
     use FileKind as K;
     load_signals(path, options, dictionary)
-        .map_err(|e| file_kind::unless(&[K::Recording, K::Imu, K::Log], path, e))
+        .map_err(|e| file_kind::or_wrong_kind(&[K::Recording, K::Imu, K::Log], path, e))
 }
 
 fn load_signals(
@@ -210,7 +210,7 @@ fn load_signals(
                 .filter(|(_, own)| **own != first)
                 .for_each(|(value, _)| *value = f64::NAN);
         }
-        if table.keep_whole().is_some() {
+        if table.drop_incomplete_rows().is_some() {
             let text = format!("of several IMUs that with {} = {first}", instance.name);
             table.assumptions.push(text);
         }
@@ -226,7 +226,7 @@ fn load_signals(
         if path.with_file_name("TotalAcceleration.csv").exists() {
             return Err(Failure::contents(&table.path, Place::Itself, text)
                 .or_hint("name TotalAcceleration.csv")
-                .passing_over("it is without gravity"));
+                .skipped_as("it is without gravity"));
         }
         table.warnings.push(text.to_owned());
     }
@@ -243,7 +243,7 @@ fn load_signals(
         );
         return Err(table
             .refused(message)
-            .passing_over(NO_COLUMN)
+            .skipped_as(NO_COLUMN)
             .or_hint(dictionary.advice)
             .or_option(help::COLUMN_NAMES));
     }
@@ -291,8 +291,8 @@ pub(crate) fn visit<T: Send>(
         for ((path, is_found), outcome) in some.iter().zip(outcomes) {
             match outcome {
                 // the output of this very command, say, when it goes to a file in the directory
-                Err(e) if *is_found && e.passed_over().is_some() => {
-                    let (path, why) = (path.display(), e.passed_over().unwrap_or_default());
+                Err(e) if *is_found && e.skip_reason().is_some() => {
+                    let (path, why) = (path.display(), e.skip_reason().unwrap_or_default());
                     let text = format!("{path}: passed over, {why}");
                     report.warnings.push(text);
                     passed_over = passed_over.or(Some(e));

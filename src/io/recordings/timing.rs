@@ -224,13 +224,13 @@ impl SampleClock {
             return Err(match longest.is_some_and(|n| n >= STRETCH) {
                 _ if !is_lost => refusal
                     .or_option(help::GAPS)
-                    .or_without(help::GAPS_ELSEWHERE),
+                    .or_hint_without(help::GAPS_ELSEWHERE),
                 true => refusal
                     .or_option(help::GAPS_LOST)
-                    .or_without(help::GAPS_LOST_ELSEWHERE),
+                    .or_hint_without(help::GAPS_LOST_ELSEWHERE),
                 false if self.is_lossy => refusal
                     .or_option(help::GAPS_KEEP)
-                    .or_without(help::GAPS_LOST_ELSEWHERE),
+                    .or_hint_without(help::GAPS_LOST_ELSEWHERE),
                 false => refusal.or_hint("record again: too many samples are lost"),
             });
         }

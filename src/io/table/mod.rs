@@ -201,7 +201,7 @@ const IS_EMPTY: &str = "it is empty";
 
 /// A table without rows.
 fn empty(path: &str) -> Failure {
-    Failure::contents(path, Place::Within, "no rows in it").passing_over(IS_EMPTY)
+    Failure::contents(path, Place::Within, "no rows in it").skipped_as(IS_EMPTY)
 }
 
 /// Columns beside which rates and accelerations are in SI: of ArduPilot and of Sensor Logger.
@@ -520,7 +520,7 @@ impl Table {
     }
 
     /// Keeps the rows of finite numbers; what was left out, in words.
-    pub(crate) fn keep_whole(&mut self) -> Option<String> {
+    pub(crate) fn drop_incomplete_rows(&mut self) -> Option<String> {
         let all = self.rows();
         let is_whole = |row: &usize| self.columns.iter().all(|c| c.values[*row].is_finite());
         let kept: Vec<usize> = (0..all).filter(is_whole).collect();
@@ -549,7 +549,7 @@ impl Table {
             [one] => format!("column {one} is missing"),
             many => format!("columns {} are missing", many.join(", ")),
         };
-        let refusal = self.refused(columns).passing_over(NO_COLUMN);
+        let refusal = self.refused(columns).skipped_as(NO_COLUMN);
         Err(refusal.or_hint(self.advice))
     }
 
@@ -785,8 +785,8 @@ impl HeaderLines {
                 head.names = cells;
                 while lines.next()? && lines.line.trim_ascii().is_empty() {}
                 let below = split(&lines.line, delimiter);
-                head.has_row =
-                    !(lines.line.is_empty() || below.len() >= head.names.len() && is_words(&below));
+                head.has_row = !(lines.line.is_empty()
+                    || below.len() >= head.names.len() && is_text_row(&below));
                 if !head.has_row && !lines.line.is_empty() {
                     let text = String::from_utf8_lossy(&lines.line);
                     let units = words_of(text.trim(), delimiter);
@@ -1053,7 +1053,7 @@ fn unquoted(cell: &[u8]) -> Cow<'_, [u8]> {
 }
 
 /// True if a row has units, say, below the names: no cell begins as a number does.
-fn is_words(cells: &[Cow<'_, [u8]>]) -> bool {
+fn is_text_row(cells: &[Cow<'_, [u8]>]) -> bool {
     let is_word = |cell: &Cow<'_, [u8]>| {
         let first = cell.trim_ascii().first();
         number(cell, b',').is_none() && first.is_none_or(|b| !b"+-.0123456789".contains(b))

@@ -386,7 +386,7 @@ pub(super) enum CarrierSpeed {
 
 impl CarrierSpeed {
     /// The speed from which a course is a heading, where velocities are known as well as `sigma` (m/s).
-    pub(super) fn needed(self, sigma: f64) -> f64 {
+    pub(super) fn min_heading_speed(self, sigma: f64) -> f64 {
         let (least, sigmas) = if self == Self::Fast { FAST } else { SLOW };
         least.max(sigmas * sigma)
     }
@@ -421,8 +421,8 @@ impl MovingFix {
     }
 
     /// The speed from which the course of this fix is a heading (m/s).
-    pub(super) fn needed(&self) -> f64 {
-        self.pace.needed(self.sigma())
+    pub(super) fn min_heading_speed(&self) -> f64 {
+        self.pace.min_heading_speed(self.sigma())
     }
 
     /// The direction in which it moves (rad from north).
@@ -500,15 +500,17 @@ fn first_fast(courses: &[MovingFix], from_s: f64) -> Option<usize> {
     let fast = |i: usize| {
         let supported = courses
             .get(i + 1)
-            .is_none_or(|next| next.speed() >= 0.6 * next.needed());
-        courses[i].fix.t_s >= from_s && courses[i].speed() >= courses[i].needed() && supported
+            .is_none_or(|next| next.speed() >= 0.6 * next.min_heading_speed());
+        courses[i].fix.t_s >= from_s
+            && courses[i].speed() >= courses[i].min_heading_speed()
+            && supported
     };
     (0..courses.len()).find(|i| fast(*i))
 }
 
 /// The fix that comes nearest to moving fast enough: when (s), its speed and standard deviation (m/s).
 fn nearest_to_fast(courses: &[MovingFix]) -> Option<(f64, f64, f64)> {
-    let share = |m: &MovingFix| m.speed() / m.needed();
+    let share = |m: &MovingFix| m.speed() / m.min_heading_speed();
     let nearest = courses
         .iter()
         .max_by(|a, b| share(a).total_cmp(&share(b)))?;

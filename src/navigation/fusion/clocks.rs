@@ -106,7 +106,7 @@ fn turns(recorded: &Recorded<'_>) -> Vec<Turn> {
 
 /// The turn between two fixes; none where one of them hardly moves, or too much time is between them.
 fn turn((from, from_s): (&MovingFix, f64), (to, to_s): (&MovingFix, f64)) -> Option<Turn> {
-    let is_course = |m: &MovingFix| m.speed() >= m.needed();
+    let is_course = |m: &MovingFix| m.speed() >= m.min_heading_speed();
     let seconds = to_s - from_s;
     let is_one = is_course(from) && is_course(to) && (APART_S.0..=APART_S.1).contains(&seconds);
     // Without its sign: the norm of the angular rate has none.

@@ -75,7 +75,7 @@ pub fn displaced(
         }
     };
     let scale = scale(&best);
-    let kept = normal.needed(&x, scale)?;
+    let kept = normal.significant_parts(&x, scale)?;
     let (x, covariance) = normal.without_the_rest(&x, &kept)?;
     // either would do where both are kept for want of one that is needed by itself
     if normal.cost(&x, 0..4)? < COSTLY * scale {
@@ -184,7 +184,11 @@ impl Normal {
     }
 
     /// The parts that `x` owes its gain to. Costs count `scale` times less.
-    pub(super) fn needed(&self, x: &Vector4<f64>, scale: f64) -> Option<Vec<Range<usize>>> {
+    pub(super) fn significant_parts(
+        &self,
+        x: &Vector4<f64>,
+        scale: f64,
+    ) -> Option<Vec<Range<usize>>> {
         let [antenna, delay] = [self.cost(x, ANTENNA)?, self.cost(x, DELAY)?];
         let limit = COSTLY * scale;
         Some(match (antenna > limit, delay > limit) {
@@ -335,7 +339,7 @@ pub struct WeightedSolution {
 
 impl WeightedSolution {
     /// The solution whose innovations tell what the fixes are worth.
-    pub fn judged(&self) -> &Solution {
+    pub fn with_stated_sigmas(&self) -> &Solution {
         self.as_stated.as_ref().unwrap_or(&self.solution)
     }
 

@@ -592,7 +592,7 @@ fn found_offset(
             if normal.cost(&off, 0..4)? < COSTLY {
                 return None;
             }
-            let needed = normal.needed(&off, COSTLY / 20.0)?;
+            let needed = normal.significant_parts(&off, COSTLY / 20.0)?;
             [needed.contains(&DELAY), needed.contains(&ANTENNA)]
         }
     };

@@ -278,7 +278,7 @@ fn through(
 fn moment([before, row, after]: [&Row; 3], pace: CarrierSpeed) -> Option<MotionSample> {
     let (v_n, speed) = (row.state.v_n, row.state.v_n.truncate().length());
     let of_velocity = row.sigma[3].max(row.sigma[4]);
-    if speed < pace.needed(of_velocity) {
+    if speed < pace.min_heading_speed(of_velocity) {
         return None;
     }
     let seconds = after.t_s - before.t_s;
@@ -475,7 +475,7 @@ fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), R
 fn stretches(recorded: &Recorded<'_>, settings: &Settings) -> Vec<VelocityChange> {
     let courses: Vec<MovingFix> = courses(recorded.gnss, recorded.imu)
         .into_iter()
-        .filter(|m| m.speed() >= m.needed())
+        .filter(|m| m.speed() >= m.min_heading_speed())
         .collect();
     let steps = steps(&courses, APART_S.0);
     steps

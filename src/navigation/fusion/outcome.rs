@@ -420,7 +420,7 @@ pub fn assess(
     withheld: Option<Withheld>,
 ) -> FusionAssessment {
     let mut findings = of_start.to_vec();
-    let of_fixes = weighed.judged();
+    let of_fixes = weighed.with_stated_sigmas();
     let correlated = correlated(weighed);
     findings.push(match (nis(of_fixes), correlated) {
         // errors that last make small innovations of right standard deviations

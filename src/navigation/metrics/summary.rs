@@ -2,7 +2,7 @@
 
 use super::estimate::{Band, PerState, SampleSize, chi_square_band, coverage_band};
 use super::outage::{Budget, EpochMetrics, outages};
-use super::verdict::{OutageVerdict, Verdict, VerdictKind, judged};
+use super::verdict::{OutageVerdict, Verdict, VerdictKind, verdicts};
 use crate::linalg::{by_value, mean};
 use crate::simulation::lincov::{self, Assessment};
 use crate::simulation::{GainsUsed, NEES_DOF, REPORTED, REPORTED_NAMES, RunResult};
@@ -208,7 +208,7 @@ impl Summary {
     /// The summary of a Monte-Carlo experiment.
     pub fn of(result: &RunResult, epochs: &[EpochMetrics], seed: u64) -> Self {
         let windows = result.independent_windows;
-        let (verdict, verdicts) = judged(&result.runs, result.outages.len(), windows);
+        let (verdict, verdicts) = verdicts(&result.runs, result.outages.len(), windows);
         let diverged = result.runs.iter().filter(|r| r.diverged);
         let diverged_runs: Vec<u64> = diverged.map(|r| r.run).collect();
         Self {

@@ -175,7 +175,7 @@ pub struct OutageVerdict {
 
 /// Verdicts on the whole and on each outage, from the records of the runs through a number of outages, those that diverged left
 /// out. No outage is called wrong where the filter is not. A run that diverged did so in every outage, since nobody knows when.
-pub(super) fn judged(
+pub(super) fn verdicts(
     runs: &[RunRecord],
     outages: usize,
     windows: Option<f64>,
@@ -222,7 +222,7 @@ impl Verdict {
     /// From the records of the runs through a number of outages, those that diverged left out;
     /// `independent_windows` as in [`RunResult`](crate::simulation::RunResult).
     pub fn of(runs: &[RunRecord], outages: usize, independent_windows: Option<f64>) -> Self {
-        judged(runs, outages, independent_windows).0
+        verdicts(runs, outages, independent_windows).0
     }
 
     /// The verdict on one recorded drive with outages (start, end) (s): errors in order of time. None without errors over their
