@@ -17,11 +17,6 @@ use std::path::{Component, Path};
 /// paper; the ASEE of each filter relative to AWV in scenario I. If interrupted, the same command makes recordings and models anew
 /// and goes on with the study.
 #[derive(clap::Args)]
-#[command(before_help = "\
-Examples:
-  nav-sim demo --seed 1 --samples 100000 --runs 8
-  nav-sim demo --seed 1 --print -o study
-  nav-sim demo --seed 1 --print > paper_section5.sh")]
 pub(crate) struct DemoArgs {
     /// Samples of each recording, at least the 900 s of the drive (default: 87 minutes, as in the paper; short ones do not
     /// show its ordering)

@@ -102,28 +102,29 @@ impl CliCommand {
 }
 
 /// Text of `nav-sim` without arguments.
-const OVERVIEW: &str = "\
-nav-sim COMMAND --help has examples of each command; the book is docs/README.md.
-
-recordings    wv, calibrate       noise and a model of it from static recordings
-              choose, design      which model navigates best; how many recordings it takes
-              synthesize          recordings from a model
-models        datasheet, export   from a data sheet; to Kalibr, PX4, GTSAM and others
-              tune, require       factors that make a filter consistent; the IMU that an outage needs
-navigation    trajectory          make, check and convert reference trajectories
-              run, compare        INS/GNSS by Monte Carlo or covariance analysis; ratios between runs
-              fuse                recorded IMU and GNSS data
-              judge               the solution of any filter against a reference
-studies       batch               grids of runs on any machines
-to start      demo, init          the case study of the paper; a directory with files of every kind
-              check, schema       check files; their JSON schemas
-              completions, man    for shells and manuals
-
-first:        nav-sim init study && cd study && nav-sim run trajectories/land_vehicle.toml calib_data/tactical.toml";
+const OVERVIEW: &str = include_str!("overview.txt");
+/// Examples that lead the help of each command, in paragraphs headed by its name.
+const EXAMPLES: &str = include_str!("examples.txt");
 
 /// The whole command line as clap knows it.
 fn command() -> clap::Command {
-    Cli::command()
+    with_examples(Cli::command(), "")
+}
+
+/// Adds the examples of a command, by its names below nav-sim, and of those under it.
+fn with_examples(command: clap::Command, names: &str) -> clap::Command {
+    let examples = EXAMPLES
+        .split("\n\n")
+        .filter_map(|paragraph| paragraph.split_once('\n'))
+        .find(|(head, _)| *head == names);
+    let command = match examples {
+        Some((_, lines)) => command.before_help(format!("Examples:\n{}", lines.trim_end())),
+        None => command,
+    };
+    command.mut_subcommands(|inner| {
+        let names = format!("{names} {}", inner.get_name());
+        with_examples(inner, names.trim_start())
+    })
 }
 
 /// The words of the command line. A negative number after an option is its value, not a flag: no flag begins with a
@@ -197,7 +198,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
         ..Session::default()
     };
     if given.len() < 2 {
-        let _ = writeln!(std::io::stderr(), "{OVERVIEW}");
+        let _ = write!(std::io::stderr(), "{OVERVIEW}");
         return 2;
     }
     let words = words(given.iter().cloned());
@@ -271,11 +272,6 @@ mod tests {
 
 /// Print a completion script for a shell
 #[derive(clap::Args)]
-#[command(before_help = "\
-Examples:
-  nav-sim completions bash > nav-sim.bash
-  nav-sim completions zsh > _nav-sim
-  nav-sim completions fish > nav-sim.fish")]
 struct CompletionsArgs {
     /// Which shell
     #[arg(value_enum)]
@@ -292,11 +288,6 @@ fn completions(args: &CompletionsArgs) -> String {
 
 /// Print the manual page of a command (without a name: of nav-sim itself)
 #[derive(clap::Args)]
-#[command(before_help = "\
-Examples:
-  nav-sim man > nav-sim.1
-  nav-sim man run > nav-sim-run.1
-  nav-sim man compare > nav-sim-compare.1")]
 struct ManArgs {
     /// Which command
     command: Option<String>,
@@ -328,11 +319,6 @@ fn man(args: &ManArgs) -> Result<String, Failure> {
 
 /// Print the JSON schema of a file that people write, for editors and checkers
 #[derive(clap::Args)]
-#[command(before_help = "\
-Examples:
-  nav-sim schema scenario > scenario.schema.json
-  nav-sim schema model | grep -c AR1
-  nav-sim schema study | grep -c description")]
 struct SchemaArgs {
     /// Which file
     #[arg(value_enum)]
@@ -382,12 +368,6 @@ mod schema_tests;
 /// what each key means. The others are those of the repository; the examples of every --help work inside the directory. Files
 /// that exist already are left alone.
 #[derive(clap::Args)]
-#[command(before_help = "\
-Examples:
-  nav-sim init study
-  nav-sim check study/scenario.toml study/calib_data/consumer_mems.toml
-  nav-sim run study/trajectories/land_vehicle.toml study/calib_data/consumer_mems.toml \\
-      --scenario study/scenario.toml --runs 8 -o study/out")]
 struct InitArgs {
     /// Directory
     #[arg(value_name = "DIR", default_value = ".")]

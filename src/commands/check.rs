@@ -27,11 +27,6 @@ use std::path::{Path, PathBuf};
 /// and .gpx; with standard deviations, or heights and neither attitude nor velocity, it is GNSS fixes; with tau_samples
 /// (or a .wv.json) a curve; any other table or .npy is a static recording.
 #[derive(clap::Args, Debug)]
-#[command(before_help = "\
-Examples:
-  nav-sim check calib_data/consumer_mems.toml
-  nav-sim check trajectories/land_vehicle.toml examples/quick_study.toml
-  nav-sim init study && nav-sim check study/scenario.toml")]
 pub struct CheckFiles {
     /// Files
     #[arg(required = true, value_name = "FILE")]

@@ -32,13 +32,6 @@ mod models;
 ///
 /// Two model files: N, B, K, Q and the parameters of the processes, and which of them changed beyond their 95 % intervals.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
-      --filter full --runs 8 --seed 1 -o out/with_all
-  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
-      --runs 8 --seed 1 -o out/with_15
-  nav-sim compare out/with_15 --reference out/with_all --state all")]
 pub struct Compare {
     /// Run directories, or two model files
     #[arg(required = true, value_name = "DIR")]

@@ -19,11 +19,6 @@ use std::path::PathBuf;
 /// instability as its minimum, and a random walk. [provenance] of the model file holds every figure as given and the
 /// parameters that follow from it. Flags override the entry of the catalogue, and the file of --from.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim datasheet --unit stim300 --rate-hz 100 -o stim300.toml
-  nav-sim datasheet calib_data/catalogue/adis16470.toml --corr-time 100s -o adis16470.toml
-  nav-sim datasheet --list")]
 pub struct DatasheetArgs {
     /// Catalogue entry (TOML)
     #[arg(value_name = "ENTRY", conflicts_with = "unit")]

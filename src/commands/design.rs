@@ -28,12 +28,6 @@ use std::path::PathBuf;
 /// interval on the horizontal error (95 % quantile) at the end of each outage, for a filter that knows the IMU.
 /// Without --recordings or --hours a table of several is printed.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim design calib_data/tactical.toml --recordings 6 --hours 2
-  nav-sim design calib_data/consumer_mems.toml --recordings 6 --hours 1 --draws 50 --estimator awv
-  nav-sim design calib_data/tactical.toml --recordings 4 --hours 1 --draws 50 \\
-      --trajectory trajectories/figure_eight.toml --outage 300:360")]
 pub struct Design {
     /// Noise model of the IMU, as far as it is known
     model: PathBuf,

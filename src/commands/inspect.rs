@@ -17,11 +17,6 @@ const GAP: f64 = 1.5;
 /// Samples of an IMU and fixes of a receiver are read through: rate by the median step, gaps (steps beyond 1.5 times it),
 /// jitter (95 % of the steps are as near to the median one).
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim inspect calib_data/formats/log.mcap
-  nav-sim inspect calib_data/formats/receiver.ubx --format json
-  nav-sim inspect calib_data/formats/log.mcap --stamp log")]
 pub struct Inspect {
     /// Log
     #[arg(id = "log", value_name = "FILE")]

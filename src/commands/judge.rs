@@ -28,11 +28,6 @@ use std::path::PathBuf;
 /// a point of the vehicle that is not the reference's is found and named. Writes summary.json, errors.csv, report.html,
 /// manifest.json. Exit code 3: the solution is overconfident.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim trajectory record trajectories/figure_eight.toml calib_data/tactical.toml -o drive
-  nav-sim fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml -o out/fused
-  nav-sim judge out/fused/solution.csv --reference drive/reference.csv -o out/judged")]
 pub struct Judge {
     /// Solution (.csv, .tsv, .txt, .pos, .nav, .tum, also .gz)
     #[arg(value_name = "SOLUTION")]

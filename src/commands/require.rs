@@ -36,14 +36,6 @@ use std::str::FromStr;
 /// and bias instability that each sensor may have beside the turn-on biases of [imu] in --scenario. With MODEL it says
 /// whether the limits are kept (exit code 3: they are not), and the longest outage that it bridges.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim require trajectories/figure_eight.toml --outage 60 \\
-      --require 'p95_m<=50' -o needed.toml
-  nav-sim require trajectories/figure_eight.toml calib_data/tactical.toml \\
-      --outage 60:120 --require 'rmse_m<=100'
-  nav-sim require trajectories/figure_eight.toml calib_data/tactical.toml \\
-      --outage longest --require 'p95_m<=20'")]
 pub struct Require {
     /// Trajectory: motion profile (.toml) or table (.csv)
     pub trajectory: PathBuf,

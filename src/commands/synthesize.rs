@@ -21,13 +21,6 @@ use std::path::{Path, PathBuf};
 /// Writes replicate_1, replicate_2, … and a manifest.json with the parameters that were drawn. The same seed gives the
 /// same noise with and without contamination, and at any number of threads.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim synthesize calib_data/consumer_mems.toml \\
-      --replicates 9 --samples 65536 --spread --seed 1 -o replicates
-  nav-sim synthesize calib_data/consumer_mems.toml --replicates 8 --samples 65536 \\
-      --axes x --contaminate section5-II -o corrupted
-  nav-sim synthesize calib_data/tactical.toml --duration 600 -o tactical")]
 pub struct Synthesize {
     /// Noise model (TOML)
     #[arg(value_name = "MODEL")]

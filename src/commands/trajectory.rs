@@ -20,11 +20,6 @@ use std::path::PathBuf;
 
 /// Make, check and convert reference trajectories
 #[derive(clap::Args)]
-#[command(before_help = "\
-Examples:
-  nav-sim trajectory check trajectories/land_vehicle.toml
-  nav-sim trajectory generate trajectories/fixed_wing.toml --rate-hz 10 -o flight.csv
-  nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 1 -o drive.csv")]
 pub(crate) struct TrajectoryArgs {
     #[command(subcommand)]
     pub(crate) command: TrajectoryCommand,
@@ -36,11 +31,6 @@ pub(crate) enum TrajectoryCommand {
     ///
     /// Columns: time, latitude, longitude, height, velocity north, east, down, roll, pitch, yaw. Numbers have
     /// enough digits to be read back exactly.
-    #[command(before_help = "\
-Examples:
-  nav-sim trajectory generate trajectories/land_vehicle.toml -o drive.csv
-  nav-sim trajectory generate trajectories/fixed_wing.toml --rate-hz 10 -o flight.csv.gz
-  nav-sim trajectory generate trajectories/figure_eight.toml --rate-hz 1")]
     Generate(Invocation<Convert>),
     Check(Invocation<CheckTrajectory>),
     /// Convert a trajectory file of any kind to a nav-sim table, or to TUM
@@ -48,11 +38,6 @@ Examples:
     /// The rows are those of the input, or evenly spaced ones with --rate-hz. Local coordinates become latitude,
     /// longitude and height. A path without attitude gets the heading and pitch along it. With -o FILE.tum the rows are those of
     /// TUM, as evo reads them: t x y z qx qy qz qw, east, north, up of --origin (default: the first row), body forward, left, up.
-    #[command(before_help = "\
-Examples:
-  nav-sim trajectory convert trajectories/figure_eight.toml -o eight.csv
-  nav-sim trajectory convert trajectories/fixed_wing.toml --rate-hz 20 -o denser.csv.gz
-  nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 10 -o drive.tum")]
     Convert(Invocation<Convert>),
     Record(Invocation<Record>),
 }
@@ -127,11 +112,6 @@ impl Command for Convert {
 /// it. The difference is the error of the strapdown algorithm at this rate. Closure beyond a bound and motion beyond
 /// a limit end with exit code 3. Velocity columns that contradict the positions are warnings.
 #[derive(clap::Args, Debug)]
-#[command(before_help = "\
-Examples:
-  nav-sim trajectory check trajectories/land_vehicle.toml
-  nav-sim trajectory check trajectories/fixed_wing.toml --rate-hz 200 --max-position-m 0.001
-  nav-sim trajectory check trajectories/figure_eight.toml --limit-speed 15 --format json")]
 pub struct CheckTrajectory {
     #[command(flatten)]
     source: TrajectorySource,
@@ -271,12 +251,6 @@ impl Command for CheckTrajectory {
 /// initial.toml (a start drawn from the initial standard deviations). The noise is that of the first run of
 /// `run` with the same seed; a turn-on bias that MODEL states is drawn too.
 #[derive(clap::Args, Debug)]
-#[command(before_help = "\
-Examples:
-  nav-sim trajectory record trajectories/land_vehicle.toml calib_data/tactical.toml -o recorded
-  nav-sim trajectory record trajectories/figure_eight.toml calib_data/tactical.toml --seed 1
-  nav-sim trajectory record trajectories/fixed_wing.toml calib_data/consumer_mems.toml \\
-      --scenario examples/scenario.toml -o flight")]
 pub struct Record {
     #[command(flatten)]
     source: TrajectorySource,

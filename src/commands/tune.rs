@@ -26,14 +26,6 @@ use std::path::PathBuf;
 /// covariance analysis along the trajectory. Where no factor makes the filter consistent, the exit code is 3 and no model
 /// is written.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim tune calib_data/tactical.toml --truth calib_data/consumer_mems.toml -o tuned.toml
-  nav-sim tune calib_data/tactical.toml --for mean \\
-      --truth calib_data/tactical.toml calib_data/consumer_mems.toml \\
-      --trajectory trajectories/figure_eight.toml --outage 60:90
-  nav-sim tune calib_data/tactical.toml --filter 15 --format json \\
-      --truth calib_data/consumer_mems.toml")]
 pub struct Tune {
     /// Noise model to be tuned
     model: PathBuf,

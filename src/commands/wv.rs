@@ -21,11 +21,6 @@ use std::path::PathBuf;
 
 /// Compute wavelet variances (classical, robust) and Allan deviations of static recordings
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim wv calib_data/formats/own.csv
-  nav-sim wv calib_data/formats/euroc.csv --axes gyro --intervals large-sample
-  nav-sim wv calib_data/formats/compressed.csv.gz --format json -o static.wv.json")]
 pub struct Wv {
     /// Recordings, or directories of recordings
     #[arg(id = "recording", required = true, value_name = "FILE")]

@@ -40,11 +40,6 @@ use toml::{Table, Value};
 /// all are compared (results.csv, summary.json, report.html). Computes what is missing: kill and repeat at will, on any
 /// number of processes and machines that share the directory. Stopped by SIGTERM or the time limit the exit code is 75.
 #[derive(clap::Args, Debug, Clone, Default)]
-#[command(before_help = "\
-Examples:
-  nav-sim batch examples/quick_study.toml -o out/quick
-  nav-sim batch examples/quick_study.toml --shard 0/2 --time-limit 50m
-  nav-sim batch examples/quick_study.toml --set runs=8 --dry-run")]
 pub struct BatchRequest {
     /// The study (TOML)
     #[arg(value_name = "STUDY")]

@@ -58,12 +58,6 @@ use std::path::{Path, PathBuf};
 /// <model>.wv.json holds the curves, <model>.draws.json the draws behind the intervals, <model>.html a page and
 /// <model>.svg its figures. With `--estimator all` there is such a set for each estimator, <model>_<estimator>.toml and so on.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim synthesize calib_data/consumer_mems.toml \\
-      --replicates 5 --samples 65536 --spread --seed 1 -o static
-  nav-sim calibrate static -o model.toml
-  nav-sim calibrate static --estimator all --model \"AR1+RW+WN\" --pool axes -o imu.toml")]
 pub struct Calibrate {
     /// Recordings, or directories of recordings
     #[arg(

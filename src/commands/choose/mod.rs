@@ -38,13 +38,6 @@ pub mod ranking;
 /// with intervals over recordings. Writes report.html, ranking.json and model.toml, the winner calibrated on all
 /// recordings.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim synthesize calib_data/consumer_mems.toml --replicates 4 --samples 16384 -o recordings
-  nav-sim choose recordings --trajectory trajectories/figure_eight.toml --outage 60:90 \\
-      --estimator awv,dr-awv --inflate none,x10
-  nav-sim choose recordings --trajectory trajectories/figure_eight.toml --outage 60:90 \\
-      --estimator awv --model N1,WN+RW --filter 15,full -o out/models --format json")]
 pub struct Choose {
     /// Static recordings, three or more files, or directories of them
     #[arg(id = "recording", required = true, value_name = "RECORDINGS")]

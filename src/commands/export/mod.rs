@@ -31,11 +31,6 @@ const LONGEST_S: f64 = 10_000.0;
 /// Other filters know white noise (N) and one bias process, a random walk (K) or a Gauss-Markov process. --policy says
 /// which such pair stands for the model's noisiest axis over --horizon.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim export calib_data/consumer_mems.toml --target kalibr -o imu.yaml
-  nav-sim export calib_data/consumer_mems.toml --target px4 --policy envelope --horizon 1s:30s
-  nav-sim export calib_data/tactical.toml --target kf-gins --format json")]
 pub struct ExportArgs {
     /// Noise model (TOML)
     #[arg(value_name = "MODEL")]

@@ -105,13 +105,6 @@ const ROWS_HZ: f64 = 10.0;
 /// innovations.csv, errors.csv (with a reference), solution.kml, summary.json, report.html, manifest.json; with
 /// --smooth also smoothed.csv, errors_smoothed.csv, smoothed.kml. Exit code 3: the solution is overconfident.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim trajectory record trajectories/land_vehicle.toml calib_data/tactical.toml -o drive
-  nav-sim fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml \\
-      --reference drive/reference.csv --outage 300:360 --smooth -o out/fused
-  nav-sim fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml \\
-      --initial drive/initial.toml -o out/given")]
 pub struct Fuse {
     /// IMU recording (.csv, .tsv, .txt, .npy, also .gz)
     #[arg(value_name = "IMU")]

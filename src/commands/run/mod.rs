@@ -44,13 +44,6 @@ mod document;
 /// Writes a run directory: epochs.csv (ASEE, RMSE, bias, NEES, coverage at 1 Hz), runs.csv, summary.json, report.html, manifest.json. The same seed gives every model the same
 /// noise, so that runs can be compared pair by pair (see `nav-sim compare`).
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml --seed 1 --runs 20
-  nav-sim run trajectories/figure_eight.toml calib_data/tactical.toml \\
-      --outage 60:90 --filter full --runs 8 -o out/full
-  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
-      --truth calib_data/tactical.toml --runs 8 -o out/mismatch")]
 pub struct Run {
     /// Trajectory: motion profile (.toml) or table (.csv)
     pub trajectory: PathBuf,
