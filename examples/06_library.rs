@@ -6,7 +6,7 @@ use std::path::Path;
 
 pub(crate) fn drift(recordings: &Path, drive: &Path) -> Result<f64, Box<dyn std::error::Error>> {
     let words = [recordings.as_os_str(), "--bootstrap=0".as_ref()];
-    let calibrate = Asked::<Calibrate>::of(words)?.request;
+    let calibrate = Invocation::<Calibrate>::of(words)?.request;
     let model = calibrate.run(&Context::default())?.model(Estimator::DrAwv);
     let (trajectory, _) = load_trajectory(drive, None)?;
     let inputs = NavigateInputs::new(trajectory, model, TrueImu::AsBelieved);

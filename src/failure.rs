@@ -1,7 +1,7 @@
 //! Errors as the user reads them, with their exit codes.
 
 use clap::error::ContextKind;
-use nav_sim_calibration::{CalibrationError, Cause};
+use nav_sim_calibration::{CalibrationError, CalibrationFault};
 use nav_sim_navigation::sensors::imu::TruthError;
 use nav_sim_navigation::sensors::outage::OutageError;
 use nav_sim_navigation::simulation::ExperimentError;
@@ -64,7 +64,7 @@ pub(crate) mod help {
     );
 }
 
-/// Where in a file.
+/// Place in a file.
 #[derive(Clone)]
 pub(crate) enum Place {
     /// Anywhere in it.
@@ -248,7 +248,7 @@ impl Failure {
     }
 
     /// The same, where a file that was found in a directory is passed over for that reason.
-    pub(crate) fn passing_over(self, reason: &'static str) -> Self {
+    pub(crate) fn skipped_as(self, reason: &'static str) -> Self {
         Self {
             passed_over: Some(reason),
             ..self
@@ -256,7 +256,7 @@ impl Failure {
     }
 
     /// Reason for which the file is passed over, if it was found in a directory.
-    pub(crate) const fn passed_over(&self) -> Option<&'static str> {
+    pub(crate) const fn skip_reason(&self) -> Option<&'static str> {
         self.passed_over
     }
 
@@ -302,7 +302,7 @@ impl Failure {
     }
 
     /// With further advice for commands that have no such option.
-    pub(crate) fn or_without(self, (option, text): (&'static str, &'static str)) -> Self {
+    pub(crate) fn or_hint_without(self, (option, text): (&'static str, &'static str)) -> Self {
         self.or(Some((option, false)), text)
     }
 
@@ -448,16 +448,18 @@ impl From<ExperimentError> for Failure {
 impl From<CalibrationError> for Failure {
     fn from(e: CalibrationError) -> Self {
         let hint = match e.cause {
-            Cause::TooShort => "fewer --scales, or record for longer",
-            Cause::TooFewScales => "record for longer, or a --model with fewer processes",
-            Cause::NotPositive => {
+            CalibrationFault::TooShort => "fewer --scales, or record for longer",
+            CalibrationFault::TooFewScales => {
+                "record for longer, or a --model with fewer processes"
+            }
+            CalibrationFault::NotPositive => {
                 "the signal is quantised so coarsely that scales are silent: --estimator awv, or another range"
             }
-            Cause::Trim => "a smaller --trim, or --estimator sr-awv",
-            Cause::NoSlope => {
+            CalibrationFault::Trim => "a smaller --trim, or --estimator sr-awv",
+            CalibrationFault::NoSlope => {
                 "--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm"
             }
-            Cause::Other => return Self::input(e),
+            CalibrationFault::Other => return Self::input(e),
         };
         Self::input(e).hint(hint)
     }

@@ -126,7 +126,7 @@ fn trajectory(path: &Path) {
     _ = trajectory_file::load_reference(path, None);
 }
 
-/// As read, and with a checksum that is right, so that more than the checksum is tried.
+/// Tests the file as read, and with a corrected checksum, so that more than the checksum is tried.
 fn part(path: &Path) {
     let bytes = fs::read(path).expect("a file");
     _ = part_of(&bytes);

@@ -14,7 +14,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub use crate::app::{Asked, Command, Context};
+pub use crate::app::{Command, Context, Invocation};
 pub use crate::commands::calibrate::{Calibrate, Calibration};
 pub use crate::commands::export::Target;
 pub use crate::commands::run::{NavigateInputs, Navigation, TrueImu, navigate};

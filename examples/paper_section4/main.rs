@@ -10,7 +10,7 @@
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 use nav_sim::calibration::{Estimator, Trim, Weighting};
-use nav_sim::document::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg};
+use nav_sim::document::{Chart, ChartAxis, Colour, Mark, Panel, PointInterval, Series, svg};
 use nav_sim::io::contamination_file;
 use nav_sim::prelude::*;
 use nav_sim::signal::noise::Kind;
@@ -197,7 +197,7 @@ fn figure2(design: &Design, rows: &[Row]) -> String {
                 .filter(|r| r.parameter == *parameter && r.estimator == estimator.name());
             let point = |(s, r): (usize, &Row)| {
                 let (y, half) = (100.0 * r.accuracy.rmse, 196.0 * r.accuracy.rmse_se);
-                Interval {
+                PointInterval {
                     x: s as f64 + beside,
                     y,
                     low: (y - half).max(0.1 * y),
@@ -208,12 +208,12 @@ fn figure2(design: &Design, rows: &[Row]) -> String {
             Series::new(estimator.name(), Colour::Hue(k), Mark::Points(points))
         };
         let panel = Panel::new(
-            Axis::log("robust RMSE (% of θ₀)"),
+            ChartAxis::log("robust RMSE (% of θ₀)"),
             design.estimators.iter().enumerate().map(series).collect(),
         );
         Chart::new(
             &format!("Accuracy of {parameter}"),
-            Axis::linear(&scenarios.join(", ")),
+            ChartAxis::linear(&scenarios.join(", ")),
             vec![panel],
         )
     };

@@ -20,7 +20,7 @@ pub(crate) fn raise(
     }
 }
 
-/// Of what concerns no file.
+/// Error that concerns no file.
 pub(crate) fn refused(py: Python<'_>, message: &str) -> PyErr {
     raise(py, message, None, None, None)
 }
@@ -29,7 +29,7 @@ pub(crate) fn refused(py: Python<'_>, message: &str) -> PyErr {
 pub(crate) fn of_failure(py: Python<'_>, failure: &Failure, hidden: &str) -> PyErr {
     let staged = failure
         .file()
-        .and_then(|file| Staged::of(file.strip_prefix(hidden)?, hidden));
+        .and_then(|file| StagedArgument::of(file.strip_prefix(hidden)?, hidden));
     let file = staged.map_or_else(|| failure.file(), |staged| Some(staged.argument));
     let line = failure
         .line()
@@ -52,20 +52,20 @@ pub(crate) fn shown(text: &str, hidden: &str) -> String {
     let mut parts = text.split(hidden);
     let mut shown = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        shown +=
-            &Staged::of(part, hidden).map_or_else(|| part.to_owned(), |staged| staged.told(part));
+        shown += &StagedArgument::of(part, hidden)
+            .map_or_else(|| part.to_owned(), |staged| staged.told(part));
     }
     shown
 }
 
 /// An argument that was written to a file, as a text names it.
 #[derive(Clone, Copy)]
-struct Staged<'a> {
+struct StagedArgument<'a> {
     argument: &'a str,
     ending: &'a str,
 }
 
-impl<'a> Staged<'a> {
+impl<'a> StagedArgument<'a> {
     /// The one that a text begins with; none where nothing is hidden.
     fn of(text: &'a str, hidden: &str) -> Option<Self> {
         let endings = ["csv", "npz", "toml"]

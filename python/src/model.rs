@@ -2,7 +2,7 @@
 
 use crate::error;
 use crate::work::work;
-use nav_sim::app::Front;
+use nav_sim::app::Reporter;
 use nav_sim::io::contamination_file;
 use nav_sim::io::model_file::{self, ModelFile};
 use nav_sim::prelude::{AxisParameters, Channel, Composite, Horizon, Policy, Sensor};
@@ -21,7 +21,7 @@ fn read(py: Python<'_>, text: &str, path: Option<&str>) -> PyResult<ModelFile> {
     model_file::from_text(path, text).map_err(|e| error::of_failure(py, &e, ""))
 }
 
-/// What a model file holds, as JSON: `rate_hz`, and for each channel the list of its processes.
+/// Contents of a model file in JSON: `rate_hz`, and for each channel the list of its processes.
 #[pyfunction]
 #[pyo3(signature = (text, path))]
 pub(crate) fn model_contents(py: Python<'_>, text: &str, path: Option<&str>) -> PyResult<String> {

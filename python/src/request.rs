@@ -2,8 +2,8 @@
 
 use crate::error;
 use crate::work::work;
-use nav_sim::app::{Answer as _, Answered, Context, Failure};
-use nav_sim::commands::batch::{BatchRequest, Outcome};
+use nav_sim::app::{Answer as _, Context, Failure, RenderedAnswer};
+use nav_sim::commands::batch::{BatchOutcome, BatchRequest};
 use nav_sim::document::Importance;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -12,7 +12,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// What `command` answers to a request. `hidden`: a directory that no text shows.
+/// Answers a request to `command`. `hidden`: a directory that no text shows.
 #[pyfunction]
 #[pyo3(signature = (command, request, hidden, progress, threads=None))]
 pub(crate) fn answer(
@@ -67,7 +67,7 @@ const WIDTH: usize = 120;
 /// The answer to a request: as the command prints, draws and writes it.
 #[pyclass(frozen, module = "nav_sim._native")]
 pub(crate) struct Answer {
-    answered: Answered,
+    answered: RenderedAnswer,
     /// Directory of what came as arrays, which no text shows.
     hidden: String,
     /// Doubts about the input.
@@ -88,20 +88,22 @@ impl Answer {
 
 #[pymethods]
 impl Answer {
-    /// As JSON.
+    /// The answer in JSON.
     fn json(&self) -> String {
         self.shown(&self.answered.json)
     }
 
-    /// As the terminal shows it.
+    /// The answer as text for the terminal.
     fn summary(&self, py: Python<'_>) -> String {
         py.detach(|| {
             let document = &self.answered.document;
             let text = document.terminal(WIDTH);
-            let spoken = document.spoken(false).map(|note| match note.importance {
-                Importance::Warning => format!("\nwarning: {}", note.text),
-                _ => format!("\nnote: {}", note.text),
-            });
+            let spoken = document
+                .shown_notes(false)
+                .map(|note| match note.importance {
+                    Importance::Warning => format!("\nwarning: {}", note.text),
+                    _ => format!("\nnote: {}", note.text),
+                });
             self.shown(&(text.trim_end().to_owned() + &spoken.collect::<String>()))
         })
     }
@@ -112,7 +114,7 @@ impl Answer {
         lines.map(|line| self.shown(line)).collect()
     }
 
-    /// As a page of its own.
+    /// The answer as a self-contained page.
     fn html(&self, py: Python<'_>) -> String {
         py.detach(|| self.shown(&self.answered.document.html()))
     }
@@ -171,12 +173,12 @@ pub(crate) fn study_run(
         (outcome, meter.warnings())
     })?;
     let outcome = outcome.and_then(|outcome| match outcome.unmet() {
-        Some(failure) if matches!(outcome, Outcome::Stopped { .. }) => Err(failure),
+        Some(failure) if matches!(outcome, BatchOutcome::Stopped { .. }) => Err(failure),
         _ => Ok(outcome),
     });
     let answer = match outcome.map_err(|e| error::of_failure(py, &e, ""))? {
-        Outcome::Merged(answer) => {
-            let answered = Answered {
+        BatchOutcome::Merged(answer) => {
+            let answered = RenderedAnswer {
                 json: serde_json::to_string(&*answer).unwrap_or_default(),
                 document: answer.document(),
                 files: Vec::new(),

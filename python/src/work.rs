@@ -1,7 +1,7 @@
 //! Jobs that leave Python free: other threads run, Ctrl-C ends them, progress is told.
 
 use crate::error;
-use nav_sim::app::Front;
+use nav_sim::app::Reporter;
 use nav_sim::document::{Importance, Note};
 use pyo3::prelude::*;
 use std::any::Any;
@@ -11,14 +11,14 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How often Python is asked whether to stop, and told how far a job is.
+/// Interval at which Python is polled for interrupts and told the progress.
 const SLICE: Duration = Duration::from_millis(50);
 
 /// Counts what a job has done, takes down what it warns of, and stops it.
 ///
 /// Threads that work never touch Python: they count here, and the calling thread looks.
 #[derive(Debug, Default)]
-pub(crate) struct Meter {
+pub(crate) struct JobMonitor {
     done: AtomicU64,
     total: AtomicU64,
     is_stopped: AtomicBool,
@@ -27,10 +27,10 @@ pub(crate) struct Meter {
     pub(crate) deadline: OnceLock<Instant>,
 }
 
-/// What a stopped job unwinds with.
+/// Panic payload of a stopped job.
 struct Stopped;
 
-impl Front for Meter {
+impl Reporter for JobMonitor {
     fn note(&self, note: Note) {
         if note.importance == Importance::Warning {
             self.noted().push(note.text);
@@ -50,18 +50,18 @@ impl Front for Meter {
         self.done.fetch_add(steps, Ordering::Relaxed);
     }
 
-    fn go_on(&self) -> bool {
+    fn should_continue(&self) -> bool {
         let is_early = self.deadline.get().is_none_or(|end| Instant::now() < *end);
         is_early && !self.is_stopped.load(Ordering::Relaxed)
     }
 }
 
-impl Meter {
+impl JobMonitor {
     fn noted(&self) -> MutexGuard<'_, Vec<String>> {
         self.warnings.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What the job has warned of.
+    /// Warnings of the job.
     pub(crate) fn warnings(&self) -> Vec<String> {
         std::mem::take(&mut self.noted())
     }
@@ -80,10 +80,10 @@ pub(crate) fn work<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
     threads: Option<usize>,
-    job: impl FnOnce(&Meter) -> T + Send + 'static,
+    job: impl FnOnce(&JobMonitor) -> T + Send + 'static,
 ) -> PyResult<T> {
     in_this_process(py)?;
-    let meter = Arc::new(Meter::default());
+    let meter = Arc::new(JobMonitor::default());
     let counted = Arc::clone(&meter);
     let (sender, receiver) = channel();
     std::thread::spawn(move || {
@@ -109,7 +109,7 @@ pub(crate) fn work<T: Send + 'static>(
     loop {
         match py.detach(next) {
             Ok(Ok(outcome)) => {
-                tell(progress, &meter, &mut told)?;
+                report_progress(progress, &meter, &mut told)?;
                 return Ok(outcome);
             }
             Ok(Err(panic)) => return Err(defect(py, panic.as_ref())),
@@ -117,14 +117,18 @@ pub(crate) fn work<T: Send + 'static>(
             Err(RecvTimeoutError::Timeout) => {
                 let heard = py
                     .check_signals()
-                    .and_then(|()| tell(progress, &meter, &mut told));
+                    .and_then(|()| report_progress(progress, &meter, &mut told));
                 heard.inspect_err(|_| meter.is_stopped.store(true, Ordering::Relaxed))?;
             }
         }
     }
 }
 
-fn tell(progress: Option<&Bound<'_, PyAny>>, meter: &Meter, told: &mut (u64, u64)) -> PyResult<()> {
+fn report_progress(
+    progress: Option<&Bound<'_, PyAny>>,
+    meter: &JobMonitor,
+    told: &mut (u64, u64),
+) -> PyResult<()> {
     let reached = meter.reached();
     if let Some(progress) = progress.filter(|_| reached != *told && reached.1 > 0) {
         progress.call1(reached)?;

@@ -1,8 +1,8 @@
 //! A command is a struct of options with inputs and an answer. Words of a command line and requests by name (Python,
 //! studies) become it by the same parser, so that both are refused in the same words.
 
-use super::{Context, Failure, Front, Input, Refuse, Result, refused};
-use crate::io::atomic::{AtomicDir, Claim, Found, claim_directory, claim_file};
+use super::{Context, Failure, Input, Refuse, Reporter, Result, refused};
+use crate::io::atomic::{AtomicDir, DirectoryState, OutputClaim, claim_directory, claim_file};
 use crate::io::{atomic, input, suggest};
 use crate::parse;
 use crate::report::json;
@@ -21,7 +21,7 @@ use std::ffi::{OsStr, OsString};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Where a command writes.
+/// Output of a command: none, a file or a directory.
 #[derive(Debug, Clone, Copy)]
 pub enum Out {
     /// To stdout alone.
@@ -51,7 +51,7 @@ pub trait Command: clap::Args + Send + Sync + 'static {
     type Answer: Answer;
     /// Its name on the command line.
     const NAME: &'static str;
-    /// Where it writes.
+    /// Its output.
     const OUT: Out = Out::Nothing;
     /// True if its document can be written as a page or a picture.
     const PLOT: bool = true;
@@ -177,7 +177,7 @@ impl PlainAnswer {
     }
 
     /// The same with a bound that may not be met.
-    pub(crate) fn judged(self, unmet: Option<Failure>) -> Self {
+    pub(crate) fn with_unmet(self, unmet: Option<Failure>) -> Self {
         Self { unmet, ..self }
     }
 }
@@ -223,7 +223,7 @@ impl<'a> OutputFile<'a> {
 
 /// A command with the options of its outputs.
 #[derive(Debug, Clone)]
-pub struct Asked<C> {
+pub struct Invocation<C> {
     /// The command.
     pub request: C,
     /// `--out`, or its default.
@@ -238,7 +238,7 @@ pub struct Asked<C> {
 const OUT: &str = "out";
 const PLOT: &str = "plot";
 
-impl<C: Command> clap::Args for Asked<C> {
+impl<C: Command> clap::Args for Invocation<C> {
     fn augment_args(command: clap::Command) -> clap::Command {
         let mut command = C::augment_args(command);
         let path = || {
@@ -273,7 +273,7 @@ impl<C: Command> clap::Args for Asked<C> {
     }
 }
 
-impl<C: Command> FromArgMatches for Asked<C> {
+impl<C: Command> FromArgMatches for Invocation<C> {
     fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
         let paths = |id| {
             let found = matches.try_get_many::<PathBuf>(id).ok().flatten();
@@ -367,7 +367,7 @@ fn canonical(value: &str) -> String {
     value.split_inclusive([',', ':', '=']).map(part).collect()
 }
 
-impl<C: Command> Asked<C> {
+impl<C: Command> Invocation<C> {
     /// The command of these words, without its name.
     ///
     /// # Errors
@@ -467,8 +467,8 @@ fn values(arg: &Arg, value: &Value) -> Vec<String> {
 
 /// An answer as it is printed and written, for callers that have no terminal.
 #[derive(Debug)]
-pub struct Answered {
-    /// As JSON.
+pub struct RenderedAnswer {
+    /// The answer in JSON.
     pub json: String,
     /// Verdict, tables, charts and notes.
     pub document: Document,
@@ -481,16 +481,16 @@ pub struct Answered {
 /// Answers a request by name without writing files.
 ///
 /// # Errors
-/// As [`Asked::named`] and [`Command::run`].
+/// As [`Invocation::named`] and [`Command::run`].
 pub fn answered<C: Command>(
     mut request: Map<String, Value>,
-    front: &dyn Front,
-) -> Result<Answered> {
+    front: &dyn Reporter,
+) -> Result<RenderedAnswer> {
     let seed = request.remove("seed").filter(|seed| !seed.is_null());
     let seed = seed
         .map(|seed| parse::seed(&seed.to_string()).refuse_within(format!("--seed='{seed}'")))
         .transpose()?;
-    let asked = Asked::<C>::named(&request)?;
+    let asked = Invocation::<C>::named(&request)?;
     let mut manifest = asked.manifest(seed)?;
     let context = Context::new(front, seed).untimed();
     let context = context.reading(manifest.inputs.clone());
@@ -514,7 +514,7 @@ pub fn answered<C: Command>(
             answer.files().into_iter().try_for_each(&mut keep)?;
         }
     }
-    Ok(Answered {
+    Ok(RenderedAnswer {
         json: crate::report::json(&answer),
         document,
         files,
@@ -537,12 +537,12 @@ fn beside(path: &Path, ending: &str) -> PathBuf {
 /// Claims on all outputs of a command. Directories that were made for them and are empty go when this is dropped.
 #[derive(Default)]
 #[must_use = "another command may write there as soon as this is dropped"]
-pub(crate) struct Claims {
-    own: Vec<Claim>,
+pub(crate) struct OutputClaims {
+    own: Vec<OutputClaim>,
     missing: Vec<PathBuf>,
 }
 
-impl Claims {
+impl OutputClaims {
     /// Notes directories of outputs that are not there yet, the outer ones first.
     fn note_missing<'a>(&mut self, outputs: impl Iterator<Item = &'a PathBuf>) {
         let above = |output: &'a PathBuf| output.ancestors().skip(1);
@@ -553,14 +553,14 @@ impl Claims {
 
     /// A warning where nothing keeps another nav-sim from writing the same.
     pub(crate) fn warning(&self) -> Option<&'static str> {
-        let is_shared = self.own.iter().any(Claim::is_shared);
+        let is_shared = self.own.iter().any(OutputClaim::is_shared);
         is_shared.then_some(
             "the disk has no locks: let no other nav-sim write the same output meanwhile",
         )
     }
 }
 
-impl Drop for Claims {
+impl Drop for OutputClaims {
     fn drop(&mut self) {
         self.own.clear();
         // those with results in them stay
@@ -572,7 +572,7 @@ impl Drop for Claims {
 const PAGE: &str = "report.html";
 const MANIFEST: &str = "manifest.json";
 
-impl<C: Command> Asked<C> {
+impl<C: Command> Invocation<C> {
     /// Every file that is read, by its role; those of directories in name order.
     pub(crate) fn inputs(&self) -> Result<Inputs> {
         let mut all = Inputs::new();
@@ -599,9 +599,9 @@ impl<C: Command> Asked<C> {
 
     /// Claims all outputs: none is an input, nothing is replaced that is not of this command, and nobody else writes
     /// there.
-    pub(crate) fn claim(&self, manifest: &Manifest, force: bool) -> Result<Claims> {
+    pub(crate) fn claim(&self, manifest: &Manifest, force: bool) -> Result<OutputClaims> {
         let inputs = || manifest.inputs.iter().map(|input| Path::new(&input.path));
-        let mut claims = Claims::default();
+        let mut claims = OutputClaims::default();
         claims.note_missing(self.out.iter().chain(&self.plots));
         match (C::OUT, &self.out) {
             (Out::Directory { .. }, Some(out)) => {
@@ -610,14 +610,14 @@ impl<C: Command> Asked<C> {
                 let recognise = |text: &str| {
                     let there = present(text).filter(|there| there.name == C::NAME);
                     let Some(there) = there else {
-                        return Found::Foreign;
+                        return DirectoryState::Foreign;
                     };
                     let is_own = |name: &str| there.outputs.contains_key(name);
                     let mut others = names.iter().filter(|name| !is_own(name));
                     match others.any(|name| out.join(name.as_ref()).exists()) {
-                        true => Found::Foreign,
-                        false if there.key == manifest.key => Found::Same,
-                        false => Found::Other,
+                        true => DirectoryState::Foreign,
+                        false if there.key == manifest.key => DirectoryState::Same,
+                        false => DirectoryState::Other,
                     }
                 };
                 let own = [PAGE, MANIFEST].map(Cow::Borrowed);
@@ -760,7 +760,7 @@ fn ending(path: &Path) -> String {
 
 // `manifest.json`: where a result directory came from, and whether another command makes the same.
 
-/// Where a result directory came from.
+/// Provenance of a result directory: `manifest.json`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Layout version.

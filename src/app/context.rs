@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// Receives notes and progress: a terminal, Python, a test. `()` ignores them.
-pub trait Front: Sync {
+pub trait Reporter: Sync {
     /// A note.
     fn note(&self, note: Note);
 
@@ -22,18 +22,18 @@ pub trait Front: Sync {
     fn end(&self) {}
 
     /// False to stop; called from any thread, several times a second, by jobs that can be resumed.
-    fn go_on(&self) -> bool {
+    fn should_continue(&self) -> bool {
         true
     }
 }
 
-impl Front for () {
+impl Reporter for () {
     fn note(&self, _: Note) {}
 }
 
 /// The surroundings of a command: where notes and progress go, the seed that was given, and the time of its runs.
 pub struct Context<'a> {
-    front: &'a dyn Front,
+    front: &'a dyn Reporter,
     seed: Option<u64>,
     is_timed: bool,
     started: Mutex<Option<Instant>>,
@@ -48,7 +48,7 @@ pub const DEFAULT_SEED: u64 = 1;
 
 impl<'a> Context<'a> {
     /// A context with the seed of `--seed`, if it is given.
-    pub fn new(front: &'a dyn Front, seed: Option<u64>) -> Self {
+    pub fn new(front: &'a dyn Reporter, seed: Option<u64>) -> Self {
         Self {
             front,
             seed,
@@ -146,8 +146,8 @@ impl<'a> Context<'a> {
     }
 
     /// False to stop.
-    pub fn go_on(&self) -> bool {
-        self.front.go_on()
+    pub fn should_continue(&self) -> bool {
+        self.front.should_continue()
     }
 
     /// The seed of `--seed`, if it is given.

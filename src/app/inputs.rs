@@ -3,7 +3,7 @@
 use super::{Context, Failure, Refuse, Result, refused};
 use crate::io::model_file::{self, ModelFile, TurnOn};
 use crate::io::recordings::{self, Gaps, ReadOptions};
-use crate::io::toml_file::Source;
+use crate::io::toml_file::TomlSource;
 use crate::io::{scenario_file, trajectory_file};
 use crate::parse;
 use crate::report::readable;
@@ -12,7 +12,7 @@ use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::trajectory::Trajectory;
-use nav_sim_navigation::trajectory::plausibility::{Excess, LIMITS, examine};
+use nav_sim_navigation::trajectory::plausibility::{LIMITS, LimitExcess, examine};
 use nav_sim_signal::imu::{Recording, Sensor};
 use nav_sim_signal::noise::{Model, continuous};
 use nav_sim_signal::units::Refused;
@@ -24,7 +24,7 @@ pub(crate) fn trajectory(path: &Path, context: &Context<'_>) -> Result<Trajector
     let (trajectory, warnings) = trajectory_file::load(path, None)?;
     context.warn_each(&warnings);
     let (_, beyond) = examine(&trajectory, &LIMITS);
-    let farthest = |e: &&Excess| e.worst / e.limit;
+    let farthest = |e: &&LimitExcess| e.worst / e.limit;
     if let Some(worst) = beyond
         .iter()
         .max_by(|a, b| farthest(a).total_cmp(&farthest(b)))
@@ -232,7 +232,7 @@ impl ScenarioArgs {
             let over: toml::Table = self.set.join("\n").parse().refuse_within("--set")?;
             let mut table = toml::Table::try_from(&scenario).refuse()?;
             merge(&mut table, over);
-            scenario = Source::new("", &toml::to_string(&table).refuse()?).get()?;
+            scenario = TomlSource::new("", &toml::to_string(&table).refuse()?).get()?;
         }
         if let Some(path) = &self.gnss {
             scenario.gnss = scenario_file::read(path)?.gnss;

@@ -9,7 +9,8 @@ pub use crate::failure::{Failure, Result};
 pub(crate) use crate::failure::{Refuse, refused};
 pub use crate::io::input::Input;
 pub use command::{
-    Answer, Answered, Asked, Command, Inputs, Manifest, Out, OutputFile, PlainAnswer, answered,
+    Answer, Command, Inputs, Invocation, Manifest, Out, OutputFile, PlainAnswer, RenderedAnswer,
+    answered,
 };
 pub(crate) use command::{argument, is_path, is_repeated};
-pub use context::{Context, DEFAULT_SEED, Front};
+pub use context::{Context, DEFAULT_SEED, Reporter};

@@ -50,10 +50,10 @@ pub struct RecordingRequest {
     #[command(flatten)]
     /// Options for reading them.
     pub reading: ReadingRequest,
-    /// What to do where the time jumps or stands still: keep leaves out what is missing, if it is less than a tenth, and
-    /// refuses the file otherwise; refuse; split makes each stretch between gaps a recording of its own (but not one 16
-    /// times shorter than the longest); ignore takes the samples as evenly spaced over the whole time: stamped late, none
-    /// lost
+    /// Handling of gaps and repeated times: keep leaves out the missing samples if they are less
+    /// than a tenth, else refuses the file; refuse; split makes each stretch between gaps a
+    /// recording (unless it is 16 times shorter than the longest); ignore takes the samples as
+    /// evenly spaced
     #[arg(long, value_parser = parse::one_of::<Gaps>(&Gaps::NAMES), default_value_t = Gaps::Keep)]
     pub gaps: Gaps,
     /// Signals to use: all, accel, gyro, x, accel.x, … (repeatable or comma-separated; default: all)
@@ -61,7 +61,7 @@ pub struct RecordingRequest {
     pub axes: Vec<ChannelSet>,
 }
 
-/// What to do with gaps in windows that are navigated, in which nothing may be missing.
+/// Gap handling for windows that are navigated: no sample may be missing.
 pub(crate) const WHOLE: &[&str] = &["refuse", "split", "ignore"];
 
 /// The axes that one word of `--axes` stands for: all, those of a sensor (`accel`), an axis of both (`x`), one (`accel.x`).

@@ -15,7 +15,7 @@ use crate::model::ModelSpec;
 use crate::noise::{Composite, Kind, Model, Process, Spread};
 use crate::outcome::{Bootstrap, Inference, ModelChoice, Outcome, Settings};
 use crate::pipeline::fit_curve;
-use crate::uncertainty::bootstrap::{CurveSampler, Scattering, like};
+use crate::uncertainty::bootstrap::{CurveSampler, Scattering, with_variances};
 use crate::uncertainty::intervals::{intervals, practical_intervals};
 use crate::wavelet::default_levels;
 use rayon::prelude::*;
@@ -163,7 +163,7 @@ impl Anticipated<'_> {
             let expected_replicate = |k: usize, channel: &Channel| Replicate {
                 name: (k + 1).to_string(),
                 axis: Some(channel.axis),
-                ..like(&template, values.to_vec())
+                ..with_variances(&template, values.to_vec())
             };
             let channels = scope.channels();
             let replicates = channels

@@ -52,20 +52,22 @@ mod anticipated;
 
 pub use anticipated::Anticipated;
 pub use curve::{
-    Beginning, CalibrationError, Cause, Estimator, Group, Pool, Replicate, Scope, Trim, WarmUp,
-    average, grouped, implied, log_bias, median, replicates, robust_bias, trend, warm_up,
+    CalibrationError, CalibrationFault, Estimator, Group, Pool, RecordingWarmUp, Replicate, Scope,
+    Trim, WarmUp, average, grouped, implied, log_bias, median, replicates, robust_bias, trend,
+    warm_up,
 };
 pub use diagnosis::{
-    Alarm, CommonCause, CommonFinding, Diagnosis, FEWEST_TO_COMPARE, Verdict, diagnose,
+    Alarm, CommonCause, CommonFinding, Diagnosis, FEWEST_TO_COMPARE, RecordingVerdict, diagnose,
 };
 pub use fit::{Fit, Termination, Weighting, estimate, fit};
 pub use format::{duration, percent};
 pub use model::{ModelSpec, SpecError};
 pub use outcome::{
-    Advance, AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct,
-    Inference, LevelSpread, Miss, ModelChoice, Outcome, ParameterInterval, ParameterSpread,
-    Practical, PracticalIntervals, Ranking, Settings, Undetermined, model_of, tau_s,
+    Advance, AxesDiffer, Bootstrap, CurveDeparture, FitRange, Goodness, IndistinctProcesses,
+    Inference, LevelSpread, ModelCandidate, ModelChoice, ModelRanking, Outcome, ParameterInterval,
+    ParameterSpread, Practical, PracticalIntervals, ScaleMisfit, Settings, Undetermined, model_of,
+    tau_s,
 };
-pub use pipeline::{calibrate, calibrate_telling, fit_curve, infer, infer_telling};
+pub use pipeline::{calibrate, calibrate_with_progress, fit_curve, infer, infer_with_progress};
 pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};
 pub use uncertainty::{ALIKE_LEVEL, Scattering, WIDEST, derived_interval, figures_with_intervals};

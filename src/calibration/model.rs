@@ -54,8 +54,8 @@ impl ModelSpec {
         labels(&self.kinds)
     }
 
-    /// Whether another model, with some amplitudes zero and some AR1 at the ends of their range, is this one: an AR1
-    /// is white noise at phi = 0 and a random walk at phi = 1.
+    /// Returns true if another model equals this one with some amplitudes zero and some AR1 at the
+    /// ends of their range: an AR1 is white noise at phi = 0 and a random walk at phi = 1.
     pub(crate) fn is_special_case_of(&self, other: &Self) -> bool {
         let count = |spec: &Self, kind: Kind| spec.kinds.iter().filter(|k| **k == kind).count();
         let more = |kind: Kind| count(self, kind).saturating_sub(count(other, kind));

@@ -4,7 +4,7 @@ use crate::curve::{CalibrationError, Estimator, Pool, Scope, Trim, implied};
 use crate::fit::{Fit, Weighting, avlr, refit, score};
 use crate::imu::Axis;
 use crate::model::{ModelSpec, SpecError};
-use crate::noise::practical::{Minimum, Pair};
+use crate::noise::practical::{AllanMinimum, Pair};
 use crate::noise::{Composite, Model, ParameterRef};
 use crate::wavelet::{Curve, Tuning};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -18,7 +18,7 @@ pub fn model_of<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>, rate_hz: f6
     };
     outcomes
         .into_iter()
-        .for_each(|outcome| outcome.put_into(&mut model));
+        .for_each(|outcome| outcome.apply_to(&mut model));
     model
 }
 
@@ -41,7 +41,7 @@ pub struct Outcome {
     /// Specification of the model.
     pub spec: ModelSpec,
     /// Ranking by which the specification was chosen, if it was.
-    pub ranking: Option<Ranking>,
+    pub ranking: Option<ModelRanking>,
     /// The curve that was fitted.
     pub curve: Curve,
     /// The model.
@@ -56,13 +56,14 @@ pub struct Outcome {
 
 impl Outcome {
     /// Gives its noise to the axes of a model that it is for.
-    pub fn put_into(&self, model: &mut Model) {
+    pub fn apply_to(&self, model: &mut Model) {
         for channel in self.scope.channels() {
             model.axes[channel.index()] = self.fit.composite.clone();
         }
     }
 
-    /// What stands for the noise in navigation: the model, or what is read off the curve where it does not describe that.
+    /// Outcome whose processes a navigation filter should use: the reading of the curve where the
+    /// model does not describe it, else the model itself.
     pub fn for_navigation(&self) -> &Self {
         self.reading.as_deref().unwrap_or(self)
     }
@@ -194,7 +195,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Whether a level is within the range of the fit; ends may be off by rounding.
+    /// Returns true for a level within the range of the fit; the ends may be off by rounding.
     pub(crate) fn counts(&self, level: u32) -> bool {
         let scale_s = tau_s(level, self.rate_hz);
         self.fit_range.is_none_or(|range| {
@@ -252,7 +253,7 @@ pub struct Inference {
     pub stretch: f64,
     /// One interval a parameter that is not fixed, in the order of the model.
     pub intervals: Vec<ParameterInterval>,
-    /// Whether the model describes the curve; of slopes (AVLR), which are not fitted to it, nothing is known.
+    /// Goodness of fit of the model; none for slopes (AVLR), which are not fitted to the curve.
     pub goodness: Option<Goodness>,
     /// Spread of the replicates at each level of the curve. Empty for a curve from elsewhere.
     pub spread: Vec<LevelSpread>,
@@ -262,7 +263,7 @@ pub struct Inference {
     /// Parameters that are known to differ between recordings; none where [`alike`](Self::alike) does not say that these differ.
     pub varying: Vec<ParameterSpread>,
     /// Alike processes that cannot be told apart, and the simpler model.
-    pub indistinct: Option<Indistinct>,
+    pub indistinct: Option<IndistinctProcesses>,
     /// Intervals of N, K and B.
     pub practical: PracticalIntervals,
 }
@@ -273,7 +274,7 @@ pub struct Practical {
     /// N and K, of the policy "matched" over the default horizon.
     pub walk: Pair,
     /// B.
-    pub minimum: Option<Minimum>,
+    pub minimum: Option<AllanMinimum>,
     /// 95 % intervals of N, K and B.
     pub intervals: PracticalIntervals,
     /// Longest averaging time that was observed (s): how far a minimum was looked for.
@@ -288,8 +289,9 @@ impl Practical {
     /// random walk and a floor part by √2, over two by this.
     pub const BESIDE: f64 = 2.0;
 
-    /// Whether the data hold averages so long that the random walk is the larger part of them, and the model has it over an
-    /// octave of these: where they do not, K is what the pair says of times that nobody saw, or that were seen to be otherwise.
+    /// Returns true if K is supported by the data: the random walk dominates within the observed
+    /// averaging times, and the model agrees with it over an octave of these. Otherwise K
+    /// extrapolates.
     pub fn walk_is_observed(&self) -> bool {
         let lasts = |from: f64| self.walk_until_s.is_none_or(|until| until >= 2.0 * from);
         self.walk
@@ -335,7 +337,8 @@ pub struct LevelSpread {
     pub between: f64,
 }
 
-/// How a parameter differs between recordings: its logarithm (of phi and beta that of the correlation time) is normal.
+/// Normal distribution, between recordings, of the logarithm of a parameter (for phi and beta, of
+/// the correlation time).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct ParameterSpread {
     /// The parameter.
@@ -403,7 +406,7 @@ pub struct Goodness {
 const LEVEL: f64 = 0.05;
 
 impl Goodness {
-    /// Whether so large a J has a probability below 5 % when the model holds.
+    /// Returns true if the probability of a J this large under the model is below 5 %.
     pub fn is_rejected(&self) -> bool {
         self.p_value < LEVEL
     }
@@ -411,7 +414,7 @@ impl Goodness {
 
 /// Processes of one kind that cannot be told apart.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Indistinct {
+pub struct IndistinctProcesses {
     /// Their positions in the model.
     pub processes: Vec<usize>,
     /// The model with one of them less, which describes the curve as well.
@@ -426,7 +429,7 @@ pub struct Indistinct {
 
 /// A model that was tried.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
+pub struct ModelCandidate {
     /// The model.
     pub spec: ModelSpec,
     /// Σ Omega_j (nu_j − nu_j(theta))².
@@ -440,8 +443,8 @@ pub struct Candidate {
     pub j_p_value: Option<f64>,
 }
 
-impl Candidate {
-    /// Whether it was tested and does not describe the curve.
+impl ModelCandidate {
+    /// Returns true if the model was tested and does not describe the curve.
     pub fn is_rejected(&self) -> bool {
         self.j_p_value.is_some_and(|p| p < LEVEL)
     }
@@ -454,9 +457,9 @@ impl Candidate {
 
 /// The candidates and the choice.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Ranking {
+pub struct ModelRanking {
     /// The candidates, the least WVIC first.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<ModelCandidate>,
     /// Index of the chosen one.
     pub chosen: usize,
     /// The largest simpler model that does not do as well as the chosen one, and the probability of so large a difference of
@@ -475,16 +478,15 @@ const KNOWN: f64 = 0.1;
 
 /// A curve at one level, against the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Miss {
+pub struct ScaleMisfit {
     /// Level.
     pub level: u32,
     /// Wavelet variance of the data over that of the model.
     pub ratio: f64,
     /// The normal score of that ratio, a chi-square over its degrees of freedom where the model holds.
     pub deviations: f64,
-    /// Whether the scale counts in the fit.
     is_fitted: bool,
-    /// Whether the data are known to 10 % there.
+    /// True if the data are known to 10 % at this scale.
     is_known: bool,
 }
 
@@ -493,28 +495,28 @@ const IMPOSSIBLE: f64 = 1e-4;
 
 /// A curve against its model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Departure {
+pub struct CurveDeparture {
     /// Scales that count in the fit.
     pub scales: usize,
-    /// Those that are missed by more than four standard deviations.
-    pub missed: Vec<Miss>,
-    /// Of the scales that are known to 10 % (of all, if none is), the one with the ratio furthest from 1.
-    pub furthest: Option<Miss>,
+    /// Scales at which the model is off by more than four standard deviations.
+    pub missed: Vec<ScaleMisfit>,
+    /// Scale with the ratio furthest from 1, among those known to 10 % (among all, if none is).
+    pub furthest: Option<ScaleMisfit>,
     /// The longest of these scales, where there are longer ones.
     pub known_to: Option<u32>,
     /// The scale with the ratio furthest from 1 of all that are missed, those that count in no fit included, where the model
     /// does not fit: by single scales, by all together or by the J-test.
-    pub misfit: Option<Miss>,
+    pub misfit: Option<ScaleMisfit>,
 }
 
-impl Departure {
-    fn of(all: &[Miss], goodness: Option<Goodness>) -> Self {
-        let beyond = |all: &[Miss], deviations: f64| -> Vec<Miss> {
-            let is_beyond = |m: &&Miss| m.deviations.abs() > deviations;
+impl CurveDeparture {
+    fn of(all: &[ScaleMisfit], goodness: Option<Goodness>) -> Self {
+        let beyond = |all: &[ScaleMisfit], deviations: f64| -> Vec<ScaleMisfit> {
+            let is_beyond = |m: &&ScaleMisfit| m.deviations.abs() > deviations;
             all.iter().filter(is_beyond).copied().collect()
         };
-        let fitted: Vec<Miss> = all.iter().filter(|m| m.is_fitted).copied().collect();
-        let known: Vec<Miss> = fitted.iter().filter(|m| m.is_known).copied().collect();
+        let fitted: Vec<ScaleMisfit> = all.iter().filter(|m| m.is_fitted).copied().collect();
+        let known: Vec<ScaleMisfit> = fitted.iter().filter(|m| m.is_known).copied().collect();
         let missed = beyond(&fitted, MISSED);
         let doubtful = furthest(&beyond(&fitted, DOUBTFUL));
         let is_rejected = match goodness {
@@ -537,12 +539,12 @@ impl Departure {
 
 /// Probability of scores at least as far off together, where the model holds: their squares as a chi-square of as many
 /// degrees of freedom as scales. That parameters were fitted makes it larger, that neighbours hang together smaller.
-fn chance(all: &[Miss]) -> f64 {
+fn chance(all: &[ScaleMisfit]) -> f64 {
     let squares: f64 = all.iter().map(|m| m.deviations * m.deviations).sum();
     ChiSquared::new(all.len().max(1) as f64).map_or(1.0, |law| law.sf(squares))
 }
 
-fn furthest(all: &[Miss]) -> Option<Miss> {
+fn furthest(all: &[ScaleMisfit]) -> Option<ScaleMisfit> {
     // In the logarithm half is as far from 1 as twice.
     all.iter()
         .copied()
@@ -551,24 +553,24 @@ fn furthest(all: &[Miss]) -> Option<Miss> {
 
 impl Outcome {
     /// The curve against the model.
-    pub fn departure(&self) -> Departure {
+    pub fn departure(&self) -> CurveDeparture {
         let curve = &self.curve;
         let implied = implied(&self.fit.composite, curve);
         let data = curve.wv.iter().zip(&curve.edof).zip(implied);
         // Var ln nu is 2/eta by a curve's own noise, and what recordings differ by beside it.
         let known_to = |edof: &f64| 1.0 / (1.0 / edof + 0.5 * curve.differing);
-        let miss = |(level, ((nu, edof), implied)): (&u32, ((&f64, &f64), f64))| Miss {
+        let miss = |(level, ((nu, edof), implied)): (&u32, ((&f64, &f64), f64))| ScaleMisfit {
             level: *level,
             ratio: nu / implied,
             deviations: score(nu / implied, known_to(edof)),
             is_fitted: !curve.ignored.contains(level),
             is_known: (2.0 / edof).sqrt() <= KNOWN,
         };
-        let all: Vec<Miss> = curve.levels.iter().zip(data).map(miss).collect();
-        Departure::of(&all, self.goodness())
+        let all: Vec<ScaleMisfit> = curve.levels.iter().zip(data).map(miss).collect();
+        CurveDeparture::of(&all, self.goodness())
     }
 
-    /// Whether the model describes the curve, where that was asked for.
+    /// Goodness of fit of the model, if it was tested.
     pub fn goodness(&self) -> Option<Goodness> {
         self.inference.as_ref().and_then(|i| i.goodness)
     }
@@ -586,7 +588,7 @@ impl Outcome {
 
 #[cfg(test)]
 mod departure_tests {
-    use super::{Departure, Miss, chance};
+    use super::{CurveDeparture, ScaleMisfit, chance};
     use crate::fit::score;
     use crate::pipeline::fit_given;
     use crate::wavelet::Curve;
@@ -597,9 +599,9 @@ mod departure_tests {
     /// what speaks against the model is the scale where it is worst.
     #[test]
     fn scales_are_judged_together_and_told_as_far_as_they_are_known() {
-        let off = |deviations: f64| -> Vec<Miss> {
+        let off = |deviations: f64| -> Vec<ScaleMisfit> {
             (1..=12)
-                .map(|level| Miss {
+                .map(|level| ScaleMisfit {
                     level,
                     ratio: 1.0 - 0.05 * f64::from(level),
                     deviations,
@@ -608,7 +610,7 @@ mod departure_tests {
                 })
                 .collect()
         };
-        let departure = |deviations| Departure::of(&off(deviations), None);
+        let departure = |deviations| CurveDeparture::of(&off(deviations), None);
         let allowed = departure(-1.0);
         assert!(
             (chance(&off(-1.0)) - 0.4457).abs() < 5e-5 && allowed.misfit.is_none(),
@@ -624,7 +626,7 @@ mod departure_tests {
             "{impossible:?}"
         );
         assert_eq!(impossible.misfit.unwrap().level, 12);
-        assert_eq!(Departure::of(&off(1.0)[..8], None).known_to, None);
+        assert_eq!(CurveDeparture::of(&off(1.0)[..8], None).known_to, None);
     }
 
     /// White noise, exact but for a fifth more at one scale: missed where recordings are alike, not where they differ by as much.

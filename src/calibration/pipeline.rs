@@ -15,15 +15,15 @@ use rayon::prelude::*;
 /// # Errors
 /// When a trim leaves no replicate, or a curve is too short for the model.
 pub fn calibrate(groups: &[Group], settings: &Settings) -> Result<Vec<Outcome>, CalibrationError> {
-    calibrate_telling(groups, settings, &|_| {})
+    calibrate_with_progress(groups, settings, &|_| {})
 }
 
-/// As [`calibrate`], and tells `advance` the number of steps done since, of [`ModelChoice::steps`] for each
-/// fit.
+/// Calibrates like [`calibrate`] and reports progress: `advance` receives the number of steps done
+/// since its last call, of [`ModelChoice::steps`] per fit.
 ///
 /// # Errors
-/// As [`calibrate`].
-pub fn calibrate_telling(
+/// The same as [`calibrate`].
+pub fn calibrate_with_progress(
     groups: &[Group],
     settings: &Settings,
     advance: Advance<'_>,
@@ -130,11 +130,12 @@ pub fn infer(
     settings: &Settings,
     bootstrap: Bootstrap,
 ) {
-    infer_telling(groups, outcomes, settings, bootstrap, &|_| {});
+    infer_with_progress(groups, outcomes, settings, bootstrap, &|_| {});
 }
 
-/// As [`infer`], and tells `advance` the number of draws done since.
-pub fn infer_telling(
+/// Runs [`infer`] and reports progress: `advance` receives the number of draws done since its last
+/// call.
+pub fn infer_with_progress(
     groups: &[Group],
     outcomes: &mut [Outcome],
     settings: &Settings,

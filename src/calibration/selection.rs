@@ -16,7 +16,7 @@ use crate::curve::{CalibrationError, Estimator, Group, implied, p_value};
 use crate::fit::{Fit, Weighting, fit, refit, too_few_scales};
 use crate::model::ModelSpec;
 use crate::noise::Kind;
-use crate::outcome::{Advance, Candidate, ModelChoice, Ranking, Settings};
+use crate::outcome::{Advance, ModelCandidate, ModelChoice, ModelRanking, Settings};
 use crate::uncertainty::bootstrap::CurveSampler;
 use crate::wavelet::Curve;
 use rayon::prelude::*;
@@ -73,7 +73,7 @@ pub(crate) fn choose(
     curve: &Curve,
     settings: &Settings,
     advance: Advance<'_>,
-) -> Result<(ModelSpec, Ranking), CalibrationError> {
+) -> Result<(ModelSpec, ModelRanking), CalibrationError> {
     let stage = ModelChoice::Auto.steps() / ModelChoice::STAGES;
     // One weighting for all candidates, whatever their models expect.
     let reported = settings;
@@ -92,7 +92,7 @@ pub(crate) fn choose(
         .filter(|(_, f)| f.zero.is_empty() && f.at_end.is_empty())
         .collect();
     advance(stage);
-    let field = Field {
+    let field = CandidateSet {
         group,
         estimator,
         curve,
@@ -117,7 +117,7 @@ struct Trials {
 impl Trials {
     /// Candidates that the ranking lists, however far they are: the chosen one, and those that only the
     /// J-test refused.
-    fn told(&self, chosen: usize) -> Vec<usize> {
+    fn listed(&self, chosen: usize) -> Vec<usize> {
         let rejected = self.whole.iter().map(|(i, _)| *i);
         rejected.chain([chosen]).collect()
     }
@@ -128,7 +128,7 @@ fn found(tested: &[(usize, f64)], i: usize) -> Option<f64> {
 }
 
 /// The candidates, with all that their comparison needs.
-struct Field<'a> {
+struct CandidateSet<'a> {
     group: &'a Group,
     estimator: Estimator,
     curve: &'a Curve,
@@ -139,8 +139,8 @@ struct Field<'a> {
     fits: Vec<(ModelSpec, Fit)>,
 }
 
-impl Field<'_> {
-    fn rank(&self, stage_done: &dyn Fn()) -> Option<(ModelSpec, Ranking)> {
+impl CandidateSet<'_> {
+    fn rank(&self, stage_done: &dyn Fn()) -> Option<(ModelSpec, ModelRanking)> {
         let nearest = (0..self.fits.len())
             .min_by(|a, b| self.objective(*a).total_cmp(&self.objective(*b)))?;
         // One set of curves for all candidates: their optimisms are then compared on the same noise.
@@ -164,20 +164,20 @@ impl Field<'_> {
         let mut trials = Trials::default();
         let chosen = self.take(best, &ranked, &mut trials);
         stage_done();
-        for tested in trials.told(chosen) {
+        for tested in trials.listed(chosen) {
             if !ranked.iter().any(|(i, _)| *i == tested) {
                 ranked.push((tested, self.optimism(tested, &curves)));
             }
         }
         order(&mut ranked);
-        let candidate = |&(i, optimism): &(usize, f64)| Candidate {
+        let candidate = |&(i, optimism): &(usize, f64)| ModelCandidate {
             spec: self.fits[i].0.clone(),
             objective: self.objective(i),
             optimism,
             p_value: found(&trials.simpler, i),
             j_p_value: found(&trials.whole, i),
         };
-        let candidates: Vec<Candidate> = ranked.iter().map(candidate).collect();
+        let candidates: Vec<ModelCandidate> = ranked.iter().map(candidate).collect();
         let place = ranked.iter().position(|(i, _)| *i == chosen)?;
         let too_simple = trials.simpler.iter().rev();
         let too_simple = too_simple
@@ -186,7 +186,7 @@ impl Field<'_> {
         let spec = |i: usize| self.fits[i].0.clone();
         Some((
             spec(chosen),
-            Ranking {
+            ModelRanking {
                 candidates,
                 chosen: place,
                 too_simple: too_simple.map(|(i, p)| (spec(i), p)),
@@ -225,7 +225,7 @@ impl Field<'_> {
         passing.or(simplest).unwrap_or(best)
     }
 
-    /// Whether the J-test does not reject a candidate.
+    /// Returns true if the J-test does not reject candidate `i`.
     fn passes(&self, i: usize, trials: &mut Trials) -> bool {
         let p = found(&trials.whole, i).unwrap_or_else(|| {
             let p = self.j_p_value(i);

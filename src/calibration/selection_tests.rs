@@ -133,15 +133,15 @@ fn a_rejected_model_is_not_preferred_to_one_that_passes() {
         let ranking = outcome(set, &noise).ranking.unwrap();
         let chosen = &ranking.candidates[ranking.chosen];
         assert!(chosen.j_p_value.is_some());
-        let passes = |c: &Candidate| c.j_p_value.is_some_and(|p| p >= J_LEVEL);
+        let passes = |c: &ModelCandidate| c.j_p_value.is_some_and(|p| p >= J_LEVEL);
         assert!(
             passes(chosen) || !ranking.candidates.iter().any(passes),
             "{ranking:?}"
         );
         // What only chance speaks against gives no place to a worse criterion.
         let better = ranking.candidates[..ranking.chosen].iter();
-        let is_larger = |c: &&Candidate| chosen.spec.is_special_case_of(&c.spec);
-        let refused = |c: &Candidate| {
+        let is_larger = |c: &&ModelCandidate| chosen.spec.is_special_case_of(&c.spec);
+        let refused = |c: &ModelCandidate| {
             c.j_p_value.is_some_and(|p| p < J_LEVEL) || c.p_value.is_some_and(|p| p <= LEVEL)
         };
         assert!(

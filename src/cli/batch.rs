@@ -2,7 +2,7 @@
 
 use super::{Failure, Session};
 use crate::app::{Answer, Context};
-use crate::commands::batch::{BatchRequest, Outcome};
+use crate::commands::batch::{BatchOutcome, BatchRequest};
 use crate::parse;
 use serde_json::json;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 #[derive(clap::Args)]
-pub(crate) struct Args {
+pub(crate) struct BatchArgs {
     #[command(flatten)]
     request: BatchRequest,
     /// Stop after this time (exit code 75; 1 if nothing was finished): seconds, or with s, m, h
@@ -21,7 +21,7 @@ pub(crate) struct Args {
 }
 
 /// Runs a study, of a session that it makes stop at a signal or a time.
-pub(crate) fn run(args: &Args, mut session: Session) -> Result<(), Failure> {
+pub(crate) fn run(args: &BatchArgs, mut session: Session) -> Result<(), Failure> {
     let (is_stopped, signal) = (
         Arc::new(AtomicBool::new(false)),
         Arc::new(AtomicUsize::new(0)),
@@ -45,28 +45,28 @@ pub(crate) fn run(args: &Args, mut session: Session) -> Result<(), Failure> {
     let variable = |name: &str| std::env::var(name).ok();
     let mut outcome = request.run(&variable, &Context::new(&session, None));
     let signal = signal.load(Ordering::Relaxed) as i32;
-    if let Ok(Outcome::Stopped { is_resumable, .. }) = &mut outcome {
+    if let Ok(BatchOutcome::Stopped { is_resumable, .. }) = &mut outcome {
         *is_resumable |= signal == SIGTERM;
     }
-    if matches!(outcome, Err(_) | Ok(Outcome::Stopped { .. })) && signal == SIGINT {
+    if matches!(outcome, Err(_) | Ok(BatchOutcome::Stopped { .. })) && signal == SIGINT {
         return Err(Failure::interrupted("interrupted")
             .hint("the same command goes on where this one stopped"));
     }
     let outcome = outcome?;
     match &outcome {
-        Outcome::Merged(answer) => {
+        BatchOutcome::Merged(answer) => {
             session.show(&**answer, &answer.document(), None);
             session.say(format!("wrote {}", request.directory().display()));
         }
-        Outcome::Partial(missing) if session.is_json() => {
+        BatchOutcome::Partial(missing) if session.is_json() => {
             session.result(json!({ "schema_version": 1, "complete": false, "missing": missing }));
         }
-        Outcome::Partial(_) => session.say("own share done"),
-        Outcome::Estimate(text) if session.is_json() => {
+        BatchOutcome::Partial(_) => session.say("own share done"),
+        BatchOutcome::Estimate(text) if session.is_json() => {
             session.result(json!({ "schema_version": 1, "estimate": text }));
         }
-        Outcome::Estimate(text) => session.result(text),
-        Outcome::Stopped { .. } => {}
+        BatchOutcome::Estimate(text) => session.result(text),
+        BatchOutcome::Stopped { .. } => {}
     }
     outcome.unmet().map_or(Ok(()), Err)
 }

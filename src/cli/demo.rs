@@ -1,8 +1,8 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
 use super::{Cli, Common, Failure, Session};
-use crate::app::{Answer, Front};
-use crate::commands::batch::{BatchRequest, Outcome};
+use crate::app::{Answer, Reporter};
+use crate::commands::batch::{BatchOutcome, BatchRequest};
 use crate::io::atomic;
 use clap::{Parser, value_parser};
 use std::path::{Component, Path};
@@ -17,12 +17,7 @@ use std::path::{Component, Path};
 /// paper; the ASEE of each filter relative to AWV in scenario I. If interrupted, the same command makes recordings and models anew
 /// and goes on with the study.
 #[derive(clap::Args)]
-#[command(before_help = "\
-Examples:
-  nav-sim demo --seed 1 --samples 100000 --runs 8
-  nav-sim demo --seed 1 --print -o study
-  nav-sim demo --seed 1 --print > paper_section5.sh")]
-pub(crate) struct Args {
+pub(crate) struct DemoArgs {
     /// Samples of each recording, at least the 900 s of the drive (default: 87 minutes, as in the paper; short ones do not
     /// show its ordering)
     #[arg(long, value_name = "T", default_value_t = 524_284, value_parser = value_parser!(u64).range(90_000..=1_000_000_000))]
@@ -45,7 +40,7 @@ const HEAD: &str = "# nav-sim demo --samples";
 const SCENARIOS: [&str; 3] = ["I", "II", "III"];
 const ESTIMATORS: [&str; 3] = ["awv", "sr-awv", "dr-awv"];
 
-pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+pub(crate) fn run(args: &DemoArgs, session: &Session) -> Result<(), Failure> {
     let out = Path::new(&args.out);
     let (study, seed) = (out.join("study.toml"), session.context().seed_or(None));
     let (text, commands) = (study_text(args, seed)?, commands(args, seed));
@@ -95,7 +90,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         force,
         ..BatchRequest::default()
     };
-    let Outcome::Merged(found) = request.run(&|_| None, &session.context())? else {
+    let BatchOutcome::Merged(found) = request.run(&|_| None, &session.context())? else {
         return Err(Failure::stopped("cells are in work elsewhere")
             .hint("the same command goes on where it was"));
     };
@@ -107,7 +102,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 }
 
 /// The study of the demo; its paths are relative to the directory of results where that is.
-fn study_text(args: &Args, seed: u64) -> Result<String, Failure> {
+fn study_text(args: &DemoArgs, seed: u64) -> Result<String, Failure> {
     let out = Path::new(&args.out);
     let is_below = out.is_relative()
         && out
@@ -144,7 +139,7 @@ estimator = \"awv\"
 }
 
 /// The commands, as words.
-fn commands(args: &Args, seed: u64) -> Vec<Vec<String>> {
+fn commands(args: &DemoArgs, seed: u64) -> Vec<Vec<String>> {
     let synthesize = |rest: String| {
         format!(
             "synthesize {IMU} --samples {} --spread {rest}",

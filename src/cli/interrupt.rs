@@ -53,7 +53,7 @@ mod system {
 
 #[cfg(windows)]
 mod system {
-    /// What the C library calls Ctrl-C.
+    /// Signal number of Ctrl-C in the C library.
     const SIGINT: i32 = 2;
 
     /// Calls `end` at Ctrl-C, Ctrl-Break or when the console is closed: a console has no other signals.

@@ -1,7 +1,7 @@
 //! The command line: what is parsed, and small commands; larger ones have files of their own.
 
 pub(crate) use crate::app::Failure;
-use crate::app::{Answer, Asked, Result};
+use crate::app::{Answer, Invocation, Result};
 use crate::commands::batch::Study;
 use crate::commands::trajectory::{TrajectoryArgs, TrajectoryCommand};
 use crate::commands::with_commands;
@@ -30,18 +30,18 @@ struct Cli {
     #[command(flatten)]
     common: Common,
     #[command(subcommand)]
-    command: Command,
+    command: CliCommand,
 }
 
 macro_rules! driven {
     ($($variant:ident: $command:path),* $(,)?) => {
         /// Commands that answer a question.
         #[derive(Subcommand)]
-        enum Driven {
-            $($variant(Asked<$command>)),*
+        enum AnswerCommand {
+            $($variant(Invocation<$command>)),*
         }
 
-        impl Driven {
+        impl AnswerCommand {
             fn run(&self, session: &Session) -> Result<(), Failure> {
                 match self {
                     $(Self::$variant(asked) => drive(asked, session)),*
@@ -54,21 +54,21 @@ with_commands!(driven);
 
 #[derive(Subcommand)]
 #[expect(clippy::large_enum_variant, reason = "there is one, once a process")]
-enum Command {
+enum CliCommand {
     #[command(flatten)]
-    Driven(Driven),
+    Answer(AnswerCommand),
     Trajectory(TrajectoryArgs),
-    Batch(batch::Args),
-    Demo(demo::Args),
+    Batch(batch::BatchArgs),
+    Demo(demo::DemoArgs),
     Init(InitArgs),
     Schema(SchemaArgs),
     Completions(CompletionsArgs),
     Man(ManArgs),
 }
 
-impl Command {
+impl CliCommand {
     /// True if the command itself ends in good order at a signal.
-    const fn heeds_signals(&self) -> bool {
+    const fn handles_signals(&self) -> bool {
         matches!(self, Self::Batch(_))
     }
 
@@ -79,7 +79,7 @@ impl Command {
 
     fn run(self, session: Session) -> Result<(), Failure> {
         let text = match self {
-            Self::Driven(driven) => return driven.run(&session),
+            CliCommand::Answer(driven) => return driven.run(&session),
             Self::Trajectory(args) => match args.command {
                 TrajectoryCommand::Generate(mut asked) => {
                     asked.request.rate_hz.get_or_insert(100.0);
@@ -102,28 +102,29 @@ impl Command {
 }
 
 /// Text of `nav-sim` without arguments.
-const OVERVIEW: &str = "\
-nav-sim COMMAND --help has examples of each command; the book is docs/README.md.
-
-recordings    wv, calibrate       noise and a model of it from static recordings
-              choose, design      which model navigates best; how many recordings it takes
-              synthesize          recordings from a model
-models        datasheet, export   from a data sheet; to Kalibr, PX4, GTSAM and others
-              tune, require       factors that make a filter consistent; the IMU that an outage needs
-navigation    trajectory          make, check and convert reference trajectories
-              run, compare        INS/GNSS by Monte Carlo or covariance analysis; ratios between runs
-              fuse                recorded IMU and GNSS data
-              judge               the solution of any filter against a reference
-studies       batch               grids of runs on any machines
-to start      demo, init          the case study of the paper; a directory with files of every kind
-              check, schema       check files; their JSON schemas
-              completions, man    for shells and manuals
-
-first:        nav-sim init study && cd study && nav-sim run trajectories/land_vehicle.toml calib_data/tactical.toml";
+const OVERVIEW: &str = include_str!("overview.txt");
+/// Examples that lead the help of each command, in paragraphs headed by its name.
+const EXAMPLES: &str = include_str!("examples.txt");
 
 /// The whole command line as clap knows it.
 fn command() -> clap::Command {
-    Cli::command()
+    with_examples(Cli::command(), "")
+}
+
+/// Adds the examples of a command, by its names below nav-sim, and of those under it.
+fn with_examples(command: clap::Command, names: &str) -> clap::Command {
+    let examples = EXAMPLES
+        .split("\n\n")
+        .filter_map(|paragraph| paragraph.split_once('\n'))
+        .find(|(head, _)| *head == names);
+    let command = match examples {
+        Some((_, lines)) => command.before_help(format!("Examples:\n{}", lines.trim_end())),
+        None => command,
+    };
+    command.mut_subcommands(|inner| {
+        let names = format!("{names} {}", inner.get_name());
+        with_examples(inner, names.trim_start())
+    })
 }
 
 /// The words of the command line. A negative number after an option is its value, not a flag: no flag begins with a
@@ -168,7 +169,7 @@ fn end(e: &clap::Error) -> ! {
     if let (ErrorKind::UnknownArgument, Some(word)) = (e.kind(), e.get(ContextKind::InvalidArg)) {
         let path = PathBuf::from(word.to_string());
         if path.is_file() {
-            failure = file_kind::unless(&[], &path, failure);
+            failure = file_kind::or_wrong_kind(&[], &path, failure);
         }
     }
     Session::default().failure(&failure);
@@ -197,7 +198,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
         ..Session::default()
     };
     if given.len() < 2 {
-        let _ = writeln!(std::io::stderr(), "{OVERVIEW}");
+        let _ = write!(std::io::stderr(), "{OVERVIEW}");
         return 2;
     }
     let words = words(given.iter().cloned());
@@ -206,7 +207,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
         .try_get_matches_from(&words)
         .unwrap_or_else(|e| end(&e));
     let Cli { common, command } = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
-    if !command.heeds_signals() {
+    if !command.handles_signals() {
         interrupt::watch(session(&common), command.advice_at_signals());
     }
     let threads = common.threads.map_or(0, usize::from); // 0: one per core
@@ -271,11 +272,6 @@ mod tests {
 
 /// Print a completion script for a shell
 #[derive(clap::Args)]
-#[command(before_help = "\
-Examples:
-  nav-sim completions bash > nav-sim.bash
-  nav-sim completions zsh > _nav-sim
-  nav-sim completions fish > nav-sim.fish")]
 struct CompletionsArgs {
     /// Which shell
     #[arg(value_enum)]
@@ -292,11 +288,6 @@ fn completions(args: &CompletionsArgs) -> String {
 
 /// Print the manual page of a command (without a name: of nav-sim itself)
 #[derive(clap::Args)]
-#[command(before_help = "\
-Examples:
-  nav-sim man > nav-sim.1
-  nav-sim man run > nav-sim-run.1
-  nav-sim man compare > nav-sim-compare.1")]
 struct ManArgs {
     /// Which command
     command: Option<String>,
@@ -328,26 +319,21 @@ fn man(args: &ManArgs) -> Result<String, Failure> {
 
 /// Print the JSON schema of a file that people write, for editors and checkers
 #[derive(clap::Args)]
-#[command(before_help = "\
-Examples:
-  nav-sim schema scenario > scenario.schema.json
-  nav-sim schema model | grep -c AR1
-  nav-sim schema study | grep -c description")]
 struct SchemaArgs {
     /// Which file
     #[arg(value_enum)]
-    of: Kind,
+    of: SchemaKind,
 }
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug)]
-enum Kind {
+enum SchemaKind {
     /// All settings of a run (`nav-sim run --scenario`)
     Scenario,
     /// A grid of experiments (`nav-sim batch`)
     Study,
     /// A noise model (what `nav-sim calibrate` writes)
     Model,
-    /// Where and how a drive begins (`nav-sim fuse --initial`)
+    /// Initial state of a drive (`nav-sim fuse --initial`)
     Initial,
     /// A trajectory by what the vehicle does (`nav-sim run`)
     Profile,
@@ -359,14 +345,14 @@ fn schema(args: &SchemaArgs) -> String {
     crate::report::json(&schema_of(args.of))
 }
 
-fn schema_of(of: Kind) -> serde_json::Value {
+fn schema_of(of: SchemaKind) -> serde_json::Value {
     match of {
-        Kind::Scenario => schemars::schema_for!(Scenario).to_value(),
-        Kind::Study => schemars::schema_for!(Study).to_value(),
-        Kind::Model => model_file::schema(),
-        Kind::Initial => fusion_files::initial_schema(),
-        Kind::Profile => trajectory_file::profile_schema(),
-        Kind::Contamination => contamination_file::schema(),
+        SchemaKind::Scenario => schemars::schema_for!(Scenario).to_value(),
+        SchemaKind::Study => schemars::schema_for!(Study).to_value(),
+        SchemaKind::Model => model_file::schema(),
+        SchemaKind::Initial => fusion_files::initial_schema(),
+        SchemaKind::Profile => trajectory_file::profile_schema(),
+        SchemaKind::Contamination => contamination_file::schema(),
     }
 }
 
@@ -382,12 +368,6 @@ mod schema_tests;
 /// what each key means. The others are those of the repository; the examples of every --help work inside the directory. Files
 /// that exist already are left alone.
 #[derive(clap::Args)]
-#[command(before_help = "\
-Examples:
-  nav-sim init study
-  nav-sim check study/scenario.toml study/calib_data/consumer_mems.toml
-  nav-sim run study/trajectories/land_vehicle.toml study/calib_data/consumer_mems.toml \\
-      --scenario study/scenario.toml --runs 8 -o study/out")]
 struct InitArgs {
     /// Directory
     #[arg(value_name = "DIR", default_value = ".")]
@@ -408,7 +388,7 @@ fn init(args: &InitArgs, session: &Session) -> Result<String, Failure> {
 // Runs a command on a terminal: claims outputs, runs, shows, writes.
 
 /// Does a command.
-fn drive<C: crate::app::Command>(asked: &Asked<C>, session: &Session) -> Result<()> {
+fn drive<C: crate::app::Command>(asked: &Invocation<C>, session: &Session) -> Result<()> {
     let mut manifest = asked.manifest(session.common.seed)?;
     manifest.command.clone_from(&session.given);
     let claims = asked.claim(&manifest, session.common.force)?;

@@ -1,6 +1,6 @@
 //! The ranges of schemas are those of the readers.
 
-use super::{Kind, schema_of};
+use super::{SchemaKind as Kind, schema_of};
 use crate::io::{
     Failure, contamination_file, fusion_files, model_file, scenario_file, trajectory_file,
 };

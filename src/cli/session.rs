@@ -2,7 +2,7 @@
 //! everything said to stderr.
 
 use super::Failure;
-use crate::app::{Answer, Context, Front};
+use crate::app::{Answer, Context, Reporter};
 use crate::failure::system_words;
 use crate::io::atomic::remove_unfinished;
 use crate::parse;
@@ -109,7 +109,7 @@ impl Session {
             _ if self.common.verbose => document.verbose(WIDTH),
             _ => document.terminal(WIDTH),
         });
-        for note in document.spoken(self.common.verbose) {
+        for note in document.shown_notes(self.common.verbose) {
             match note.importance {
                 Importance::Warning => self.note(note.clone()),
                 _ => self.say(format!("note: {}", note.text)),
@@ -150,7 +150,7 @@ impl Session {
     }
 }
 
-impl Front for Session {
+impl Reporter for Session {
     fn note(&self, Note { importance, text }: Note) {
         match importance {
             // those of the commands of a demo are for --verbose, as their remarks are
@@ -195,7 +195,7 @@ impl Front for Session {
         *self.running() = None;
     }
 
-    fn go_on(&self) -> bool {
+    fn should_continue(&self) -> bool {
         self.go_on.as_ref().is_none_or(|go_on| go_on())
     }
 }

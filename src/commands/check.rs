@@ -7,7 +7,7 @@ use crate::io::Place;
 use crate::io::file_kind::{self, FileKind};
 use crate::io::fusion_files::{ImuFile, read_gnss, read_imu, read_initial};
 use crate::io::recordings::Gaps;
-use crate::io::toml_file::Source;
+use crate::io::toml_file::TomlSource;
 use crate::io::{contamination_file, curve_file, datasheet, scenario_file};
 use crate::parse;
 use crate::report::six_digits;
@@ -27,11 +27,6 @@ use std::path::{Path, PathBuf};
 /// and .gpx; with standard deviations, or heights and neither attitude nor velocity, it is GNSS fixes; with tau_samples
 /// (or a .wv.json) a curve; any other table or .npy is a static recording.
 #[derive(clap::Args, Debug)]
-#[command(before_help = "\
-Examples:
-  nav-sim check calib_data/consumer_mems.toml
-  nav-sim check trajectories/land_vehicle.toml examples/quick_study.toml
-  nav-sim init study && nav-sim check study/scenario.toml")]
 pub struct CheckFiles {
     /// Files
     #[arg(required = true, value_name = "FILE")]
@@ -85,18 +80,18 @@ impl Command for CheckFiles {
             }
         };
         let document = Document::new("Files", Tone::Good, lines);
-        Ok(PlainAnswer::new(files.into(), document).judged(unmet))
+        Ok(PlainAnswer::new(files.into(), document).with_unmet(unmet))
     }
 }
 
-fn tell(notes: &[Note], context: &Context<'_>) {
+fn report_notes(notes: &[Note], context: &Context<'_>) {
     for Note { importance, text } in notes {
         context.note(*importance, text);
     }
 }
 
 fn drive(imu: &ImuFile, context: &Context<'_>) -> String {
-    tell(&imu.remarks, context);
+    report_notes(&imu.remarks, context);
     let (samples, rate_hz) = (imu.samples.len(), imu.rate_hz);
     format!("an IMU recording of {samples} samples at {rate_hz:.2} Hz, for fuse")
 }
@@ -105,7 +100,7 @@ fn drive(imu: &ImuFile, context: &Context<'_>) -> String {
 fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<String> {
     let beside = path.parent().unwrap_or(Path::new(""));
     let found = match file_kind::of(path)? {
-        FileKind::Scenario => match Source::read(path)?.table()?.is_empty() {
+        FileKind::Scenario => match TomlSource::read(path)?.table()?.is_empty() {
             true => "an empty file; as a scenario, all defaults",
             false => scenario_file::read(path).map(|_| "a scenario")?,
         },
@@ -152,7 +147,7 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
             };
             let (fixes, notes) =
                 read.or_else(|e| read_gnss(path, Some(&given), None, None).map_err(|_| e))?;
-            tell(&notes, context);
+            report_notes(&notes, context);
             return Ok(format!("{} GNSS fixes{unsaid}", fixes.len()));
         }
         FileKind::Imu => return Ok(drive(&read_imu(path, None, None)?, context)),

@@ -7,9 +7,9 @@ use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::report::csv::{csv, flat, merged};
 use crate::report::verdict::{SPOKEN, axis_of, tone, verdict_counts};
-use crate::report::{in_order, some};
+use crate::report::{first_names, in_order};
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
+    Cell, Chart, ChartAxis, Colour, Document, Importance, Mark, Panel, Series, Table, short_names,
     window,
 };
 use nav_sim_navigation::metrics::{self, OutageComparison, PerState, StateRatio};
@@ -32,13 +32,6 @@ mod models;
 ///
 /// Two model files: N, B, K, Q and the parameters of the processes, and which of them changed beyond their 95 % intervals.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
-      --filter full --runs 8 --seed 1 -o out/with_all
-  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
-      --runs 8 --seed 1 -o out/with_15
-  nav-sim compare out/with_15 --reference out/with_all --state all")]
 pub struct Compare {
     /// Run directories, or two model files
     #[arg(required = true, value_name = "DIR")]
@@ -54,7 +47,7 @@ pub struct Compare {
     table: Option<TableForm>,
 }
 
-/// How a table is written.
+/// Layout of the printed table.
 #[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TableForm {
     /// A table of Markdown
@@ -273,7 +266,8 @@ pub(crate) fn between<'a>(
     Ok(found)
 }
 
-/// What makes two runs differ beside the model in the filter; then run k did not see the same noise.
+/// Differences between two runs other than the filter's model: with any, run k did not have the
+/// same noise.
 fn differences(candidate: &RunDirectory, reference: &RunDirectory) -> Vec<&'static str> {
     let (c, r) = (
         &candidate.origin.configuration,
@@ -301,7 +295,7 @@ fn differences(candidate: &RunDirectory, reference: &RunDirectory) -> Vec<&'stat
         .collect()
 }
 
-/// What made the INS errors: a recording, a model, or the filter's own.
+/// Hashes of the source of the INS errors: a recording, a model, or the filter's own model.
 fn truth(manifest: &Manifest) -> Vec<&str> {
     ["static", "truth", "model"]
         .map(|role| manifest.hashes(role))
@@ -337,7 +331,8 @@ pub struct Comparison {
     schema_version: u32,
     /// Run directory of the reference.
     pub(crate) reference: String,
-    /// Whether run k saw the same noise everywhere, so that intervals are those of paired differences.
+    /// True if run k had the same noise in all directories: intervals are then those of paired
+    /// differences.
     paired: bool,
     /// One row a run, the reference first.
     verdicts: Vec<Value>,
@@ -401,7 +396,8 @@ impl Comparison {
         };
         let costs: Vec<String> = others.iter().filter_map(cost).collect();
         (!costs.is_empty()).then(|| {
-            let (reference, costs, state) = (self.name_of_reference(), some(&costs), SPOKEN[state]);
+            let (reference, costs, state) =
+                (self.name_of_reference(), first_names(&costs), SPOKEN[state]);
             format!("against {reference}: {costs} of the uncertainty of {state}")
         })
     }
@@ -416,7 +412,7 @@ impl Comparison {
             }
             names => format!(
                 "the runs and the calibrations, of {} of the runs alone",
-                some(names)
+                first_names(names)
             ),
         };
         format!("95 % intervals (±) of {covered}")
@@ -434,7 +430,7 @@ impl Comparison {
                 )
             };
             let zero = Series::new("", Colour::Ink, Mark::Level(0.0));
-            let axis = Axis::linear(&format!("{}: (ratio − 1)·100 (%)", SPOKEN[*state]))
+            let axis = ChartAxis::linear(&format!("{}: (ratio − 1)·100 (%)", SPOKEN[*state]))
                 .including(-1.0, 1.0);
             let series = std::iter::once(zero)
                 .chain(others.iter().enumerate().map(line))
@@ -534,7 +530,7 @@ const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's
 /// Estimators by the names their run directories end in.
 const ESTIMATORS: [&str; 6] = ["sr-awv", "dr-awv", "awv", "rgmwm", "gmwm", "avlr"];
 
-/// Where a run stands in Table I: its row (scenario) and column (estimator, may be empty).
+/// Position of a run in Table I: its row (scenario) and column (estimator, may be empty).
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 struct Label {
     /// Row.

@@ -2,7 +2,7 @@
 
 use crate::app::{Command, Context, Failure, Out, PlainAnswer, Refuse, Result};
 use crate::io::datasheet::{
-    CATALOGUE, Datasheet, Entry, Figure, GRADE, Quantity, catalogued, measured, read,
+    CATALOGUE, Datasheet, DatasheetEntry, Figure, GRADE, StatedQuantity, catalogued, measured, read,
 };
 use crate::io::model_file;
 use crate::io::recordings::facts::out_of_range;
@@ -19,11 +19,6 @@ use std::path::PathBuf;
 /// instability as its minimum, and a random walk. [provenance] of the model file holds every figure as given and the
 /// parameters that follow from it. Flags override the entry of the catalogue, and the file of --from.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim datasheet --unit stim300 --rate-hz 100 -o stim300.toml
-  nav-sim datasheet calib_data/catalogue/adis16470.toml --corr-time 100s -o adis16470.toml
-  nav-sim datasheet --list")]
 pub struct DatasheetArgs {
     /// Catalogue entry (TOML)
     #[arg(value_name = "ENTRY", conflicts_with = "unit")]
@@ -104,36 +99,39 @@ impl Command for DatasheetArgs {
 pub struct Figures {
     /// Velocity random walk or noise density of the accelerometers: m/s/sqrt(h), ug/sqrt(Hz), …
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Noise))]
-    vrw: Option<Quantity>,
+    vrw: Option<StatedQuantity>,
     /// Angle random walk or noise density of the gyroscopes: deg/sqrt(h), deg/s/sqrt(Hz), …
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Noise))]
-    arw: Option<Quantity>,
+    arw: Option<StatedQuantity>,
     /// Bias instability of the accelerometers: ug, mg, m/s²
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Bias))]
-    accel_bias: Option<Quantity>,
+    accel_bias: Option<StatedQuantity>,
     /// Bias instability of the gyroscopes: deg/h, deg/s, rad/s
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Bias))]
-    gyro_bias: Option<Quantity>,
+    gyro_bias: Option<StatedQuantity>,
     /// Rate random walk K of the accelerometers: m/s²/sqrt(h), m/s³/sqrt(Hz), …
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Walk))]
-    accel_rrw: Option<Quantity>,
+    accel_rrw: Option<StatedQuantity>,
     /// Rate random walk K of the gyroscopes: deg/h/sqrt(h), rad/s²/sqrt(Hz), …
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Walk))]
-    gyro_rrw: Option<Quantity>,
+    gyro_rrw: Option<StatedQuantity>,
     /// Longest correlation time of both biases: s, min, h [default: 300 s, with a warning]
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::CorrelationTime))]
-    corr_time: Option<Quantity>,
+    corr_time: Option<StatedQuantity>,
     /// Turn-on bias of the accelerometers, as a standard deviation: mg, m/s²
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::TurnOn))]
-    accel_turn_on: Option<Quantity>,
+    accel_turn_on: Option<StatedQuantity>,
     /// Turn-on bias of the gyroscopes, as a standard deviation: deg/s, deg/h
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::TurnOn))]
-    gyro_turn_on: Option<Quantity>,
+    gyro_turn_on: Option<StatedQuantity>,
 }
 
 /// Checks a figure of a sensor.
-fn figure(sensor: Sensor, figure: Figure) -> impl Fn(&str) -> Result<Quantity, String> + Clone {
-    move |text| Quantity::parse(text, figure.units(sensor))
+fn figure(
+    sensor: Sensor,
+    figure: Figure,
+) -> impl Fn(&str) -> Result<StatedQuantity, String> + Clone {
+    move |text| StatedQuantity::parse(text, figure.units(sensor))
 }
 
 impl Figures {
@@ -153,7 +151,7 @@ impl Figures {
         ];
         for (sensor, figure, quantity) in given {
             if let Some(quantity) = quantity {
-                sheet.set(Entry {
+                sheet.set(DatasheetEntry {
                     sensor,
                     figure,
                     quantity: quantity.clone(),
@@ -200,7 +198,7 @@ fn lacking(sheet: &Datasheet, sensor: Sensor) -> impl Iterator<Item = String> {
 /// A catalogued unit with the figures of its data sheet.
 fn catalogued_unit(name: &str) -> Result<Value> {
     let sheet = named(name)?;
-    let figure = |e: &Entry| {
+    let figure = |e: &DatasheetEntry| {
         json!({
             "sensor": e.sensor,
             "figure": e.figure.name(),

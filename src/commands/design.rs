@@ -28,12 +28,6 @@ use std::path::PathBuf;
 /// interval on the horizontal error (95 % quantile) at the end of each outage, for a filter that knows the IMU.
 /// Without --recordings or --hours a table of several is printed.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim design calib_data/tactical.toml --recordings 6 --hours 2
-  nav-sim design calib_data/consumer_mems.toml --recordings 6 --hours 1 --draws 50 --estimator awv
-  nav-sim design calib_data/tactical.toml --recordings 4 --hours 1 --draws 50 \\
-      --trajectory trajectories/figure_eight.toml --outage 300:360")]
 pub struct Design {
     /// Noise model of the IMU, as far as it is known
     model: PathBuf,
@@ -43,8 +37,8 @@ pub struct Design {
     /// Length of each in hours [default: a table of 1, 3 and 10]
     #[arg(long, value_name = "HOURS", value_parser = parse::positive)]
     hours: Option<f64>,
-    /// How they will be calibrated: awv averages classical wavelet variances; sr-awv robust ones, against outliers; dr-awv
-    /// also trims them, against abnormal recordings
+    /// Estimator of the planned calibration: awv averages classical wavelet variances; sr-awv
+    /// robust ones, against outliers; dr-awv also trims them, against abnormal recordings
     #[arg(long, value_name = "ESTIMATOR", value_parser = parse::one_of::<Estimator>(AVERAGES), default_value_t)]
     estimator: Estimator,
     /// Draws of the bootstrap
@@ -228,7 +222,7 @@ fn destination_quantiles(
 ) -> Result<Vec<DesignedQuantile>> {
     outcomes
         .iter()
-        .for_each(|outcome| outcome.put_into(&mut inputs.model));
+        .for_each(|outcome| outcome.apply_to(&mut inputs.model));
     let draws = DrawsFile::of(outcomes, rate_hz);
     inputs.model_draws = draws.and_then(|draws| draws.draws(&inputs.model));
     let found = navigate(inputs, scenario, outages, 0, &Context::default())?;
@@ -256,7 +250,7 @@ pub struct Designs {
     designs: Vec<DesignOutcome>,
 }
 
-/// What so many recordings, so long each, would tell.
+/// Expected result of a number of recordings of one length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct DesignOutcome {
     /// Recordings.
@@ -313,11 +307,12 @@ struct DesignedQuantile {
     pub half_width_pct: f64,
 }
 
-/// What stands between the interval to expect and that of one calibration. Of 400 to 1000 simulated intervals of a random walk
-/// (white noise and random walk, four recordings of three axes; ± 57 to ± 102 % to expect by 2000 draws) the median was
-/// 0.83 to 0.88 of that, the mean 0.92 to 0.95, and 32 to 33 % were wider (AWV and DR-AWV); those of white noise were 0.93
-/// to 0.98 of it. All of them held the truth in 96 to 98.5 % of the cases: a scatter read off twelve signals is more often
-/// less than more, for which Student's quantile makes amends.
+/// Caveat on the expected interval against that of one calibration. Of 400 to 1000 simulated
+/// intervals of a random walk (white noise and random walk, four recordings of three axes; ± 57 to
+/// ± 102 % expected by 2000 draws) the median was 0.83 to 0.88 of the expected one, the mean 0.92
+/// to 0.95, and 32 to 33 % were wider (AWV and DR-AWV); for white noise 0.93 to 0.98. All of them
+/// held the truth in 96 to 98.5 % of the cases: a scatter estimated from twelve signals is more
+/// often too small than too large, for which Student's quantile compensates.
 const STATED: &str = "where ± 100 % are expected, half of the calibrations state below 0.85 of it, one in three more";
 
 /// A part of an interval this large is nearly all of it.
@@ -347,7 +342,7 @@ impl DesignOutcome {
 }
 
 impl Designs {
-    /// How many parameters the largest plan would determine, and how well.
+    /// Number of parameters that the largest plan determines, and the least certain one.
     fn verdict(&self) -> (Tone, Vec<String>) {
         let Some(largest) = self.designs.last() else {
             return (Tone::Undecided, vec!["nothing was planned".to_owned()]);

@@ -5,7 +5,7 @@ use crate::app::{Answer, Command, Context, Result};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::logs;
 use nav_sim_document::{Document, Importance, Table, Tone, six_digits};
-use nav_sim_logs::{Channel, Content, Error, Log, Stamp};
+use nav_sim_logs::{Content, Log, LogChannel, LogError, Stamp};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -17,16 +17,11 @@ const GAP: f64 = 1.5;
 /// Samples of an IMU and fixes of a receiver are read through: rate by the median step, gaps (steps beyond 1.5 times it),
 /// jitter (95 % of the steps are as near to the median one).
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim inspect calib_data/formats/log.mcap
-  nav-sim inspect calib_data/formats/receiver.ubx --format json
-  nav-sim inspect calib_data/formats/log.mcap --stamp log")]
 pub struct Inspect {
     /// Log
     #[arg(id = "log", value_name = "FILE")]
     file: PathBuf,
-    /// How it is read.
+    /// Options for reading it.
     #[command(flatten)]
     log: LogRequest,
 }
@@ -95,7 +90,7 @@ pub struct InspectedChannel {
 /// # Errors
 /// When the file is not a log that is read, or is damaged before its end.
 pub fn inspect(path: &Path, stamp: Stamp) -> Result<Inspection> {
-    let log = logs::open(path).map_err(|e| file_kind::unless(&[FileKind::Log], path, e))?;
+    let log = logs::open(path).map_err(|e| file_kind::or_wrong_kind(&[FileKind::Log], path, e))?;
     let channels = log
         .channels()
         .iter()
@@ -110,7 +105,7 @@ pub fn inspect(path: &Path, stamp: Stamp) -> Result<Inspection> {
     })
 }
 
-fn inspected(log: &Log, channel: &Channel, stamp: Stamp) -> Result<InspectedChannel, Error> {
+fn inspected(log: &Log, channel: &LogChannel, stamp: Stamp) -> Result<InspectedChannel, LogError> {
     let (content, units, stamps) = match channel.content {
         _ if channel.messages == 0 => ("other", None, Vec::new()),
         Content::Imu => (

@@ -8,7 +8,7 @@ use crate::report::verdict::{drive_line, tone};
 use crate::report::{error_charts, json};
 use nav_sim_document::{Cell, Colour, Document, Importance, Table, readable, window};
 use nav_sim_navigation::fusion::judge::{
-    Doubt, Judgement, ReferenceOffset, StatedErrors, judge, rough_delay_s,
+    Judgement, ReferenceOffset, SetupFault, StatedErrors, judge, rough_delay_s,
 };
 use nav_sim_navigation::metrics::{DriveVerdict, VerdictKind};
 use nav_sim_navigation::sensors::outage::Outage;
@@ -25,11 +25,6 @@ use std::path::PathBuf;
 /// a point of the vehicle that is not the reference's is found and named. Writes summary.json, errors.csv, report.html,
 /// manifest.json. Exit code 3: the solution is overconfident.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim trajectory record trajectories/figure_eight.toml calib_data/tactical.toml -o drive
-  nav-sim fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml -o out/fused
-  nav-sim judge out/fused/solution.csv --reference drive/reference.csv -o out/judged")]
 pub struct Judge {
     /// Solution (.csv, .tsv, .txt, .pos, .nav, .tum, also .gz)
     #[arg(value_name = "SOLUTION")]
@@ -144,7 +139,7 @@ impl Command for Judge {
         ];
         Ok(PlainAnswer::new(summary, document)
             .with(files)
-            .judged(unmet))
+            .with_unmet(unmet))
     }
 }
 
@@ -184,28 +179,28 @@ fn summary(judgement: &Judgement, outages: &[(f64, f64)]) -> serde_json::Value {
 }
 
 /// Whatever else explains the errors, in a sentence with what to do.
-fn doubt(doubt: &Doubt) -> String {
+fn doubt(doubt: &SetupFault) -> String {
     match doubt {
-        Doubt::Apart { metres } => format!(
+        SetupFault::Apart { metres } => format!(
             "solution and reference are {} m apart: another origin, latitude and longitude exchanged, or another drive",
             readable(*metres)
         ),
-        Doubt::Height { metres } => format!(
+        SetupFault::Height { metres } => format!(
             "heights of the solution are {} m above the reference's all the time: one above sea level, one above the ellipsoid?",
             readable(*metres)
         ),
-        Doubt::Axes {
+        SetupFault::Axes {
             axes,
             angles_deg: [roll, pitch, yaw],
         } => format!(
             "the axes of {axes} are turned by roll {roll:.0}°, pitch {pitch:.0}°, yaw {yaw:.0}° in those of the reference: write both as front, right, down in north, east, down"
         ),
-        Doubt::Transformed { cause, times, left } => format!(
+        SetupFault::Transformed { cause, times, left } => format!(
             "{cause}? Errors are {} times their standard deviations as it is, {} times after that",
             readable(*times),
             readable(*left)
         ),
-        Doubt::Offset(found) => {
+        SetupFault::Offset(found) => {
             let (offset, sigma) = (found.offset, found.sigma);
             let (arm, arm_sigma) = (offset.lever_arm_m, sigma.lever_arm_m);
             let delay = format!(
@@ -271,7 +266,7 @@ fn page(judgement: &Judgement, outages: &[(f64, f64)]) -> Document {
     {
         let text = format!(
             "{}: less than the solution states",
-            doubt(&Doubt::Offset(found))
+            doubt(&SetupFault::Offset(found))
         );
         document.note(Importance::Remark, text);
     }

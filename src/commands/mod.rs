@@ -18,7 +18,7 @@ pub mod trajectory;
 pub mod tune;
 pub mod wv;
 
-use crate::app::{Answered, Command, Failure, Front, Result, answered};
+use crate::app::{Command, Failure, RenderedAnswer, Reporter, Result, answered};
 use serde_json::{Map, Value};
 
 /// Calls a macro with all commands that answer a question, in the order of the help.
@@ -54,8 +54,8 @@ macro_rules! by_name {
         pub fn answer(
             name: &str,
             options: Map<String, Value>,
-            front: &dyn Front,
-        ) -> Result<Answered> {
+            front: &dyn Reporter,
+        ) -> Result<RenderedAnswer> {
             $(if name == <$command as Command>::NAME {
                 return answered::<$command>(options, front);
             })*

@@ -11,8 +11,8 @@ use crate::report::csv::merged;
 use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds, window};
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
-    Answer as Bound, Course, Drift, ImuParameters, Limit, Margins, Need, Quantity, RequireError,
-    Worst, evenly,
+    Drift, HardestLimit, ImuParameters, ImuSearch, IntensityBound as Bound, Limit, LimitQuantity,
+    Margins, OutagePlacements, RequireError, evenly,
 };
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::aiding::AidingSettings;
@@ -36,14 +36,6 @@ use std::str::FromStr;
 /// and bias instability that each sensor may have beside the turn-on biases of [imu] in --scenario. With MODEL it says
 /// whether the limits are kept (exit code 3: they are not), and the longest outage that it bridges.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim require trajectories/figure_eight.toml --outage 60 \\
-      --require 'p95_m<=50' -o needed.toml
-  nav-sim require trajectories/figure_eight.toml calib_data/tactical.toml \\
-      --outage 60:120 --require 'rmse_m<=100'
-  nav-sim require trajectories/figure_eight.toml calib_data/tactical.toml \\
-      --outage longest --require 'p95_m<=20'")]
 pub struct Require {
     /// Trajectory: motion profile (.toml) or table (.csv)
     pub trajectory: PathBuf,
@@ -51,7 +43,7 @@ pub struct Require {
     model: Option<PathBuf>,
     /// Outage: a length in seconds (tried from every second on), START:END, or "longest" (needs MODEL)
     #[arg(long, value_name = "SECONDS")]
-    outage: Ask,
+    outage: OutageRequest,
     /// Earliest start of the outage in seconds [default: 300, less if the trajectory is short]
     #[arg(long, value_name = "SECONDS", value_parser = parse::non_negative)]
     start: Option<f64>,
@@ -62,7 +54,8 @@ pub struct Require {
     /// Receiver, start, IMU rate, aiding.
     #[command(flatten)]
     settings: ScenarioArgs,
-    /// What the vehicle knows of its own motion: a car moves neither sideways nor up; with MODEL, a table with and without
+    /// Motion constraints of the vehicle: a car moves neither sideways nor up; with MODEL, a table
+    /// with and without
     #[arg(long, value_name = "KIND", value_parser = ["car"])]
     vehicle: Option<String>,
     /// Rank the catalogued IMUs (`nav-sim datasheet --list`), or those of a directory of entries and model files
@@ -73,7 +66,7 @@ pub struct Require {
 /// Stands for the units that are known by name.
 const BUILT_IN: &str = "built-in";
 
-impl FromStr for Ask {
+impl FromStr for OutageRequest {
     type Err = String;
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
@@ -108,7 +101,7 @@ impl Command for Require {
     }
 
     fn inputs(&self, mut given: Inputs) -> Result<Inputs> {
-        if let (Ask::Window(outage), Some(start_s)) = (self.outage, self.start) {
+        if let (OutageRequest::Window(outage), Some(start_s)) = (self.outage, self.start) {
             let Outage {
                 start_s: from,
                 end_s: to,
@@ -118,7 +111,7 @@ impl Command for Require {
                 "an outage of a length alone has an earliest start",
             );
         }
-        if self.model.is_none() && self.outage == Ask::Longest {
+        if self.model.is_none() && self.outage == OutageRequest::Longest {
             return refused(
                 "--outage longest needs a MODEL",
                 "without one, give a length in seconds",
@@ -131,12 +124,12 @@ impl Command for Require {
     fn run(&self, context: &Context<'_>) -> Result<PlainAnswer> {
         let asked = self.requirements(context)?;
         match (&self.model, &self.catalogue) {
-            (Some(path), _) => asked.given(path, self.vehicle.is_some(), context),
+            (Some(path), _) => asked.judge_imu(path, self.vehicle.is_some(), context),
             (None, Some(directory)) => asked.ranked(&match directory.as_os_str() == BUILT_IN {
                 true => asked.catalogue()?,
                 false => asked.units_of(directory, context)?,
             }),
-            (None, None) => asked.needed().map_err(|e| {
+            (None, None) => asked.required_imu().map_err(|e| {
                 let hint = match e {
                     RequireError::Loose { .. } => "a smaller limit, or a longer outage",
                     _ => "a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)",
@@ -151,7 +144,7 @@ impl Command for Require {
 const NONE: &str = "no unit keeps the limits by figures that are all stated";
 
 impl Require {
-    /// What is asked, with the files read.
+    /// Reads the files and assembles the requirements.
     fn requirements(&self, context: &Context<'_>) -> Result<Requirements> {
         if self.limits.is_empty() {
             return refused(
@@ -181,8 +174,13 @@ impl Require {
 }
 
 impl Requirements {
-    /// What a given IMU makes of the limits.
-    fn given(&self, path: &Path, has_vehicle: bool, context: &Context<'_>) -> Result<PlainAnswer> {
+    /// Judges a given IMU against the limits.
+    fn judge_imu(
+        &self,
+        path: &Path,
+        has_vehicle: bool,
+        context: &Context<'_>,
+    ) -> Result<PlainAnswer> {
         let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
         let file = inputs::model(path, context)?;
         let mut scenario = self.scenario.clone();
@@ -197,10 +195,10 @@ impl Requirements {
         }
         let model = inputs::at_rate(path, &file.model, scenario.imu.rate_hz, context)?;
         let outages = match self.ask {
-            Ask::Longest => self.long_outages(),
+            OutageRequest::Longest => self.long_outages(),
             _ => self.outages(),
         };
-        let judgement = self.judged(&scenario, &model).map_err(unusable)?;
+        let judgement = self.judge_model(&scenario, &model).map_err(unusable)?;
         let margins = judgement.margins.as_ref();
         let is_good = margins.map_or(judgement.outage.length_s() > 0.0, |margins| margins.met);
         let mut document = Document::new(
@@ -234,17 +232,17 @@ impl Requirements {
         let columns = [("limit on", "quantity"), ("{outage_s} s", "points/*/value")];
         document.table(Table::of(&json, "/curves/*", &columns));
         let unmet = margins.filter(|margins| !margins.met).map(|margins| {
-            let Worst { limit, value, .. } = margins.worst;
+            let HardestLimit { limit, value, .. } = margins.worst;
             let [value, most] = [value, limit.most].map(|x| limit.quantity.shown(x));
             Failure::bound(format!(
                 "{} is {value}, the limit is {most}",
                 limit.quantity
             ))
         });
-        Ok(PlainAnswer::new(json, document).judged(unmet))
+        Ok(PlainAnswer::new(json, document).with_unmet(unmet))
     }
 
-    fn verdict(&self, judgement: &Judgement, outages: &[Outage]) -> Vec<String> {
+    fn verdict(&self, judgement: &LimitResult, outages: &[Outage]) -> Vec<String> {
         let longest = &judgement.outage.text;
         let Some(margins) = &judgement.margins else {
             let (limits, starts) = (self.limits_in_words(), starts(outages));
@@ -335,7 +333,7 @@ impl Requirements {
 const CURVE_S: [u32; 7] = [1, 3, 10, 30, 60, 120, 300];
 /// Longest outage that is looked at (s).
 const LONGEST_S: f64 = 600.0;
-/// What confirms a figure of covariance analysis.
+/// Advice for confirming a figure of the covariance analysis.
 const CONFIRM: &str = "confirm with nav-sim run --method both";
 /// Warns of errors that are beyond linear theory.
 fn note_beyond(place: &str, document: &mut Document) {
@@ -354,7 +352,7 @@ fn starts(outages: &[Outage]) -> String {
 }
 
 /// `p95_m 4.87 at the end of outage 300–360 s`
-fn in_words(worst: &Worst, outages: &[Outage]) -> String {
+fn in_words(worst: &HardestLimit, outages: &[Outage]) -> String {
     let outage = outages.get(worst.place).unwrap_or(&outages[0]);
     let place = window(outage.start_s, outage.end_s);
     format!(
@@ -387,14 +385,14 @@ impl Requirements {
 }
 
 /// A quantity and its unit, for axes and heads.
-const fn quantity_in_words(quantity: Quantity) -> &'static str {
+const fn quantity_in_words(quantity: LimitQuantity) -> &'static str {
     match quantity {
-        Quantity::P50 => "horizontal error, median (m)",
-        Quantity::P95 => "horizontal error, 95 % quantile (m)",
-        Quantity::Rmse => "horizontal error, RMSE (m)",
-        Quantity::Roll => "roll, RMSE (°)",
-        Quantity::Pitch => "pitch, RMSE (°)",
-        Quantity::Yaw => "yaw, RMSE (°)",
+        LimitQuantity::P50 => "horizontal error, median (m)",
+        LimitQuantity::P95 => "horizontal error, 95 % quantile (m)",
+        LimitQuantity::Rmse => "horizontal error, RMSE (m)",
+        LimitQuantity::Roll => "roll, RMSE (°)",
+        LimitQuantity::Pitch => "pitch, RMSE (°)",
+        LimitQuantity::Yaw => "yaw, RMSE (°)",
     }
 }
 
@@ -412,7 +410,7 @@ fn bound(which: usize, found: &Bound) -> Value {
 
 /// The outage that is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Ask {
+pub enum OutageRequest {
     /// One of this length (s), from every second on.
     Length(f64),
     /// This one.
@@ -421,8 +419,8 @@ pub enum Ask {
     Longest,
 }
 
-impl Ask {
-    /// How long it lasts at least (s).
+impl OutageRequest {
+    /// Shortest length (s).
     fn length_s(self) -> f64 {
         match self {
             Self::Length(length_s) => length_s,
@@ -443,16 +441,16 @@ const TOGETHER_S: f64 = 60_000.0;
 /// Beginnings at least.
 const BEGINNINGS: f64 = 16.0;
 
-/// What is asked of an IMU, and where.
+/// Requirements on an IMU: limits, outage, trajectory.
 #[derive(Debug)]
 struct Requirements {
     /// Receiver, start and rate.
     scenario: Scenario,
     /// The reference.
     trajectory: Trajectory,
-    /// What the errors at the outage's end may be.
+    /// Limits of the errors at the outage's end.
     limits: Vec<Limit>,
-    ask: Ask,
+    ask: OutageRequest,
     first_s: f64,
 }
 
@@ -466,7 +464,7 @@ impl Requirements {
         scenario: Scenario,
         trajectory: Trajectory,
         limits: Vec<Limit>,
-        ask: Ask,
+        ask: OutageRequest,
         first_s: Option<f64>,
     ) -> Result<Self, Failure> {
         let span_s = (trajectory.start_s(), trajectory.end_s());
@@ -475,7 +473,7 @@ impl Requirements {
         let earlier = first_s.map_or("", |_| ", or an earlier --start");
         let first_s = first_s.unwrap_or(settled_s);
         let begins_s = match ask {
-            Ask::Window(outage) => outage.start_s,
+            OutageRequest::Window(outage) => outage.start_s,
             _ => first_s,
         };
         if begins_s < span_s.0 || begins_s + length_s > span_s.1 {
@@ -500,11 +498,11 @@ impl Requirements {
     ///
     /// # Errors
     /// When no IMU keeps the limits, or trajectory and rates do not fit together.
-    fn needed(&self) -> Result<PlainAnswer, RequireError> {
+    fn required_imu(&self) -> Result<PlainAnswer, RequireError> {
         let outages = self.outages();
         let course = self.course(&outages)?;
         let scenario = &self.with_stated_turn_on();
-        let need = Need {
+        let need = ImuSearch {
             course: &course,
             scenario,
             limits: &self.limits,
@@ -512,7 +510,7 @@ impl Requirements {
         };
         let imu = need.allocated()?;
         let model = imu.model(self.scenario.imu.rate_hz);
-        let worst = Worst::of(&self.limits, &course.drifts(scenario, &model)?)
+        let worst = HardestLimit::of(&self.limits, &course.drifts(scenario, &model)?)
             .expect("at least one limit and one place");
         let turn_on = |sensor| scenario.imu.turn_on_bias(sensor).unwrap_or(0.0);
         let [accel, gyro] = Sensor::ALL.map(turn_on);
@@ -552,8 +550,8 @@ impl Requirements {
             figures.push(json!({
                 "figure": name,
                 "allocated": allocated,
-                "alone": bound(i, &need.quite_alone(&imu, i)?),
-                "others_10_times_better": bound(i, &need.alone(&imu, i, 0.1)?),
+                "alone": bound(i, &need.limit_with_others_perfect(&imu, i)?),
+                "others_10_times_better": bound(i, &need.limit_of(&imu, i, 0.1)?),
             }));
         }
         file.provenance = Some(provenance);
@@ -603,21 +601,22 @@ impl Requirements {
     /// of that length.
     fn bridged(&self, scenario: &Scenario, model: &Model) -> Result<Bridged, RequireError> {
         let long = self.long_outages();
-        let curves = Course::new(scenario, &self.trajectory, &long)?.curves(scenario, model)?;
+        let curves =
+            OutagePlacements::new(scenario, &self.trajectory, &long)?.curves(scenario, model)?;
         let longest = self.longest_of(&curves);
         let length_s = match self.ask {
-            Ask::Longest => longest.length_s(),
+            OutageRequest::Longest => longest.length_s(),
             ask => ask.length_s(),
         };
-        let worst = Worst::of(&self.limits, &after(&curves, length_s));
+        let worst = HardestLimit::of(&self.limits, &after(&curves, length_s));
         Ok((curves, longest, worst))
     }
 
-    /// What a model makes of the limits. `scenario` is that of the unit, with its turn-on biases.
+    /// Judges a model against the limits. `scenario` is that of the unit, with its turn-on biases.
     ///
     /// # Errors
     /// When the model has no filter.
-    fn judged(&self, scenario: &Scenario, model: &Model) -> Result<Judgement, RequireError> {
+    fn judge_model(&self, scenario: &Scenario, model: &Model) -> Result<LimitResult, RequireError> {
         let (curves, outage, worst) = self.bridged(scenario, model)?;
         // of one set of starts: with fewer starts for longer outages the worst of them would fall
         let lasts = |length_s: &u32| !after(&curves, f64::from(*length_s)).is_empty();
@@ -632,7 +631,7 @@ impl Requirements {
             };
             json!({ "quantity": quantity, "points": CURVE_S.map(point) })
         };
-        let (margins, shown) = if self.ask == Ask::Longest {
+        let (margins, shown) = if self.ask == OutageRequest::Longest {
             let shown = worst.map(|worst| {
                 let Outage { start_s, .. } = self.long_outages()[worst.place];
                 let end_s = start_s + outage.length_s();
@@ -646,7 +645,7 @@ impl Requirements {
             (Some(margins), Some(shown))
         };
         let beyond_linear = shown.map(|outage| self.beyond_linear(scenario, model, outage));
-        Ok(Judgement {
+        Ok(LimitResult {
             curves: self.limits.iter().map(of_limit).collect(),
             outage,
             beyond_linear: beyond_linear.transpose()?.flatten(),
@@ -680,8 +679,7 @@ impl Requirements {
         Ok(aided?.into())
     }
 
-    /// Whether `run` would say that the errors in an outage are beyond linear theory: by the covariance analysis that it
-    /// makes.
+    /// Outage whose errors are beyond linear theory by the criterion of `run`, if any.
     fn beyond_linear(
         &self,
         scenario: &Scenario,
@@ -707,7 +705,7 @@ impl Requirements {
     /// When a model has no filter, with its name, or the longest outage is asked for.
     fn ranked(&self, units: &[CatalogueUnit]) -> Result<PlainAnswer> {
         let ranked = |unit: &CatalogueUnit| {
-            let judged = self.judged(&unit.scenario, &unit.model);
+            let judged = self.judge_model(&unit.scenario, &unit.model);
             let mut judgement = judged.refuse_within(&unit.name)?;
             let is_complete = unit.not_stated.is_empty();
             let mut kept = "not met";
@@ -780,11 +778,11 @@ impl Requirements {
         let columns = [("unit", "unit"), ("not stated", "missing")];
         document.table(Table::of(&json, "/units/*", &columns));
         document.text(RULE);
-        Ok(PlainAnswer::new(json, document).judged(unmet))
+        Ok(PlainAnswer::new(json, document).with_unmet(unmet))
     }
 
     /// The longest outage of which all places are within the limits, in whole seconds. The first place holds the longest.
-    fn longest_of(&self, curves: &[Vec<Drift>]) -> Longest {
+    fn longest_of(&self, curves: &[Vec<Drift>]) -> LongestOutage {
         let first = curves.first().map_or(&[][..], Vec::as_slice);
         let lengths: Vec<f64> = first.iter().map(|d| d.after_s).collect();
         let is_missed = |length_s: &f64| {
@@ -811,7 +809,7 @@ impl Requirements {
             Some(s) => format!("{} s", seconds(s)),
             None => at_least(),
         };
-        Longest {
+        LongestOutage {
             longest_s,
             at_least_s: longest_s.is_none().then_some(at_least_s),
             text,
@@ -835,7 +833,7 @@ impl Requirements {
     /// The places of the outage; those of one second where the longest is sought.
     fn outages(&self) -> Vec<Outage> {
         match self.ask {
-            Ask::Window(outage) => vec![outage],
+            OutageRequest::Window(outage) => vec![outage],
             ask => self.places(ask.length_s(), ask.length_s()),
         }
     }
@@ -858,7 +856,7 @@ impl Requirements {
         };
         let places = match self.ask {
             // Where the longest is sought every length is, at all places that leave room for it.
-            Ask::Longest => self.places(self.ask.length_s(), self.mean_length_s()),
+            OutageRequest::Longest => self.places(self.ask.length_s(), self.mean_length_s()),
             _ => self.outages(),
         };
         places.into_iter().map(lasting).collect()
@@ -872,8 +870,8 @@ impl Requirements {
         longest_s * (1.0 - 0.5 * longest_s / left_s)
     }
 
-    fn course(&self, outages: &[Outage]) -> Result<Course<'_>, ExperimentError> {
-        Course::new(&self.scenario, &self.trajectory, outages)
+    fn course(&self, outages: &[Outage]) -> Result<OutagePlacements<'_>, ExperimentError> {
+        OutagePlacements::new(&self.scenario, &self.trajectory, outages)
     }
 
     fn question(&self, outages: &[Outage]) -> Value {
@@ -910,7 +908,7 @@ fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
 
 /// The longest outage that keeps the limits.
 #[derive(Debug, Serialize)]
-struct Longest {
+struct LongestOutage {
     /// Its length (s).
     #[serde(skip_serializing_if = "Option::is_none")]
     longest_s: Option<f64>,
@@ -920,7 +918,7 @@ struct Longest {
     text: String,
 }
 
-impl Longest {
+impl LongestOutage {
     /// Length that is bridged (s).
     fn length_s(&self) -> f64 {
         self.longest_s.or(self.at_least_s).unwrap_or_default()
@@ -928,12 +926,12 @@ impl Longest {
 }
 
 /// Curves of errors, the longest outage within the limits, and the hardest limit.
-type Bridged = (Vec<Vec<Drift>>, Longest, Option<Worst>);
+type Bridged = (Vec<Vec<Drift>>, LongestOutage, Option<HardestLimit>);
 
-/// What a model makes of its limits.
+/// Result of a model against the limits.
 #[derive(Debug, Serialize)]
-struct Judgement {
-    outage: Longest,
+struct LimitResult {
+    outage: LongestOutage,
     /// The quantity of each limit, at its worst place, after outages of growing length: of the places that allow them all.
     curves: Vec<Value>,
     /// The outage of the answer, where it is beyond linear theory.
@@ -945,7 +943,7 @@ struct Judgement {
 
 // Units of a catalogue against a limit.
 
-/// What a ranking takes for granted.
+/// Assumptions of a ranking.
 const RULE: &str = "A figure that is missing counts as none: open means that the limit would be kept then. Turn-on bias is the repeatability from one switching-on to the next, or that of the grade; an initial tolerance of the zero offset counts as removed before use. Figures named without a sensor are missing for both.";
 
 /// `bias, accel turn-on`: figures that both sensors lack are named once.

@@ -21,13 +21,6 @@ use std::path::{Path, PathBuf};
 /// Writes replicate_1, replicate_2, … and a manifest.json with the parameters that were drawn. The same seed gives the
 /// same noise with and without contamination, and at any number of threads.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim synthesize calib_data/consumer_mems.toml \\
-      --replicates 9 --samples 65536 --spread --seed 1 -o replicates
-  nav-sim synthesize calib_data/consumer_mems.toml --replicates 8 --samples 65536 \\
-      --axes x --contaminate section5-II -o corrupted
-  nav-sim synthesize calib_data/tactical.toml --duration 600 -o tactical")]
 pub struct Synthesize {
     /// Noise model (TOML)
     #[arg(value_name = "MODEL")]
@@ -315,12 +308,14 @@ fn reaches(
 }
 
 fn find(name: &str, rate_hz: f64) -> Result<Contamination> {
-    contamination_file::find(name, rate_hz).map_err(|e| match contamination_file::meant(name) {
-        _ if Path::new(name).exists() => e,
-        Some(meant) => e.hint(format!("did you mean \"{meant}\"?")),
-        None => {
-            let known = contamination_file::names().join(", ");
-            e.hint(format!("give a file or one of {known}"))
+    contamination_file::find(name, rate_hz).map_err(|e| {
+        match contamination_file::nearest_preset(name) {
+            _ if Path::new(name).exists() => e,
+            Some(meant) => e.hint(format!("did you mean \"{meant}\"?")),
+            None => {
+                let known = contamination_file::names().join(", ");
+                e.hint(format!("give a file or one of {known}"))
+            }
         }
     })
 }

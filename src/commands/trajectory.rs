@@ -1,7 +1,7 @@
 //! `nav-sim trajectory`: reference trajectories.
 
 use crate::app::inputs::ScenarioArgs;
-use crate::app::{Asked, Command, Context, Failure, Out, PlainAnswer, Result, inputs};
+use crate::app::{Command, Context, Failure, Invocation, Out, PlainAnswer, Result, inputs};
 use crate::io::trajectory_file::{self, parse_origin};
 use crate::parse;
 use crate::report::{gnss_csv, imu_csv, initial_toml};
@@ -20,11 +20,6 @@ use std::path::PathBuf;
 
 /// Make, check and convert reference trajectories
 #[derive(clap::Args)]
-#[command(before_help = "\
-Examples:
-  nav-sim trajectory check trajectories/land_vehicle.toml
-  nav-sim trajectory generate trajectories/fixed_wing.toml --rate-hz 10 -o flight.csv
-  nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 1 -o drive.csv")]
 pub(crate) struct TrajectoryArgs {
     #[command(subcommand)]
     pub(crate) command: TrajectoryCommand,
@@ -36,30 +31,20 @@ pub(crate) enum TrajectoryCommand {
     ///
     /// Columns: time, latitude, longitude, height, velocity north, east, down, roll, pitch, yaw. Numbers have
     /// enough digits to be read back exactly.
-    #[command(before_help = "\
-Examples:
-  nav-sim trajectory generate trajectories/land_vehicle.toml -o drive.csv
-  nav-sim trajectory generate trajectories/fixed_wing.toml --rate-hz 10 -o flight.csv.gz
-  nav-sim trajectory generate trajectories/figure_eight.toml --rate-hz 1")]
-    Generate(Asked<Convert>),
-    Check(Asked<CheckTrajectory>),
+    Generate(Invocation<Convert>),
+    Check(Invocation<CheckTrajectory>),
     /// Convert a trajectory file of any kind to a nav-sim table, or to TUM
     ///
     /// The rows are those of the input, or evenly spaced ones with --rate-hz. Local coordinates become latitude,
     /// longitude and height. A path without attitude gets the heading and pitch along it. With -o FILE.tum the rows are those of
     /// TUM, as evo reads them: t x y z qx qy qz qw, east, north, up of --origin (default: the first row), body forward, left, up.
-    #[command(before_help = "\
-Examples:
-  nav-sim trajectory convert trajectories/figure_eight.toml -o eight.csv
-  nav-sim trajectory convert trajectories/fixed_wing.toml --rate-hz 20 -o denser.csv.gz
-  nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 10 -o drive.tum")]
-    Convert(Asked<Convert>),
-    Record(Asked<Record>),
+    Convert(Invocation<Convert>),
+    Record(Invocation<Record>),
 }
 
 /// The trajectory of a command.
 #[derive(clap::Args, Debug)]
-struct Source {
+struct TrajectorySource {
     /// Motion profile (.toml) or table (.csv, .tsv, .txt, also .gz)
     #[arg(id = "trajectory", value_name = "TRAJECTORY")]
     path: PathBuf,
@@ -74,7 +59,7 @@ fn origin(text: &str) -> Result<[f64; 3], String> {
         .ok_or_else(|| "not LAT_DEG,LON_DEG,H_M with a latitude within ±89.9".to_owned())
 }
 
-impl Source {
+impl TrajectorySource {
     /// Reads it, and warns of what is doubtful about it.
     fn read(&self, context: &Context<'_>) -> Result<(Trajectory, Vec<String>)> {
         let read = trajectory_file::load(&self.path, self.origin)?;
@@ -87,7 +72,7 @@ impl Source {
 #[derive(clap::Args, Debug)]
 pub struct Convert {
     #[command(flatten)]
-    source: Source,
+    source: TrajectorySource,
     /// Instants per second (default: of generate 100, of convert the rows of the input)
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
     pub(crate) rate_hz: Option<f64>,
@@ -127,14 +112,9 @@ impl Command for Convert {
 /// it. The difference is the error of the strapdown algorithm at this rate. Closure beyond a bound and motion beyond
 /// a limit end with exit code 3. Velocity columns that contradict the positions are warnings.
 #[derive(clap::Args, Debug)]
-#[command(before_help = "\
-Examples:
-  nav-sim trajectory check trajectories/land_vehicle.toml
-  nav-sim trajectory check trajectories/fixed_wing.toml --rate-hz 200 --max-position-m 0.001
-  nav-sim trajectory check trajectories/figure_eight.toml --limit-speed 15 --format json")]
 pub struct CheckTrajectory {
     #[command(flatten)]
-    source: Source,
+    source: TrajectorySource,
     /// IMU rate at which the closure is computed
     #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = parse::rate_hz)]
     rate_hz: f64,
@@ -261,7 +241,7 @@ impl Command for CheckTrajectory {
         let unmet = (!missed.is_empty()).then(|| Failure::bound(message).hint(hints.join("; ")));
         let lines = [path, closes].into_iter().chain(table);
         let document = Document::new("Trajectory", Tone::Good, lines);
-        Ok(PlainAnswer::new(json, document).judged(unmet))
+        Ok(PlainAnswer::new(json, document).with_unmet(unmet))
     }
 }
 
@@ -271,15 +251,9 @@ impl Command for CheckTrajectory {
 /// initial.toml (a start drawn from the initial standard deviations). The noise is that of the first run of
 /// `run` with the same seed; a turn-on bias that MODEL states is drawn too.
 #[derive(clap::Args, Debug)]
-#[command(before_help = "\
-Examples:
-  nav-sim trajectory record trajectories/land_vehicle.toml calib_data/tactical.toml -o recorded
-  nav-sim trajectory record trajectories/figure_eight.toml calib_data/tactical.toml --seed 1
-  nav-sim trajectory record trajectories/fixed_wing.toml calib_data/consumer_mems.toml \\
-      --scenario examples/scenario.toml -o flight")]
 pub struct Record {
     #[command(flatten)]
-    source: Source,
+    source: TrajectorySource,
     /// Noise model of the IMU
     #[arg(value_name = "MODEL")]
     model: PathBuf,

@@ -26,14 +26,6 @@ use std::path::PathBuf;
 /// covariance analysis along the trajectory. Where no factor makes the filter consistent, the exit code is 3 and no model
 /// is written.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim tune calib_data/tactical.toml --truth calib_data/consumer_mems.toml -o tuned.toml
-  nav-sim tune calib_data/tactical.toml --for mean \\
-      --truth calib_data/tactical.toml calib_data/consumer_mems.toml \\
-      --trajectory trajectories/figure_eight.toml --outage 60:90
-  nav-sim tune calib_data/tactical.toml --filter 15 --format json \\
-      --truth calib_data/consumer_mems.toml")]
 pub struct Tune {
     /// Noise model to be tuned
     model: PathBuf,
@@ -103,7 +95,7 @@ impl Command for Tune {
         });
         Ok(PlainAnswer::new(found.json(), found.document())
             .with(tuned)
-            .judged(unmet))
+            .with_unmet(unmet))
     }
 }
 
@@ -124,8 +116,8 @@ impl Tune {
         }
     }
 
-    /// What may be true, at the rate of the IMU: noise, turn-on bias, and what the scenario states of the true IMU and
-    /// receiver.
+    /// Candidate truths at the rate of the IMU: noise, turn-on bias, and the scenario's errors of
+    /// the true IMU and receiver.
     fn true_errors(&self, scenario: &Scenario, context: &Context<'_>) -> Result<Vec<TrueErrors>> {
         let truth = |path: &PathBuf| {
             let file = inputs::model(path, context)?;
@@ -207,7 +199,7 @@ impl Tune {
         truths: &[TrueErrors],
         track: &Track,
         outages: &[Outage],
-    ) -> std::result::Result<Tuning, BeliefError> {
+    ) -> std::result::Result<TuneResult, BeliefError> {
         let mut scenario = given.clone();
         match self.filter {
             // what goes with the filter of 21 states beside the model stays
@@ -242,7 +234,7 @@ impl Tune {
         };
         let factors = task.factors()?;
         let after = task.consistency(task.filter, &factors)?;
-        Ok(Tuning {
+        Ok(TuneResult {
             filter: self.filter,
             filter_of_run,
             before: Task { track, ..task }.consistency(task.filter, &[])?,
@@ -321,7 +313,7 @@ const UNCHANGED: f64 = 0.01;
 
 /// Factors, and the filter before and after them.
 #[derive(Debug, Clone)]
-struct Tuning {
+struct TuneResult {
     /// The filter that was tuned.
     filter: FilterStates,
     /// The filter that `run` makes of the model unless told otherwise.
@@ -355,7 +347,7 @@ fn kind(found: &FilterConsistency) -> VerdictKind {
     }
 }
 
-impl Tuning {
+impl TuneResult {
     /// The factors and their cost, then the filters that they make.
     fn verdict(&self) -> Vec<String> {
         let name = filter_name(self.filter);
@@ -394,7 +386,7 @@ impl Tuning {
         lines
     }
 
-    /// What covers the errors of the vehicle's own measurements.
+    /// Factor that covers the errors of the vehicle's own measurements.
     fn of_aiding(&self) -> Option<String> {
         let factor = self.aiding_sigmas.filter(|factor| *factor != 1.0)?;
         Some(if factor.is_nan() {
@@ -435,7 +427,7 @@ impl Tuning {
         (is_overconfident || is_at_limit).then(unmet)
     }
 
-    /// What helps there.
+    /// Advice where the factors are of no use.
     fn remedy(&self) -> &'static str {
         match self.aim {
             _ if !self.without_factor.is_empty() => {
@@ -470,7 +462,7 @@ impl Tuning {
     }
 }
 
-impl Tuning {
+impl TuneResult {
     fn json(&self) -> Value {
         let end = |(after_s, rmse): (&f64, &[f64; REPORTED_NAMES.len()])| {
             json!({
@@ -546,7 +538,7 @@ fn factors_in_words(changed: &[&Factor]) -> String {
     changed.iter().map(word).collect::<Vec<_>>().join(", ")
 }
 
-impl Tuning {
+impl TuneResult {
     fn document(&self) -> Document {
         let found = kind(&self.after);
         let tone = match self.fault() {
@@ -583,7 +575,7 @@ impl Tuning {
     }
 }
 
-impl Tuning {
+impl TuneResult {
     /// State, time and truth of the largest error.
     fn place(&self, found: &FilterConsistency) -> String {
         let mut place = REPORTED_NAMES[found.largest.state].to_owned();
@@ -623,8 +615,8 @@ mod tests {
         }
     }
 
-    fn result(filter: FilterStates, of_run: FilterConsistency) -> Tuning {
-        Tuning {
+    fn result(filter: FilterStates, of_run: FilterConsistency) -> TuneResult {
+        TuneResult {
             aiding_sigmas: None,
             filter,
             filter_of_run: FilterStates::Reduced15,

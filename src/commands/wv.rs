@@ -13,7 +13,7 @@ use nav_sim_calibration::{
     Diagnosis, Pool, Replicate, Settings, calibrate, diagnose, duration, grouped, median,
     replicates,
 };
-use nav_sim_document::{Axis, Cell, Chart, Colour, Document, Panel, Series, Table, Tone};
+use nav_sim_document::{Cell, Chart, ChartAxis, Colour, Document, Panel, Series, Table, Tone};
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::wavelet::{WaveletError, haar, interval};
 use rayon::prelude::*;
@@ -21,23 +21,18 @@ use std::path::PathBuf;
 
 /// Compute wavelet variances (classical, robust) and Allan deviations of static recordings
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim wv calib_data/formats/own.csv
-  nav-sim wv calib_data/formats/euroc.csv --axes gyro --intervals large-sample
-  nav-sim wv calib_data/formats/compressed.csv.gz --format json -o static.wv.json")]
 pub struct Wv {
     /// Recordings, or directories of recordings
     #[arg(id = "recording", required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// How they are read.
+    /// Options for reading them.
     #[command(flatten)]
     pub recordings: RecordingRequest,
     /// Scales and robustness.
     #[command(flatten)]
     tuning: VarianceRequest,
-    /// Where the degrees of freedom of the intervals come from: eta3, the field's usual ones, conservative beyond the
-    /// first scale; large-sample, the autocovariance of the coefficients: with the stated coverage
+    /// Degrees of freedom of the intervals: eta3, the customary ones, conservative beyond the first
+    /// scale; large-sample, from the autocovariance of the coefficients, with the stated coverage
     #[arg(long, value_parser = parse::one_of::<Intervals>(&Intervals::NAMES), default_value_t, help_heading = "Wavelet variance")]
     intervals: Intervals,
 }
@@ -113,7 +108,7 @@ impl Wv {
     }
 }
 
-/// Where the degrees of freedom of intervals are from.
+/// Source of the degrees of freedom of intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Intervals {
     /// The field's usual ones, conservative beyond the first scale.
@@ -216,8 +211,8 @@ fn chart(file: &SignalsFile, channel: Channel) -> Chart {
     };
     Chart::new(
         &format!("{} {}", sensor_name(channel.sensor), channel.axis),
-        Axis::log("scale τ (s)"),
-        vec![Panel::new(Axis::log(variance), series)],
+        ChartAxis::log("scale τ (s)"),
+        vec![Panel::new(ChartAxis::log(variance), series)],
     )
     .small()
     .in_group("scales")
@@ -307,7 +302,7 @@ fn ratios(s: &SignalCurves) -> impl Iterator<Item = (f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::curves::Band;
+    use crate::report::curves::VarianceBand;
     use nav_sim_signal::imu::{Axis, Sensor};
 
     fn file(count: usize) -> SignalsFile {
@@ -315,7 +310,7 @@ mod tests {
         let tau_s: Vec<f64> = (1..=14).map(|j| f64::from(j).exp2() / 100.0).collect();
         let wv: Vec<f64> = tau_s.iter().map(|tau| 1.0 / tau).collect();
         let edof: Vec<f64> = (1..=14).map(|j| 1e5 / f64::from(j).exp2()).collect();
-        let band = |factor: f64, status: &str| Band {
+        let band = |factor: f64, status: &str| VarianceBand {
             wv: wv.iter().map(|x| x * factor).collect(),
             ci_low: wv.clone(),
             ci_high: wv.clone(),

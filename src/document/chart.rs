@@ -1,17 +1,17 @@
-//! What a chart shows, before it is drawn.
+//! Contents of a chart, before it is drawn.
 
 /// An axis.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Axis {
+pub struct ChartAxis {
     /// Quantity and unit, such as `time (s)`.
     pub label: String,
-    /// Whether it runs by powers of ten; what is not positive is not shown then.
+    /// True for a logarithmic axis, which leaves out values that are not positive.
     pub is_log: bool,
-    /// What it shows at least.
+    /// Range that it always shows.
     pub include: Option<(f64, f64)>,
 }
 
-impl Axis {
+impl ChartAxis {
     /// A linear axis.
     pub fn linear(label: &str) -> Self {
         Self {
@@ -41,7 +41,7 @@ impl Axis {
 /// A colour of the palette, which the blind to red or green can tell apart too (Okabe and Ito).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Colour {
-    /// That of the text: measurements.
+    /// Colour of text: measurements.
     Ink,
     /// Grey: what stands in the background.
     Soft,
@@ -52,11 +52,11 @@ pub enum Colour {
 impl Colour {
     /// Hues of the palette.
     pub const HUES: usize = 8;
-    /// What a filter or a model believes.
+    /// Standard deviation stated by a filter or a model.
     pub const BELIEVED: Self = Self::Hue(0);
-    /// What is true.
+    /// True or measured error.
     pub const REAL: Self = Self::Hue(1);
-    /// Where a right filter or model stays.
+    /// Region in which a consistent filter or model stays.
     pub const RIGHT: Self = Self::Hue(2);
 
     /// Class of the style sheet.
@@ -69,10 +69,10 @@ impl Colour {
     }
 }
 
-/// How a line is drawn.
+/// Style of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stroke {
-    /// As most are.
+    /// Solid line of normal width.
     Plain,
     /// One of many.
     Thin,
@@ -96,7 +96,7 @@ impl Stroke {
 
 /// A point and its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
+pub struct PointInterval {
     /// Where.
     pub x: f64,
     /// The value.
@@ -107,7 +107,7 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// What is drawn of a series.
+/// Mark of a series: line, points, band.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Mark {
     /// A line through points (x, y); a value that cannot be shown breaks it.
@@ -115,7 +115,7 @@ pub enum Mark {
     /// The area between two curves (x, low, high).
     Band(Vec<(f64, f64, f64)>),
     /// Points with error bars.
-    Points(Vec<Interval>),
+    Points(Vec<PointInterval>),
     /// A line at one value of y.
     Level(f64),
     /// The area between two values of y.
@@ -131,7 +131,7 @@ pub struct Series {
     pub name: String,
     /// Colour.
     pub colour: Colour,
-    /// What is drawn.
+    /// Its mark.
     pub mark: Mark,
 }
 
@@ -156,7 +156,7 @@ impl Series {
         colour: Colour,
         points: impl IntoIterator<Item = (f64, f64, f64)>,
     ) -> Self {
-        let point = |(x, y, half): (f64, f64, f64)| Interval {
+        let point = |(x, y, half): (f64, f64, f64)| PointInterval {
             x,
             y,
             low: y - half,
@@ -179,8 +179,8 @@ impl Series {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
     /// Its own axis.
-    pub y: Axis,
-    /// What is in it, the first at the bottom.
+    pub y: ChartAxis,
+    /// Series of the panel, the first at the bottom.
     pub series: Vec<Series>,
     /// Its height as a share of the usual one.
     pub height: f64,
@@ -188,7 +188,7 @@ pub struct Panel {
 
 impl Panel {
     /// A panel of the usual height.
-    pub fn new(y: Axis, series: Vec<Series>) -> Self {
+    pub fn new(y: ChartAxis, series: Vec<Series>) -> Self {
         Self {
             y,
             series,
@@ -202,7 +202,7 @@ impl Panel {
     }
 }
 
-/// How much room a chart takes.
+/// Size of a chart on the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Size {
     /// The whole width: drawn twice, for a screen and for a phone.
@@ -214,25 +214,25 @@ pub enum Size {
 /// Panels above one another with one x axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
-    /// What it shows, in words.
+    /// Title in words.
     pub title: String,
     /// The axis of all panels.
-    pub x: Axis,
+    pub x: ChartAxis,
     /// From top to bottom.
     pub panels: Vec<Panel>,
     /// Vertical stripes (from, to), such as outages, and what they are.
     pub stripes: (String, Vec<(f64, f64)>),
-    /// Whether x and y have one scale, as on a map.
+    /// True if x and y share one scale, as on a map.
     pub is_map: bool,
     /// Charts of one group are zoomed together, and show their values at the same x.
     pub group: String,
-    /// How much room it takes.
+    /// Size on the page.
     pub size: Size,
 }
 
 impl Chart {
     /// A chart of one or more panels, of the whole width.
-    pub fn new(title: &str, x: Axis, panels: Vec<Panel>) -> Self {
+    pub fn new(title: &str, x: ChartAxis, panels: Vec<Panel>) -> Self {
         Self {
             title: title.to_owned(),
             x,
@@ -246,10 +246,10 @@ impl Chart {
 
     /// A map: east to the right, north up, in metres, one scale.
     pub fn map(title: &str, series: Vec<Series>) -> Self {
-        let panel = Panel::new(Axis::linear("north (m)"), series);
+        let panel = Panel::new(ChartAxis::linear("north (m)"), series);
         Self {
             is_map: true,
-            ..Self::new(title, Axis::linear("east (m)"), vec![panel])
+            ..Self::new(title, ChartAxis::linear("east (m)"), vec![panel])
         }
     }
 
@@ -257,7 +257,7 @@ impl Chart {
     pub fn over_time(title: &str, panels: Vec<Panel>, outages: &[(f64, f64)]) -> Self {
         Self {
             stripes: ("outage".to_owned(), outages.to_vec()),
-            ..Self::new(title, Axis::linear("time (s)"), panels).in_group("time")
+            ..Self::new(title, ChartAxis::linear("time (s)"), panels).in_group("time")
         }
     }
 

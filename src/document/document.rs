@@ -59,7 +59,7 @@ pub enum Block {
     Charts(Vec<Chart>, String),
     /// Files beside the document: relative path and what is there.
     Links(Vec<(String, String)>),
-    /// What few want to see, under a title.
+    /// Details folded away under a title.
     Folded(String, Vec<Block>),
 }
 
@@ -72,7 +72,7 @@ pub struct Document {
     pub tone: Tone,
     /// The answer: one sentence each, of at most 120 characters, the most important first.
     pub verdict: Vec<String>,
-    /// What follows the verdict.
+    /// Blocks after the verdict.
     pub blocks: Vec<Block>,
     notes: Vec<Note>,
 }
@@ -222,7 +222,7 @@ impl Document {
     }
 
     /// The notes that a terminal shows, the most important first; all of them to those who ask for more.
-    pub fn spoken(&self, is_verbose: bool) -> impl Iterator<Item = &Note> {
+    pub fn shown_notes(&self, is_verbose: bool) -> impl Iterator<Item = &Note> {
         let is_spoken = move |note: &&Note| is_verbose || note.importance < Importance::Detail;
         self.notes()
             .iter()
@@ -275,9 +275,12 @@ mod terminal_tests {
             text.ends_with("  12\n  … 27 more rows (--verbose)\n") && text.lines().count() <= 18,
             "{text}"
         );
-        let spoken: Vec<&str> = document.spoken(false).map(|n| n.text.as_str()).collect();
+        let spoken: Vec<&str> = document
+            .shown_notes(false)
+            .map(|n| n.text.as_str())
+            .collect();
         assert_eq!(spoken, ["last said, first told", "remark 0", "remark 1"]);
-        assert_eq!(document.spoken(true).count(), 7);
+        assert_eq!(document.shown_notes(true).count(), 7);
         assert!(document.verbose(100).contains("\n  39\n"));
     }
 }

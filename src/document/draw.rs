@@ -1,6 +1,6 @@
 //! Charts as SVG: layout, axes, stripes; for a screen and for a phone, so that text is never scaled.
 
-use crate::chart::{Axis, Chart, Interval, Mark, Panel, Series, Stroke};
+use crate::chart::{Chart, ChartAxis, Mark, Panel, PointInterval, Series, Stroke};
 use crate::number::readable;
 use std::fmt::Write as _;
 
@@ -30,12 +30,12 @@ pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
     });
     let left = 10.0 + labels.fold(24.0, f64::max);
     for (i, panel, range) in shown {
-        let mut x = Ruler {
+        let mut x = AxisScale {
             range: x_range,
             is_log,
             pixels: (left, canvas.width - GAP),
         };
-        let mut y = Ruler {
+        let mut y = AxisScale {
             range,
             is_log: panel.y.is_log,
             pixels: (0.0, 0.0),
@@ -58,7 +58,7 @@ pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
 }
 
 /// Gives both rulers of a map one scale and returns its height.
-fn equalise(x: &mut Ruler, y: &mut Ruler, canvas: &Canvas) -> f64 {
+fn equalise(x: &mut AxisScale, y: &mut AxisScale, canvas: &Canvas) -> f64 {
     let width = x.pixels.1 - x.pixels.0;
     let spans = [x.range.1 - x.range.0, y.range.1 - y.range.0];
     let height = (width * spans[1] / spans[0]).clamp(0.4 * canvas.map, canvas.map);
@@ -74,7 +74,7 @@ impl Frame {
     /// Ticks and grid; returns the height of what stands below the plot.
     fn grid(
         &self,
-        x_axis: &Axis,
+        x_axis: &ChartAxis,
         canvas: &Canvas,
         y_ticks: &[(f64, String)],
         is_last: bool,
@@ -189,11 +189,11 @@ fn values(mark: &Mark) -> (Vec<f64>, Vec<f64>) {
     }
 }
 
-/// How far beyond the main curves a logarithmic axis follows others.
+/// Largest factor by which a logarithmic axis extends beyond the main curves for others.
 const BEYOND: f64 = 30.0;
 
-/// What a panel shows: what is far beyond the main curves is cut, so that it does not flatten them. Bands and
-/// auxiliary lines may leave the panel.
+/// Range of the vertical axis. Values far beyond the main curves are cut, so that they do not
+/// flatten them; bands and auxiliary lines may leave the panel.
 fn y_range(panel: &Panel) -> Option<(f64, f64)> {
     let is_log = panel.y.is_log;
     let main = panel.series.iter().flat_map(|s| match &s.mark {
@@ -217,7 +217,7 @@ fn y_range(panel: &Panel) -> Option<(f64, f64)> {
 // Ranges, ticks and their labels.
 
 /// From values to pixels along one axis.
-struct Ruler {
+struct AxisScale {
     /// First and last value shown.
     range: (f64, f64),
     is_log: bool,
@@ -225,7 +225,7 @@ struct Ruler {
     pixels: (f64, f64),
 }
 
-impl Ruler {
+impl AxisScale {
     fn at(&self, value: f64) -> f64 {
         let along = |v: f64| if self.is_log { v.log10() } else { v };
         let (low, high) = (along(self.range.0), along(self.range.1));
@@ -244,13 +244,13 @@ impl Ruler {
     }
 }
 
-/// Whether a value can be shown on an axis, which may be logarithmic.
+/// Returns true if an axis, which may be logarithmic, can show the value.
 fn is_shown(value: f64, is_log: bool) -> bool {
     value.is_finite() && (!is_log || value > 0.0)
 }
 
-/// What an axis shows: the values with some air, none without a value.
-fn range(axis: &Axis, values: impl Iterator<Item = f64>, air: f64) -> Option<(f64, f64)> {
+/// Range of an axis: the values with a margin; none without a value.
+fn range(axis: &ChartAxis, values: impl Iterator<Item = f64>, air: f64) -> Option<(f64, f64)> {
     let extra = axis.include.into_iter().flat_map(|(low, high)| [low, high]);
     let shown = values.chain(extra).filter(|v| is_shown(*v, axis.is_log));
     let (low, high) = extremes(shown)?;
@@ -280,7 +280,7 @@ fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 }
 
 /// Places of an axis that have a label, and the labels; `most`: about how many.
-fn ticks(axis: &Axis, range: (f64, f64), most: usize) -> Vec<(f64, String)> {
+fn ticks(axis: &ChartAxis, range: (f64, f64), most: usize) -> Vec<(f64, String)> {
     if axis.is_log && range.1 / range.0 >= 6.0 {
         decades(range, most)
     } else {
@@ -359,7 +359,7 @@ fn power(factor: i32, exponent: i32) -> String {
 mod marks_tests {
     use super::*;
 
-    fn labels(axis: &Axis, range: (f64, f64)) -> Vec<String> {
+    fn labels(axis: &ChartAxis, range: (f64, f64)) -> Vec<String> {
         ticks(axis, range, 8)
             .into_iter()
             .map(|(_, label)| label)
@@ -369,27 +369,27 @@ mod marks_tests {
     #[test]
     fn ticks_are_round_numbers() {
         assert_eq!(
-            labels(&Axis::linear(""), (0.0, 900.0)),
+            labels(&ChartAxis::linear(""), (0.0, 900.0)),
             ["0", "200", "400", "600", "800"]
         );
         assert_eq!(
-            labels(&Axis::linear(""), (-0.021, 0.02)),
+            labels(&ChartAxis::linear(""), (-0.021, 0.02)),
             ["−0.02", "−0.01", "0", "0.01", "0.02"]
         );
         assert_eq!(
-            labels(&Axis::log(""), (0.4, 12.0)),
+            labels(&ChartAxis::log(""), (0.4, 12.0)),
             ["0.5", "1", "2", "5", "10"]
         );
         assert_eq!(
-            labels(&Axis::log(""), (0.02, 3e3)),
+            labels(&ChartAxis::log(""), (0.02, 3e3)),
             ["0.1", "1", "10", "100", "1000"]
         );
         assert_eq!(
-            labels(&Axis::log(""), (3e-9, 2e-6)),
+            labels(&ChartAxis::log(""), (3e-9, 2e-6)),
             ["10⁻⁸", "10⁻⁷", "10⁻⁶"]
         );
         assert_eq!(
-            labels(&Axis::log(""), (0.9, 1.3))
+            labels(&ChartAxis::log(""), (0.9, 1.3))
                 .first()
                 .map(String::as_str),
             Some("0.9")
@@ -398,7 +398,7 @@ mod marks_tests {
 
     #[test]
     fn many_decades_are_labelled_now_and_then() {
-        let shown = ticks(&Axis::log(""), (1e-12, 1e3), 5);
+        let shown = ticks(&ChartAxis::log(""), (1e-12, 1e3), 5);
         assert_eq!(
             shown
                 .iter()
@@ -410,7 +410,7 @@ mod marks_tests {
 
     #[test]
     fn ends_of_the_range_are_ends_of_the_axis() {
-        let ruler = Ruler {
+        let ruler = AxisScale {
             range: (1.0, 100.0),
             is_log: true,
             pixels: (200.0, 0.0),
@@ -425,18 +425,21 @@ mod marks_tests {
     #[test]
     fn a_range_holds_what_can_be_shown() {
         let values = [f64::NAN, -1.0, 0.0, 1.0, 100.0];
-        let (low, high) = range(&Axis::log(""), values.into_iter(), 0.0).unwrap();
+        let (low, high) = range(&ChartAxis::log(""), values.into_iter(), 0.0).unwrap();
         assert_eq!((low, high), (1.0, 100.0));
         assert_eq!(
             range(
-                &Axis::linear("").including(-3.0, 5.0),
+                &ChartAxis::linear("").including(-3.0, 5.0),
                 values.into_iter(),
                 0.0
             ),
             Some((-3.0, 100.0))
         );
-        assert_eq!(range(&Axis::linear(""), [f64::NAN].into_iter(), 0.0), None);
-        let (low, high) = range(&Axis::linear(""), [2.0].into_iter(), 0.0).unwrap();
+        assert_eq!(
+            range(&ChartAxis::linear(""), [f64::NAN].into_iter(), 0.0),
+            None
+        );
+        let (low, high) = range(&ChartAxis::linear(""), [2.0].into_iter(), 0.0).unwrap();
         assert!(low < 2.0 && high > 2.0);
     }
 }
@@ -514,7 +517,8 @@ pub fn one_line(text: &str) -> String {
     text.chars().map(shown).collect()
 }
 
-/// Whether a character turns the direction of what follows, and so shows a name as another (Unicode TR 36, sec. 2.1).
+/// Returns true for a character that turns the direction of the text after it, and so disguises a
+/// name (Unicode TR 36, sec. 2.1).
 const fn turns(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
@@ -536,7 +540,7 @@ const SWATCH: f64 = 24.0;
 const SPACE: f64 = 16.0;
 
 /// A name and all that has it; of stripes no series.
-struct Entry<'a> {
+struct LegendEntry<'a> {
     name: &'a str,
     /// The first panel that shows it, and tells it.
     panel: usize,
@@ -544,18 +548,18 @@ struct Entry<'a> {
 }
 
 /// Names that are told. One name alone is told by the axis.
-struct Legend<'a>(Vec<Entry<'a>>);
+struct Legend<'a>(Vec<LegendEntry<'a>>);
 
 impl<'a> Legend<'a> {
     fn of(chart: &'a Chart) -> Self {
-        let mut entries: Vec<Entry<'a>> = Vec::new();
+        let mut entries: Vec<LegendEntry<'a>> = Vec::new();
         for (panel, of_panel) in chart.panels.iter().enumerate() {
             for series in &of_panel.series {
                 let is_beside = matches!(series.mark, Mark::Place(..));
                 match entries.iter_mut().find(|e| e.name == series.name) {
                     _ if series.name.is_empty() || is_beside => {}
                     Some(entry) => entry.series.push(series),
-                    None => entries.push(Entry {
+                    None => entries.push(LegendEntry {
                         name: &series.name,
                         panel,
                         series: vec![series],
@@ -565,7 +569,7 @@ impl<'a> Legend<'a> {
         }
         let (name, stripes) = &chart.stripes;
         if !stripes.is_empty() && !chart.is_map {
-            entries.push(Entry {
+            entries.push(LegendEntry {
                 name,
                 panel: 0,
                 series: Vec::new(),
@@ -666,8 +670,8 @@ const MANY: usize = 150;
 
 /// Rulers of one panel.
 struct Frame {
-    x: Ruler,
-    y: Ruler,
+    x: AxisScale,
+    y: AxisScale,
     /// Points of a line that can be told apart.
     most: usize,
 }
@@ -738,7 +742,7 @@ impl Frame {
         pieces.map(closed).collect()
     }
 
-    fn points(&self, points: &[Interval], svg: &mut String) {
+    fn points(&self, points: &[PointInterval], svg: &mut String) {
         // more lie on one another
         let every = points.len().div_ceil(self.most).max(1);
         let shown = || {
@@ -747,8 +751,8 @@ impl Frame {
                 .step_by(every)
                 .filter(|p| self.shows(p.x, p.y))
         };
-        let with_bar = |p: &&Interval| !(p.low.is_nan() && p.high.is_nan());
-        let bar = |p: &Interval| {
+        let with_bar = |p: &&PointInterval| !(p.low.is_nan() && p.high.is_nan());
+        let bar = |p: &PointInterval| {
             let [low, high] =
                 [p.low, p.high].map(|end| self.y.within(if end.is_nan() { p.y } else { end }));
             format!("M{:.1} {low:.1}V{high:.1}", self.x.at(p.x))
@@ -842,7 +846,7 @@ mod axis_tests {
     use super::*;
 
     fn frame(is_log: bool) -> Frame {
-        let ruler = |is_log, pixels| Ruler {
+        let ruler = |is_log, pixels| AxisScale {
             range: (1.0, 11.0),
             is_log,
             pixels,

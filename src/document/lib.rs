@@ -28,7 +28,7 @@ mod table;
 // L5: documents
 mod document;
 
-pub use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Series, Size, Stroke};
+pub use chart::{Chart, ChartAxis, Colour, Mark, Panel, PointInterval, Series, Size, Stroke};
 pub use document::{Block, Document, Importance, NOTES, Note, Tone};
 pub use draw::{escape, one_line};
 pub use number::{readable, seconds, short_names, shortest, six_digits, window};

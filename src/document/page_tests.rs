@@ -1,6 +1,6 @@
 #[cfg(feature = "pictures")]
 use crate::encode;
-use crate::{Axis, Cell, Chart, Colour, Document, Mark, Panel, Series, Table, Tone, svg};
+use crate::{Cell, Chart, ChartAxis, Colour, Document, Mark, Panel, Series, Table, Tone, svg};
 
 fn chart() -> Chart {
     let curve = (0..50)
@@ -20,8 +20,8 @@ fn chart() -> Chart {
         vec![(0.0, 1.0), (49.0, f64::NAN)],
     )];
     let panels = vec![
-        Panel::new(Axis::log("error (m)"), upper),
-        Panel::new(Axis::linear("ratio"), lower),
+        Panel::new(ChartAxis::log("error (m)"), upper),
+        Panel::new(ChartAxis::linear("ratio"), lower),
     ];
     Chart {
         group: String::new(),
@@ -67,8 +67,8 @@ fn a_page_is_self_contained() {
 fn nothing_to_show_is_said() {
     let empty = Chart::new(
         "t",
-        Axis::linear("x"),
-        vec![Panel::new(Axis::log("y"), vec![])],
+        ChartAxis::linear("x"),
+        vec![Panel::new(ChartAxis::log("y"), vec![])],
     );
     assert!(page(&empty).contains("No value to show."));
     let picture = svg("title", &[empty, chart()]);
@@ -171,8 +171,8 @@ fn a_legend_stays_within_its_picture() {
     ];
     let html = page(&Chart::new(
         "t",
-        Axis::linear("x"),
-        vec![Panel::new(Axis::linear("y"), lines)],
+        ChartAxis::linear("x"),
+        vec![Panel::new(ChartAxis::linear("y"), lines)],
     ));
     assert!(
         !html.contains(&format!(">{name}</text>")) && html.matches("…").count() >= 2,

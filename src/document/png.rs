@@ -6,7 +6,8 @@ use std::sync::Arc;
 /// Dots an inch of a PNG; an SVG's pixel is 1/96 inch.
 const DENSITY: f32 = 300.0;
 const PIXELS_AN_INCH: f32 = 96.0;
-/// Of a PNG: a taller picture has fewer dots an inch, so that no viewer refuses it.
+/// Largest number of dots of a PNG: a taller picture has fewer dots per inch, so that no viewer
+/// refuses it.
 const MOST_DOTS: f32 = 8e7;
 
 /// With the font that is compiled in: the same drawing on every machine, also where no font is installed.

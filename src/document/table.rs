@@ -9,7 +9,7 @@ use serde_json::Value;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cell {
     pub(crate) text: String,
-    /// Where its number stands in the result as JSON, as a JSON pointer.
+    /// JSON pointer to its number in the answer.
     pub(crate) pointer: String,
     pub(crate) is_number: bool,
 }
@@ -81,13 +81,13 @@ impl Table {
         self.rows.push(cells.into_iter().collect());
     }
 
-    /// Whether it has no row.
+    /// Returns true if it has no row.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
-    /// Whether all cells of a column are numbers.
+    /// Returns true if all cells of a column are numbers.
     pub(crate) fn is_numeric(&self, column: usize) -> bool {
         !self.rows.is_empty()
             && self

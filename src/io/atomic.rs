@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// What this process is writing. Whoever gives an output its name holds the list meanwhile, so that an
+/// Temporary files of this process. The list is locked while an output gets its name, so that an
 /// interrupt finds the output whole or without its name.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 /// Claims of this process.
@@ -333,7 +333,7 @@ impl AtomicDir {
 /// Outputs that are this command's own until this is dropped.
 #[derive(Debug)]
 #[must_use = "another command may write there as soon as this is dropped"]
-pub(crate) struct Claim {
+pub(crate) struct OutputClaim {
     outputs: Vec<PathBuf>,
     marker: Option<Temporary>,
     /// True if a process was killed that had claimed the same.
@@ -343,7 +343,7 @@ pub(crate) struct Claim {
 /// Name of the marker in a directory of outputs; ending of the one beside an output.
 const MARKER: &str = ".claim";
 
-impl Claim {
+impl OutputClaim {
     /// True if another nav-sim may write there: the disk has no locks.
     pub(crate) fn is_shared(&self) -> bool {
         self.marker
@@ -390,7 +390,7 @@ impl Claim {
     }
 }
 
-impl Drop for Claim {
+impl Drop for OutputClaim {
     fn drop(&mut self) {
         let mut claimed = locked(&CLAIMED);
         self.outputs
@@ -423,18 +423,18 @@ pub(crate) fn claim_file<'a>(
     output: &Path,
     kind: &str,
     inputs: impl IntoIterator<Item = &'a Path>,
-) -> Result<Claim, Failure> {
+) -> Result<OutputClaim, Failure> {
     guard_inputs(output, inputs)?;
     drop(AtomicFile::open(output).map_err(|e| Failure::unwritable(output, e))?);
     if fs::metadata(output).is_ok_and(|m| !m.is_file()) {
-        return Ok(Claim {
+        return Ok(OutputClaim {
             outputs: Vec::new(),
             marker: None,
             is_left: false,
         });
     }
     let output_at = resolved(output);
-    let claim = Claim::new(output, &marker_beside(&output_at), vec![output_at.clone()])?;
+    let claim = OutputClaim::new(output, &marker_beside(&output_at), vec![output_at.clone()])?;
     remove_abandoned(&output_at);
     guard_others(output, kind)?;
     Ok(claim)
@@ -486,30 +486,30 @@ pub(crate) fn claim_directory<'a>(
     files: &[impl AsRef<str>],
     inputs: impl Iterator<Item = &'a Path> + Clone,
     force: bool,
-    recognise: impl FnOnce(&str) -> Found,
-) -> Result<Claim, Failure> {
+    recognise: impl FnOnce(&str) -> DirectoryState,
+) -> Result<OutputClaim, Failure> {
     for name in files {
         guard_inputs(&directory.join(name.as_ref()), inputs.clone())?;
     }
     AtomicDir::create(directory)?; // dropped at once
-    let claim = Claim::of_directory(directory, files)?;
+    let claim = OutputClaim::of_directory(directory, files)?;
     remove_abandoned(directory);
     remove_abandoned(&directory.join(INSIDE));
     let last = directory.join(files.last().map_or("", AsRef::as_ref));
     let found = match fs::read_to_string(&last) {
         // killed where it put its files in place
-        Err(_) if claim.is_left || is_empty(directory) => Found::Same,
-        Err(_) => Found::Foreign,
+        Err(_) if claim.is_left || is_empty(directory) => DirectoryState::Same,
+        Err(_) => DirectoryState::Foreign,
         Ok(text) => recognise(&text),
     };
     match found {
-        Found::Foreign => Err(foreign(directory)),
-        Found::Other if !force => {
+        DirectoryState::Foreign => Err(foreign(directory)),
+        DirectoryState::Other if !force => {
             let why = "holds the result of another configuration, other inputs or another seed";
             Err(refused(directory, why)
                 .or_hint("name another place for it, or replace it with --force"))
         }
-        Found::Other | Found::Same => Ok(claim),
+        DirectoryState::Other | DirectoryState::Same => Ok(claim),
     }
 }
 
@@ -560,8 +560,8 @@ fn is_part(path: &Path) -> bool {
         && (name == "report.html" || manifest.contains(&format!("\"{name}\": \"")))
 }
 
-/// What stands in a directory of results, told by its last file, which appears when the others are whole.
-pub(crate) enum Found {
+/// State of a directory of results, told by its last file, which appears when the others are whole.
+pub(crate) enum DirectoryState {
     /// Nothing that may be replaced.
     Foreign,
     /// A result of another configuration, other inputs or another seed.

@@ -37,7 +37,7 @@ fn what_killed_writers_left_goes_with_the_next_claim() {
             &["b.csv"],
             std::iter::empty(),
             false,
-            |_| Found::Same,
+            |_| DirectoryState::Same,
         ),
     );
     write(&path, "whole").unwrap();
@@ -186,7 +186,7 @@ fn a_manifest_stands_beside_its_own_files_only() {
     let claim = || {
         let (inputs, force) = (std::iter::empty(), false);
         claim_directory(dir.path(), &["manifest.json"], inputs, force, |_| {
-            Found::Same
+            DirectoryState::Same
         })
     };
     assert!(claim().is_err());
@@ -240,7 +240,7 @@ fn a_claim_without_a_lock_is_shared() {
     let dir = tempfile::tempdir().unwrap();
     let whole = claim_file(&dir.path().join("a.csv"), ".csv", []).unwrap();
     assert!(!whole.is_shared());
-    let unlocked = Claim {
+    let unlocked = OutputClaim {
         outputs: Vec::new(),
         marker: Some(Temporary::new(dir.path().join("b.claim"), None)),
         is_left: false,

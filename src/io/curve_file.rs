@@ -25,7 +25,7 @@ pub(crate) struct NamedCurve {
     pub curve: Curve,
 }
 
-/// What a curve file is.
+/// Layouts of a curve file, in words.
 const LAYOUT: &str = "a curve is a CSV with the columns tau_samples,wv,edof (tau_samples = 2, 4, 8, …), or a .wv.json \
                       written by calibrate or wv";
 
@@ -36,7 +36,7 @@ const LAYOUT: &str = "a curve is a CSV with the columns tau_samples,wv,edof (tau
 pub(crate) fn read(path: &Path) -> Result<Vec<NamedCurve>, Failure> {
     let text = source::text(path).map_err(|e| Failure::io(path, e))?;
     parse(&path.display().to_string(), &text)
-        .map_err(|e| file_kind::unless(&[FileKind::Curve], path, e.or_hint(LAYOUT)))
+        .map_err(|e| file_kind::or_wrong_kind(&[FileKind::Curve], path, e.or_hint(LAYOUT)))
 }
 
 fn parse(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
@@ -78,7 +78,7 @@ fn csv(path: &str, text: &str) -> Result<NamedCurve, Failure> {
     })
 }
 
-/// What tells the file of `wv` from that of `calibrate`.
+/// Key that distinguishes a file of `wv` from one of `calibrate`.
 #[derive(serde::Deserialize)]
 struct Signals {
     signals: Option<serde::de::IgnoredAny>,

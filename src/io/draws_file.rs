@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// The version of the layout.
 const SCHEMA_VERSION: u32 = 1;
 
-/// What the file holds.
+/// Bootstrap draws beside a model file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DrawsFile {
     /// Layout version.
@@ -29,11 +29,11 @@ pub struct DrawsFile {
 /// The draws of one fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SignalDraws {
-    /// What was fitted: `accel`, or `accel.x` alone.
+    /// Signals of the fit: `accel`, or `accel.x` alone.
     pub signals: String,
-    /// What distances from the median of the draws are multiplied by.
+    /// Factor on the distances of the draws from their median.
     pub stretch: f64,
-    /// What the columns are: process and parameter, as in the model file.
+    /// Names of the columns: process and parameter, as in the model file.
     pub parameters: Vec<String>,
     /// The fit itself: a model file that has other values is not of these draws.
     pub estimate: Vec<f64>,
@@ -46,11 +46,11 @@ pub struct SignalDraws {
 pub struct Draws {
     /// One model a draw.
     pub models: Vec<Model>,
-    /// What distances from the median of whatever follows from them are multiplied by.
+    /// Factor on the distances from the median, for any quantity computed from the draws.
     pub stretch: f64,
 }
 
-/// Where the draws of a model file stand.
+/// Path of the draws of a model file.
 #[must_use]
 pub(crate) fn beside(model: &Path) -> PathBuf {
     model.with_extension("draws.json")
@@ -104,7 +104,7 @@ fn values(composite: &Composite) -> Vec<f64> {
 }
 
 impl DrawsFile {
-    /// Of what stands for some outcomes in navigation; none where one of them has no draws.
+    /// Draws of the models used in navigation; none if one outcome has no draws.
     #[must_use]
     pub fn of(outcomes: &[Outcome], rate_hz: f64) -> Option<Self> {
         let signals = |outcome: &Outcome| {

@@ -1,4 +1,4 @@
-//! What kind of file a path holds, by its ending and its contents.
+//! Kind of a file, from its extension and contents.
 
 use super::fusion_files::{FIXES, bare_row, is_nmea, is_rtklib};
 use super::table::{Quantity, quantities};
@@ -21,7 +21,7 @@ pub(crate) enum FileKind {
     Contamination,
     /// Wavelet-variance curves.
     Curve,
-    /// What this program noted of a result, which no command reads by itself: manifests, draws, summaries.
+    /// Record of a result that no command reads alone: manifests, draws, summaries.
     Record,
     /// A trajectory.
     Trajectory,
@@ -62,7 +62,7 @@ impl FileKind {
 }
 
 /// The refusal of a file that was expected to be of other kinds.
-pub(crate) fn unless(expected: &[FileKind], path: &Path, refusal: Failure) -> Failure {
+pub(crate) fn or_wrong_kind(expected: &[FileKind], path: &Path, refusal: Failure) -> Failure {
     // of what is known no better, the reader's own advice says more
     let is_vague = |kind: &FileKind| *kind == FileKind::Other && refusal.advice().is_some();
     let is_other = |kind: &FileKind| !(expected.contains(kind) || is_vague(kind));
@@ -75,7 +75,7 @@ pub(crate) fn unless(expected: &[FileKind], path: &Path, refusal: Failure) -> Fa
     }
 }
 
-/// What a path holds. A pipe is read, and reads the same again.
+/// Kind of the file at a path. A pipe is read, and reads the same again.
 ///
 /// # Errors
 /// When the system refuses.
@@ -88,7 +88,7 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, Failure> {
         return Ok(FileKind::Recording);
     }
     match logs::kind_of(path) {
-        Some(nav_sim_logs::Kind::Npz) => return Ok(FileKind::Recording),
+        Some(nav_sim_logs::LogFormat::Npz) => return Ok(FileKind::Recording),
         Some(_) => return Ok(FileKind::Log),
         None => {}
     }
@@ -123,7 +123,8 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, Failure> {
     })
 }
 
-/// What does not parse is read as a scenario, whose reader says where it is wrong.
+/// Kind of a TOML table. Text that does not parse counts as a scenario, whose reader reports the
+/// fault.
 fn toml_kind(table: &toml::Table) -> FileKind {
     let has = |keys: &[&str]| keys.iter().any(|key| table.contains_key(*key));
     let sensors = || {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// A file that was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Input {
-    /// What for: "trajectory", "model", "truth", "static", "scenario".
+    /// Role: "trajectory", "model", "truth", "static", "scenario".
     pub role: String,
     /// Path as given.
     pub path: String,

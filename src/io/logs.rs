@@ -1,7 +1,7 @@
 //! Logs of robots, flight controllers and receivers ([`nav_sim_logs`]), among the files that are read.
 
 use super::{Failure, Place, source};
-use nav_sim_logs::{Damage, Error, Fault, HEAD, Kind, Log, Stamp, recognise};
+use nav_sim_logs::{HEAD, Log, LogError, LogFault, LogFormat, Stamp, Truncation, recognise};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -17,7 +17,7 @@ pub struct LogOptions {
 
 /// The kind of log that a file is by its first bytes; none for tables and arrays. What cannot be opened is for its reader
 /// to refuse, and a pipe gives its bytes once.
-pub(crate) fn kind_of(path: &Path) -> Option<Kind> {
+pub(crate) fn kind_of(path: &Path) -> Option<LogFormat> {
     std::fs::metadata(path)
         .ok()
         .filter(std::fs::Metadata::is_file)?;
@@ -37,31 +37,31 @@ pub(crate) fn open(path: &Path) -> Result<Log, Failure> {
 }
 
 /// The refusal of a log, with what helps.
-pub(crate) fn refused(path: &Path, error: Error) -> Failure {
+pub(crate) fn refused(path: &Path, error: LogError) -> Failure {
     let hint = error.hint();
     let refusal = |place| Failure::contents(path.display(), place, &error);
     match error.fault {
-        Fault::Topic => {
+        LogFault::Topic => {
             refusal(Place::Within).or_hint("--topic NAME names one (nav-sim inspect lists them)")
         }
-        Fault::NoTopic => {
+        LogFault::NoTopic => {
             refusal(Place::Within).or_hint("nav-sim inspect lists what it has: name another file")
         }
-        Fault::TimeBack => {
+        LogFault::TimeBack => {
             refusal(Place::Within).or_option(("stamp", "--stamp log takes the times of arrival"))
         }
-        Fault::NotRead(_) => {
+        LogFault::NotRead(_) => {
             Failure::contents(path.display(), Place::Itself, format!("is {error}"))
                 .or_hint_if(hint.map(|command| format!("convert it: {command}")))
         }
-        Fault::Io(source) => Failure::io(path, source),
+        LogFault::Io(source) => Failure::io(path, source),
         _ => refusal(Place::Within).or_hint_if(hint.map(str::to_owned)),
     }
 }
 
 /// Warning of a cut at which the reading ended.
-pub(crate) fn cut_off(damage: &Damage) -> String {
-    let Damage {
+pub(crate) fn cut_off(damage: &Truncation) -> String {
+    let Truncation {
         error,
         read_bytes,
         file_bytes,

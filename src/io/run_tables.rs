@@ -4,7 +4,7 @@ use super::Failure;
 use nav_sim_navigation::metrics::EpochRow;
 use nav_sim_navigation::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunRecord};
 
-/// What to do about a damaged table: it was written by the program.
+/// Hint for a damaged table, which the program itself wrote.
 pub(crate) const REPEAT: &str = "repeat the run, or put back its files";
 
 /// Gives the cell of a column in a row; an empty one is NaN.

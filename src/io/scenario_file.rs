@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::file_kind::{self, FileKind};
-use super::toml_file::Source;
+use super::toml_file::TomlSource;
 use nav_sim_navigation::scenario::Scenario;
 use std::path::Path;
 
@@ -11,11 +11,11 @@ use std::path::Path;
 /// # Errors
 /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
 pub(crate) fn read(path: &Path) -> Result<Scenario, Failure> {
-    let refused = |e| file_kind::unless(&[FileKind::Scenario, FileKind::Study], path, e);
-    from_source(&Source::read(path)?).map_err(refused)
+    let refused = |e| file_kind::or_wrong_kind(&[FileKind::Scenario, FileKind::Study], path, e);
+    from_source(&TomlSource::read(path)?).map_err(refused)
 }
 
-fn from_source(source: &Source) -> Result<Scenario, Failure> {
+fn from_source(source: &TomlSource) -> Result<Scenario, Failure> {
     let scenario: Scenario = source.get()?;
     scenario.validate().map_err(|e| source.setting(&e))?;
     Ok(scenario)
@@ -27,7 +27,7 @@ mod tests {
     use serde_json::Value;
 
     fn refused(text: &str) -> (String, Option<String>) {
-        let error = from_source(&Source::new("s.toml", text)).unwrap_err();
+        let error = from_source(&TomlSource::new("s.toml", text)).unwrap_err();
         (error.to_string(), error.advice())
     }
 
@@ -164,7 +164,7 @@ mod tests {
         } else {
             format!("[{section}]")
         };
-        let source = Source::new("s.toml", &format!("{head}\n{beside}{name} = {value}\n"));
+        let source = TomlSource::new("s.toml", &format!("{head}\n{beside}{name} = {value}\n"));
         let scenario: Result<Scenario, _> = source.get();
         scenario.map_or(true, |scenario| {
             scenario
@@ -224,6 +224,6 @@ mod tests {
 
     #[test]
     fn states_may_be_a_number() {
-        assert!(from_source(&Source::new("s.toml", "filter.states = 15")).is_ok());
+        assert!(from_source(&TomlSource::new("s.toml", "filter.states = 15")).is_ok());
     }
 }

@@ -1,4 +1,4 @@
-//! Where inputs are opened: what can be read once only is kept, what has no end is refused.
+//! Opens inputs: keeps those that can be read only once, refuses those without end.
 
 use super::Failure;
 use flate2::read::MultiGzDecoder;
@@ -51,8 +51,8 @@ pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
 
 /// Bytes that are read at once.
 const BUFFER: usize = 1 << 17;
-/// How many times its packed size a table may be, beyond [`LARGEST_PIPE`]: tables of measurements pack to a third to a
-/// twentieth, and gzip makes up to 1032 times as much of nothing.
+/// Largest ratio of the unpacked size of a table to its packed size, beyond [`LARGEST_PIPE`]:
+/// measurements pack to a third to a twentieth, and gzip expands zeros up to 1032 times.
 const MOST_PACKED: u64 = 40;
 
 /// Opens a table of text, unpacking it when its name ends in `.gz`.
@@ -70,7 +70,7 @@ pub(crate) fn table(path: &Path) -> io::Result<Box<dyn BufRead>> {
     let packed = std::fs::metadata(path)?.len();
     let largest = LARGEST_PIPE.max(packed.saturating_mul(MOST_PACKED));
     let inner = MultiGzDecoder::new(file).take(largest);
-    let unpacked = Unpacked { inner, largest };
+    let unpacked = UnpackedReader { inner, largest };
     Ok(Box::new(BufReader::with_capacity(BUFFER, unpacked)))
 }
 
@@ -93,12 +93,12 @@ fn lossy(path: &Path, most: u64) -> io::Result<String> {
 }
 
 /// Bytes of a packed table, of which there may be so many: a small file unpacks to any number.
-struct Unpacked<R> {
+struct UnpackedReader<R> {
     inner: io::Take<R>,
     largest: u64,
 }
 
-impl<R: Read> Read for Unpacked<R> {
+impl<R: Read> Read for UnpackedReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.inner.read(buffer)?;
         if self.inner.limit() == 0 {
@@ -182,7 +182,7 @@ mod tests {
         let unpacked = |text: &[u8], largest: u64| {
             let mut out = Vec::new();
             let inner = Cursor::new(text).take(largest);
-            let read = Unpacked { inner, largest }.read_to_end(&mut out);
+            let read = UnpackedReader { inner, largest }.read_to_end(&mut out);
             read.map(|_| out).map_err(|e| e.to_string())
         };
         let rows: Vec<u8> = (0..9000)

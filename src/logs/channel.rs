@@ -1,11 +1,11 @@
 //! Channels of a log.
 
-use crate::input::{Error, Fault};
+use crate::input::{LogError, LogFault};
 use std::collections::BTreeMap;
 
 /// Channel of a log.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Channel {
+pub struct LogChannel {
     /// Topic, or name of the messages.
     pub topic: String,
     /// Type of the messages, as the log names it.
@@ -22,7 +22,7 @@ pub struct Channel {
     pub clock: Clock,
     /// The number by which the format knows it.
     pub(crate) id: u32,
-    /// Of channels of the same content, the lowest is read when none is named.
+    /// Priority among channels of the same content: the lowest is read by default.
     pub(crate) rank: u8,
     /// Encoding of the messages, of which a container may have several.
     pub(crate) encoding: String,
@@ -50,7 +50,7 @@ impl Content {
     }
 }
 
-impl Channel {
+impl LogChannel {
     /// Counts a message.
     pub(crate) fn count(&mut self, ns: i64) {
         self.messages = self.messages.saturating_add(1);
@@ -63,38 +63,39 @@ impl Channel {
 #[derive(Default)]
 pub(crate) struct Scan<'a> {
     /// Channels, by the numbers that the format knows them by.
-    pub(crate) channels: BTreeMap<u32, Channel>,
+    pub(crate) channels: BTreeMap<u32, LogChannel>,
     /// The channel whose samples are read, and their stamps; none while the channels are counted.
-    pub(crate) wanted: Option<(&'a Channel, Stamp)>,
+    pub(crate) wanted: Option<(&'a LogChannel, Stamp)>,
     /// Its samples, each with its byte.
-    pub(crate) samples: Vec<(u64, Sample)>,
+    pub(crate) samples: Vec<(u64, LogSample)>,
 }
 
 /// The channel of such content: the one named, or the only one there.
 pub(crate) fn choose<'a>(
-    channels: &'a [Channel],
+    channels: &'a [LogChannel],
     content: Content,
     topic: Option<&str>,
-) -> Result<&'a Channel, Error> {
-    let mut fitting: Vec<&Channel> = channels.iter().collect();
+) -> Result<&'a LogChannel, LogError> {
+    let mut fitting: Vec<&LogChannel> = channels.iter().collect();
     fitting.retain(|c| c.content == content && c.messages > 0);
-    let topics =
-        |fitting: &[&Channel]| -> Vec<String> { fitting.iter().map(|c| c.topic.clone()).collect() };
+    let topics = |fitting: &[&LogChannel]| -> Vec<String> {
+        fitting.iter().map(|c| c.topic.clone()).collect()
+    };
     let what = content.words();
     if let Some(topic) = topic {
         let named = fitting.iter().find(|c| c.topic == topic).copied();
         let wanted = format!("{what} and the name {topic}");
-        return named.ok_or_else(|| Error::no_topic(&wanted, &topics(&fitting)));
+        return named.ok_or_else(|| LogError::no_topic(&wanted, &topics(&fitting)));
     }
     let rank = fitting.iter().map(|c| c.rank).min();
     fitting.retain(|c| Some(c.rank) == rank);
     match fitting[..] {
-        [] => Err(Error::no_topic(what, &[])),
+        [] => Err(LogError::no_topic(what, &[])),
         [only] => Ok(only),
         _ => {
             let (count, topics) = (fitting.len(), topics(&fitting).join(", "));
             let message = format!("{count} topics have {what}: {topics}");
-            Err(Error::new(Fault::Topic, message))
+            Err(LogError::new(LogFault::Topic, message))
         }
     }
 }
@@ -138,7 +139,7 @@ pub enum Clock {
 
 /// Sample of an IMU, in the sensor's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ImuSample {
+pub struct ImuReading {
     /// Stamp (ns); where the sensor gives increments, the end of their interval.
     pub stamp_ns: i64,
     /// Specific force (m/s²); of increments, the mean over the interval.
@@ -149,7 +150,7 @@ pub struct ImuSample {
 
 /// Position fix of a receiver; messages without a fix in three dimensions are passed over.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Fix {
+pub struct LogFix {
     /// Stamp (ns).
     pub stamp_ns: i64,
     /// Latitude (deg).
@@ -166,13 +167,13 @@ pub struct Fix {
     pub sd_v_ned_m_s: Option<[f64; 3]>,
 }
 
-/// What a message holds. Samples are many, fixes are few.
-pub(crate) enum Sample {
-    Imu(ImuSample),
-    Fix(Box<Fix>),
+/// Contents of a message. Samples are many, fixes are few.
+pub(crate) enum LogSample {
+    Imu(ImuReading),
+    Fix(Box<LogFix>),
 }
 
-impl Sample {
+impl LogSample {
     pub(crate) const fn stamp_ns(&self) -> i64 {
         match self {
             Self::Imu(sample) => sample.stamp_ns,

@@ -1,17 +1,17 @@
 //! Containers of messages in chunks, as MCAP and the bags of ROS 1 are.
 
-use crate::channel::{Content, Fix, ImuSample, NS, Sample, Scan, Stamp, stated};
-use crate::input::{Bytes, Error, Fault, Input, text};
+use crate::channel::{Content, ImuReading, LogFix, LogSample, NS, Scan, Stamp, stated};
+use crate::input::{Bytes, LogError, LogFault, LogInput, text};
 use std::collections::HashMap;
 use std::io;
 use std::io::Read;
 
 /// Record of a container.
-pub(crate) enum Record {
+pub(crate) enum ContainerRecord {
     /// A chunk, whose packed bytes come next.
     Chunk(Chunk),
     /// A message, whose bytes come next.
-    Message(Head),
+    Message(MessageHead),
     /// A channel: its number, topic, type and encoding.
     Channel(u32, [String; 3]),
     /// One that was passed over.
@@ -19,7 +19,7 @@ pub(crate) enum Record {
 }
 
 /// Head of a message.
-pub(crate) struct Head {
+pub(crate) struct MessageHead {
     channel: u32,
     log_ns: i64,
     pub(crate) size: u64,
@@ -28,9 +28,9 @@ pub(crate) struct Head {
 /// Shows all records of a container to `each`, those within chunks too. Who is shown a message reads its bytes or skips
 /// them.
 fn walk(
-    input: &mut Input,
-    each: &mut dyn FnMut(Record, &mut Input) -> Result<(), Error>,
-) -> Result<(), Error> {
+    input: &mut LogInput,
+    each: &mut dyn FnMut(ContainerRecord, &mut LogInput) -> Result<(), LogError>,
+) -> Result<(), LogError> {
     let mut records = Records::default();
     let magic: [u8; 8] = input.array()?;
     let next = match magic == MCAP_MAGIC {
@@ -39,18 +39,18 @@ fn walk(
             let version: [u8; 5] = input.array()?;
             let magic = [&magic[..], &version].concat();
             if magic != BAG_MAGIC {
-                return Err(Error::encoding(0, magic.trim_ascii_end()));
+                return Err(LogError::encoding(0, magic.trim_ascii_end()));
             }
             Records::bag
         }
     };
     while let Some(record) = next(&mut records, input)? {
         match record {
-            Record::Chunk(chunk) => {
+            ContainerRecord::Chunk(chunk) => {
                 let mut inside = chunk.open(input)?;
                 while let Some(record) = next(&mut records, &mut inside)? {
-                    if matches!(record, Record::Chunk(_)) {
-                        return Err(Error::malformed(chunk.offset, "a chunk within a chunk"));
+                    if matches!(record, ContainerRecord::Chunk(_)) {
+                        return Err(LogError::malformed(chunk.offset, "a chunk within a chunk"));
                     }
                     each(record, &mut inside)?;
                 }
@@ -60,7 +60,7 @@ fn walk(
     }
     if records.end == 0 || records.end > input.length() {
         let message = "the end is missing: still being written, or its writer was stopped";
-        return Err(Error::at(input.offset(), Fault::Cut, message));
+        return Err(LogError::at(input.offset(), LogFault::Cut, message));
     }
     Ok(())
 }
@@ -69,12 +69,14 @@ fn walk(
 const LARGEST_MESSAGE: u64 = 1 << 20;
 
 /// Finds and counts the channels of a container, or reads the messages of one, which may stand out of order in the file.
-pub(crate) fn scan(input: &mut Input, scan: &mut Scan<'_>) -> Result<(), Error> {
+pub(crate) fn scan(input: &mut LogInput, scan: &mut Scan<'_>) -> Result<(), LogError> {
     let mut found = Vec::new();
     let channels = &mut scan.channels;
     let outcome = walk(input, &mut |record, input| {
         match (record, scan.wanted) {
-            (Record::Message(head), Some((channel, stamp))) if head.channel == channel.id => {
+            (ContainerRecord::Message(head), Some((channel, stamp)))
+                if head.channel == channel.id =>
+            {
                 let message = Message {
                     log_ns: (stamp == Stamp::Log).then_some(head.log_ns),
                     offset: input.offset(),
@@ -86,11 +88,11 @@ pub(crate) fn scan(input: &mut Input, scan: &mut Scan<'_>) -> Result<(), Error> 
                 };
                 found.extend(sample.map(|sample| (head.log_ns, message.offset, sample)));
             }
-            (Record::Message(head), _) => {
+            (ContainerRecord::Message(head), _) => {
                 input.skip(head.size)?;
                 channels.entry(head.channel).or_default().count(head.log_ns);
             }
-            (Record::Channel(id, [topic, type_name, encoding]), _) => {
+            (ContainerRecord::Channel(id, [topic, type_name, encoding]), _) => {
                 let channel = channels.entry(id).or_default();
                 if channel.topic.is_empty() {
                     channel.content = match type_name.as_str() {
@@ -137,9 +139,13 @@ pub(crate) struct Chunk {
 
 impl Chunk {
     /// Unpacks it: the input stands at its first byte.
-    pub(crate) fn open(&self, input: &mut Input) -> Result<Input, Error> {
+    pub(crate) fn open(&self, input: &mut LogInput) -> Result<LogInput, LogError> {
         if self.unpacked > LARGEST_CHUNK {
-            return Err(Error::too_large(self.offset, self.unpacked, LARGEST_CHUNK));
+            return Err(LogError::too_large(
+                self.offset,
+                self.unpacked,
+                LARGEST_CHUNK,
+            ));
         }
         let packed = input.bytes(self.packed, LARGEST_CHUNK)?;
         let bytes = match self.compression.as_slice() {
@@ -151,25 +157,28 @@ impl Chunk {
             b"lz4" => self.unpack(|| Ok(lz4_flex::frame::FrameDecoder::new(packed.as_slice())))?,
             #[cfg(feature = "bag")]
             b"bz2" => self.unpack(|| Ok(bzip2::read::MultiBzDecoder::new(packed.as_slice())))?,
-            unknown => return Err(Error::encoding(self.offset, unknown)),
+            unknown => return Err(LogError::encoding(self.offset, unknown)),
         };
         if bytes.len() as u64 != self.unpacked {
-            return Err(Error::malformed(
+            return Err(LogError::malformed(
                 self.offset,
                 "a chunk has not the length it states",
             ));
         }
         #[cfg(feature = "mcap")]
         if self.crc != 0 && self.crc != crc32fast::hash(&bytes) {
-            return Err(Error::malformed(self.offset, "CRC failed"));
+            return Err(LogError::malformed(self.offset, "CRC failed"));
         }
-        Ok(Input::chunk(bytes, self.offset))
+        Ok(LogInput::chunk(bytes, self.offset))
     }
 
     /// Unpacks at most a byte more than the chunk states; memory grows with what is unpacked, not with what is stated.
-    fn unpack<R: Read>(&self, decoder: impl FnOnce() -> io::Result<R>) -> Result<Vec<u8>, Error> {
+    fn unpack<R: Read>(
+        &self,
+        decoder: impl FnOnce() -> io::Result<R>,
+    ) -> Result<Vec<u8>, LogError> {
         let fault = |error: io::Error| {
-            Error::malformed(self.offset, format!("a chunk cannot be unpacked: {error}"))
+            LogError::malformed(self.offset, format!("a chunk cannot be unpacked: {error}"))
         };
         let mut bytes = Vec::with_capacity(self.unpacked.min(8 * self.packed) as usize);
         decoder()
@@ -193,11 +202,11 @@ struct Message {
 
 /// Body of a message, and its stamp. Behind the header: in ROS 1 a sequence number, the time, a name; in ROS 2 the same
 /// without the number.
-fn body<'a>(encoding: &str, message: &'a Message) -> Result<(Bytes<'a>, i64), Error> {
+fn body<'a>(encoding: &str, message: &'a Message) -> Result<(Bytes<'a>, i64), LogError> {
     let mut bytes = match encoding {
         "ros1" => Bytes::little(&message.data),
         "cdr" => cdr(message)?,
-        other => return Err(Error::encoding(message.offset, other.as_bytes())),
+        other => return Err(LogError::encoding(message.offset, other.as_bytes())),
     };
     let mut header = || {
         if encoding == "ros1" {
@@ -213,7 +222,7 @@ fn body<'a>(encoding: &str, message: &'a Message) -> Result<(Bytes<'a>, i64), Er
 
 /// Common Data Representation (OMG DDSI-RTPS 2.3, 10.2): the order of bytes, then numbers that are aligned from there
 /// on; in its second version to 4 bytes at most.
-fn cdr(message: &Message) -> Result<Bytes<'_>, Error> {
+fn cdr(message: &Message) -> Result<Bytes<'_>, LogError> {
     let (head, rest) = message
         .data
         .split_at_checked(4)
@@ -224,7 +233,7 @@ fn cdr(message: &Message) -> Result<Bytes<'_>, Error> {
         [0, 6] => (true, 4),
         [0, 7] => (false, 4),
         _ => {
-            return Err(Error::encoding(
+            return Err(LogError::encoding(
                 message.offset,
                 format!("CDR {:02x?}", &head[..2]).as_bytes(),
             ));
@@ -233,15 +242,15 @@ fn cdr(message: &Message) -> Result<Bytes<'_>, Error> {
     Ok(Bytes::new(rest, is_big_endian, most))
 }
 
-fn short(message: &Message) -> Error {
-    Error::malformed(
+fn short(message: &Message) -> LogError {
+    LogError::malformed(
         message.offset,
         format!("a message of {} bytes is too short", message.data.len()),
     )
 }
 
 /// A sample of `sensor_msgs/Imu`: the orientation and the covariances are passed over.
-fn imu(encoding: &str, message: &Message) -> Result<Sample, Error> {
+fn imu(encoding: &str, message: &Message) -> Result<LogSample, LogError> {
     let (mut bytes, stamp_ns) = body(encoding, message)?;
     let mut sample = || {
         bytes.f64s::<{ 4 + 9 }>()?;
@@ -249,7 +258,7 @@ fn imu(encoding: &str, message: &Message) -> Result<Sample, Error> {
         bytes.f64s::<9>()?;
         let accel_m_s2 = bytes.f64s()?;
         bytes.f64s::<9>()?;
-        Some(Sample::Imu(ImuSample {
+        Some(LogSample::Imu(ImuReading {
             stamp_ns,
             accel_m_s2,
             gyro_rad_s,
@@ -259,7 +268,7 @@ fn imu(encoding: &str, message: &Message) -> Result<Sample, Error> {
 }
 
 /// A fix of `sensor_msgs/NavSatFix`; none where its status is below 0.
-fn fix(encoding: &str, message: &Message) -> Result<Option<Sample>, Error> {
+fn fix(encoding: &str, message: &Message) -> Result<Option<LogSample>, LogError> {
     let (mut bytes, stamp_ns) = body(encoding, message)?;
     let mut rest = || {
         let status = bytes.u8()?.cast_signed();
@@ -272,7 +281,7 @@ fn fix(encoding: &str, message: &Message) -> Result<Option<Sample>, Error> {
     let sd = [covariance[4], covariance[0], covariance[8]].map(f64::sqrt);
     let is_fix = status >= 0 && place.iter().all(|v| v.is_finite());
     Ok(is_fix.then(|| {
-        Sample::Fix(Box::new(Fix {
+        LogSample::Fix(Box::new(LogFix {
             stamp_ns,
             lat_deg,
             lon_deg,
@@ -300,7 +309,7 @@ struct Records {
 
 impl Records {
     /// The next record of a bag, or of a chunk of it; none at its end.
-    fn bag(&mut self, input: &mut Input) -> Result<Option<Record>, Error> {
+    fn bag(&mut self, input: &mut LogInput) -> Result<Option<ContainerRecord>, LogError> {
         if input.left() == 0 {
             return Ok(None);
         }
@@ -309,7 +318,7 @@ impl Records {
         let header = input.bytes(length, LONGEST_HEADER)?;
         let size = u64::from(input.u32()?);
         input.expect(size)?;
-        let fault = || Error::malformed(offset, "a record of a bag does not parse");
+        let fault = || LogError::malformed(offset, "a record of a bag does not parse");
         let fields = Fields(&header);
         let record = match fields.bytes(b"op").ok_or_else(fault)? {
             // a message
@@ -318,18 +327,18 @@ impl Records {
             [0x03] => {
                 input.skip(size)?;
                 if let Some(name) = fields.bytes(b"encryptor").filter(|name| !name.is_empty()) {
-                    return Err(Error::encoding(offset, name));
+                    return Err(LogError::encoding(offset, name));
                 }
                 let index = fields.bytes(b"index_pos");
                 let index = index.and_then(|b| Bytes::little(b).u64());
                 self.end = index.ok_or_else(fault)?;
-                Some(Record::Other)
+                Some(ContainerRecord::Other)
             }
             [0x05] => {
                 let compression = fields.bytes(b"compression").ok_or_else(fault)?.to_vec();
                 let unpacked = fields.u32(b"size").ok_or_else(fault)?.into();
                 let offset = input.offset();
-                Some(Record::Chunk(Chunk {
+                Some(ContainerRecord::Chunk(Chunk {
                     offset,
                     compression,
                     packed: size,
@@ -340,7 +349,7 @@ impl Records {
             [0x07] => connection(fields, &input.bytes(size, LARGEST_RECORD)?),
             _ => {
                 input.skip(size)?;
-                Some(Record::Other)
+                Some(ContainerRecord::Other)
             }
         };
         record.ok_or_else(fault).map(Some)
@@ -375,19 +384,19 @@ fn time_ns(bytes: &mut Bytes<'_>) -> Option<i64> {
     Some(i64::from(bytes.u32()?) * NS + i64::from(bytes.u32()?))
 }
 
-fn bag_message(fields: Fields<'_>, size: u64) -> Option<Record> {
+fn bag_message(fields: Fields<'_>, size: u64) -> Option<ContainerRecord> {
     let log_ns = time_ns(&mut Bytes::little(fields.bytes(b"time")?))?;
-    Some(Record::Message(Head {
+    Some(ContainerRecord::Message(MessageHead {
         channel: fields.u32(b"conn")?,
         log_ns,
         size,
     }))
 }
 
-fn connection(fields: Fields<'_>, data: &[u8]) -> Option<Record> {
+fn connection(fields: Fields<'_>, data: &[u8]) -> Option<ContainerRecord> {
     let (topic, type_name) = (fields.bytes(b"topic")?, Fields(data).bytes(b"type")?);
     let named = [text(topic), text(type_name), "ros1".to_owned()];
-    Some(Record::Channel(fields.u32(b"conn")?, named))
+    Some(ContainerRecord::Channel(fields.u32(b"conn")?, named))
 }
 
 // Records of MCAP (<https://mcap.dev/spec>).
@@ -401,7 +410,7 @@ const LARGEST_RECORD: u64 = 64 << 20;
 
 impl Records {
     /// The next record of an MCAP file, or of a chunk of it; none at its end.
-    fn mcap(&mut self, input: &mut Input) -> Result<Option<Record>, Error> {
+    fn mcap(&mut self, input: &mut LogInput) -> Result<Option<ContainerRecord>, LogError> {
         let offset = input.offset();
         if input.left() == 0 {
             return Ok(None);
@@ -409,13 +418,13 @@ impl Records {
         let (code, length) = (input.u8()?, input.u64()?);
         input.expect(length)?;
         let fault = || {
-            Error::malformed(
+            LogError::malformed(
                 offset,
                 format!("record {code:#04x} of {length} bytes does not parse"),
             )
         };
         let record = match code {
-            0x00 => return Err(Error::malformed(offset, "record of kind 0")),
+            0x00 => return Err(LogError::malformed(offset, "record of kind 0")),
             // the footer
             0x02 => {
                 input.skip(length)?;
@@ -430,41 +439,48 @@ impl Records {
                 self.body(code, &body).ok_or_else(fault)?
             }
             0x05 => message(input, length, fault)?,
-            0x06 => Record::Chunk(mcap_chunk(input, length)?),
+            0x06 => ContainerRecord::Chunk(mcap_chunk(input, length)?),
             _ => {
                 input.skip(length)?;
-                Record::Other
+                ContainerRecord::Other
             }
         };
         Ok(Some(record))
     }
 
     /// A record that is read whole.
-    fn body(&mut self, code: u8, body: &[u8]) -> Option<Record> {
+    fn body(&mut self, code: u8, body: &[u8]) -> Option<ContainerRecord> {
         let mut bytes = Bytes::little(body);
         let id = bytes.u16()?;
         match code {
             SCHEMA => {
                 self.types.insert(id, text(bytes.string()?));
-                Some(Record::Other)
+                Some(ContainerRecord::Other)
             }
             _ => {
                 let type_name = self.types.get(&bytes.u16()?).cloned().unwrap_or_default();
                 let (topic, encoding) = (text(bytes.string()?), text(bytes.string()?));
-                Some(Record::Channel(id.into(), [topic, type_name, encoding]))
+                Some(ContainerRecord::Channel(
+                    id.into(),
+                    [topic, type_name, encoding],
+                ))
             }
         }
     }
 }
 
 /// A message behind its channel, number and two times.
-fn message(input: &mut Input, length: u64, fault: impl Fn() -> Error) -> Result<Record, Error> {
+fn message(
+    input: &mut LogInput,
+    length: u64,
+    fault: impl Fn() -> LogError,
+) -> Result<ContainerRecord, LogError> {
     let size = length.checked_sub(22).ok_or_else(&fault)?;
     let channel = u32::from(input.u16()?);
     input.u32()?;
     let log_ns = i64::try_from(input.u64()?).map_err(|_| fault())?;
     input.u64()?;
-    Ok(Record::Message(Head {
+    Ok(ContainerRecord::Message(MessageHead {
         channel,
         log_ns,
         size,
@@ -472,7 +488,7 @@ fn message(input: &mut Input, length: u64, fault: impl Fn() -> Error) -> Result<
 }
 
 /// A chunk behind its times, length, CRC and compression.
-fn mcap_chunk(input: &mut Input, length: u64) -> Result<Chunk, Error> {
+fn mcap_chunk(input: &mut LogInput, length: u64) -> Result<Chunk, LogError> {
     const LONGEST_NAME: u64 = 64;
     let start = input.position();
     input.skip(16)?;
@@ -482,7 +498,7 @@ fn mcap_chunk(input: &mut Input, length: u64) -> Result<Chunk, Error> {
     let packed = input.u64()?;
     let offset = input.offset();
     if (input.position() - start).checked_add(packed) != Some(length) {
-        return Err(Error::malformed(
+        return Err(LogError::malformed(
             offset,
             "a chunk has not the length of its record",
         ));

@@ -9,20 +9,20 @@ use std::path::Path;
 /// Bytes that are read at once.
 const BUFFER: usize = 1 << 16;
 
-trait Source: Read + Seek + Send {}
-impl<T: Read + Seek + Send> Source for T {}
+trait ByteSource: Read + Seek + Send {}
+impl<T: Read + Seek + Send> ByteSource for T {}
 
 /// Bytes to be read in order, with seeking.
-pub(crate) struct Input {
-    source: BufReader<Box<dyn Source>>,
+pub(crate) struct LogInput {
+    source: BufReader<Box<dyn ByteSource>>,
     position: u64,
     length: u64,
     /// Byte of the file where the chunk stands whose unpacked bytes these are.
     chunk: Option<u64>,
 }
 
-impl Input {
-    fn new(source: Box<dyn Source>, length: u64, chunk: Option<u64>) -> Self {
+impl LogInput {
+    fn new(source: Box<dyn ByteSource>, length: u64, chunk: Option<u64>) -> Self {
         Self {
             source: BufReader::with_capacity(BUFFER, source),
             position: 0,
@@ -31,7 +31,7 @@ impl Input {
         }
     }
 
-    pub(crate) fn open(path: &Path) -> Result<Self, Error> {
+    pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
         let file = File::open(path)?;
         let length = file.metadata()?.len();
         Ok(Self::new(Box::new(file), length, None))
@@ -61,21 +61,21 @@ impl Input {
     }
 
     /// Holds when so many bytes are there.
-    pub(crate) fn expect(&self, needed: u64) -> Result<(), Error> {
+    pub(crate) fn expect(&self, needed: u64) -> Result<(), LogError> {
         let left = self.left();
         match self.chunk {
             _ if needed <= left => Ok(()),
-            None => Err(Error::truncated(self.position, needed, left)),
-            Some(chunk) => Err(Error::malformed(chunk, "a record goes beyond its chunk")),
+            None => Err(LogError::truncated(self.position, needed, left)),
+            Some(chunk) => Err(LogError::malformed(chunk, "a record goes beyond its chunk")),
         }
     }
 
-    pub(crate) fn skip(&mut self, bytes: u64) -> Result<(), Error> {
+    pub(crate) fn skip(&mut self, bytes: u64) -> Result<(), LogError> {
         self.expect(bytes)?;
         self.seek(self.position + bytes)
     }
 
-    pub(crate) fn seek(&mut self, position: u64) -> Result<(), Error> {
+    pub(crate) fn seek(&mut self, position: u64) -> Result<(), LogError> {
         match position.checked_signed_diff(self.position) {
             Some(step) => self.source.seek_relative(step)?,
             None => _ = self.source.seek(SeekFrom::Start(position))?,
@@ -84,40 +84,40 @@ impl Input {
         Ok(())
     }
 
-    fn fill(&mut self, into: &mut [u8]) -> Result<(), Error> {
+    fn fill(&mut self, into: &mut [u8]) -> Result<(), LogError> {
         self.expect(into.len() as u64)?;
         self.source.read_exact(into)?;
         self.position += into.len() as u64;
         Ok(())
     }
 
-    pub(crate) fn array<const N: usize>(&mut self) -> Result<[u8; N], Error> {
+    pub(crate) fn array<const N: usize>(&mut self) -> Result<[u8; N], LogError> {
         let mut bytes = [0; N];
         self.fill(&mut bytes)?;
         Ok(bytes)
     }
 
-    pub(crate) fn u8(&mut self) -> Result<u8, Error> {
+    pub(crate) fn u8(&mut self) -> Result<u8, LogError> {
         Ok(self.array::<1>()?[0])
     }
 
-    pub(crate) fn u16(&mut self) -> Result<u16, Error> {
+    pub(crate) fn u16(&mut self) -> Result<u16, LogError> {
         self.array().map(u16::from_le_bytes)
     }
 
-    pub(crate) fn u32(&mut self) -> Result<u32, Error> {
+    pub(crate) fn u32(&mut self) -> Result<u32, LogError> {
         self.array().map(u32::from_le_bytes)
     }
 
-    pub(crate) fn u64(&mut self) -> Result<u64, Error> {
+    pub(crate) fn u64(&mut self) -> Result<u64, LogError> {
         self.array().map(u64::from_le_bytes)
     }
 
     /// So many bytes, which are there and not too many: both are known before anything is allocated.
-    pub(crate) fn bytes(&mut self, count: u64, limit: u64) -> Result<Vec<u8>, Error> {
+    pub(crate) fn bytes(&mut self, count: u64, limit: u64) -> Result<Vec<u8>, LogError> {
         self.expect(count)?;
         if count > limit {
-            return Err(Error::too_large(self.offset(), count, limit));
+            return Err(LogError::too_large(self.offset(), count, limit));
         }
         let mut bytes = vec![0; count as usize];
         self.fill(&mut bytes)?;
@@ -252,7 +252,7 @@ pub const HEAD: usize = 4096;
 
 /// Format of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum LogFormat {
     /// MCAP, of ROS 2 or ROS 1.
     Mcap,
     /// Bag of ROS 1, version 2.0.
@@ -267,7 +267,7 @@ pub enum Kind {
     Other(&'static str, &'static str),
 }
 
-impl Kind {
+impl LogFormat {
     /// Name, as in a sentence.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -293,36 +293,36 @@ impl Kind {
 
 const MATLAB: &str =
     "in MATLAB: writematrix(imu, 'imu.csv'), and read it with --columns, which names its columns";
-const NOVATEL: Kind = Kind::Other(
+const NOVATEL: LogFormat = LogFormat::Other(
     "a NovAtel log",
     "fixes to the logs GPGGA, GPRMC and GPGST; counts of the IMU, times its scale factors, to a table t_s, accel_x_m_s2 … \
      gyro_z_rad_s",
 );
-const HDF5: Kind = Kind::Other("an HDF5 file, as MATLAB 7.3 writes", MATLAB);
+const HDF5: LogFormat = LogFormat::Other("an HDF5 file, as MATLAB 7.3 writes", MATLAB);
 /// First bytes of the formats that have such.
-const MAGIC: [(&[u8], Kind); 14] = [
+const MAGIC: [(&[u8], LogFormat); 14] = [
     (b"\xaa\x44\x12", NOVATEL),
     (b"\xaa\x44\x13", NOVATEL),
     (
         b"$IMURAW\0",
-        Kind::Other(
+        LogFormat::Other(
             "an Inertial Explorer .imr",
             "in Inertial Explorer: Tools > View Raw IMU Data, and save it as text with a header that names the units",
         ),
     ),
     (
         b"\xff\x5a",
-        Kind::Other(
+        LogFormat::Other(
             "an SBG log",
             "in sbgCenter or with sbgBasicLogger: export it as CSV or text, with the units in its header",
         ),
     ),
-    (b"\x89MCAP0\r\n", Kind::Mcap),
-    (b"#ROSBAG V", Kind::Bag),
-    (b"ULog\x01\x12\x35", Kind::Ulog),
+    (b"\x89MCAP0\r\n", LogFormat::Mcap),
+    (b"#ROSBAG V", LogFormat::Bag),
+    (b"ULog\x01\x12\x35", LogFormat::Ulog),
     (
         b"SQLite format 3\0",
-        Kind::Other(
+        LogFormat::Other(
             "a SQLite database, as rosbag2 writes (.db3)",
             "mcap convert FILE.db3 FILE.mcap",
         ),
@@ -330,28 +330,28 @@ const MAGIC: [(&[u8], Kind); 14] = [
     // a description of the description of messages comes first
     (
         b"\xa3\x95\x80",
-        Kind::Other(
+        LogFormat::Other(
             "an ArduPilot DataFlash log",
             "mavlogdump.py --format csv --types IMU FILE.bin > imu.csv",
         ),
     ),
     (
         b"MATLAB 5.0 MAT-file",
-        Kind::Other("a MATLAB .mat file", MATLAB),
+        LogFormat::Other("a MATLAB .mat file", MATLAB),
     ),
     (b"MATLAB 7.3 MAT-file", HDF5),
     (b"\x89HDF\r\n\x1a\n", HDF5),
     // preamble of an Xbus message, and the bus itself
     (
         b"\xfa\xff",
-        Kind::Other(
+        LogFormat::Other(
             "an Xsens .mtb log",
             "in MT Manager: File > Export, as ASCII (.txt)",
         ),
     ),
     (
         b"$@",
-        Kind::Other(
+        LogFormat::Other(
             "a Septentrio SBF log",
             "bin2asc -f FILE.sbf -m PVTGeodetic2 -t",
         ),
@@ -367,21 +367,21 @@ pub(crate) const UBX_SYNC: [u8; 2] = [0xb5, 0x62];
 /// ```
 /// use nav_sim_logs::{Kind, recognise};
 ///
-/// assert_eq!(recognise(b"\x89MCAP0\r\n\x01"), Some(Kind::Mcap));
+/// assert_eq!(recognise(b"\x89MCAP0\r\n\x01"), Some(LogFormat::Mcap));
 /// let kind = recognise(b"SQLite format 3\0\x10\0").expect("a known one");
 /// assert_eq!(kind.conversion(), Some("mcap convert FILE.db3 FILE.mcap"));
 /// assert_eq!(recognise(b"t_s,gyro_x\n0.0,1.0\n"), None);
 /// ```
 #[must_use]
-pub fn recognise(head: &[u8]) -> Option<Kind> {
+pub fn recognise(head: &[u8]) -> Option<LogFormat> {
     if let Some((_, kind)) = MAGIC.iter().find(|(magic, _)| head.starts_with(magic)) {
         return Some(*kind);
     }
     if ZIP.iter().any(|magic| head.starts_with(magic)) {
         return Some(if first_name(head).is_some_and(|n| n.ends_with(b".npy")) {
-            Kind::Npz
+            LogFormat::Npz
         } else {
-            Kind::Other("a zip archive", "unzip FILE.zip")
+            LogFormat::Other("a zip archive", "unzip FILE.zip")
         });
     }
     // ASCII logs of NovAtel: `#BESTPOSA,`, short `%RAWIMUSA,`, abbreviated `<BESTPOS `
@@ -400,7 +400,7 @@ pub fn recognise(head: &[u8]) -> Option<Kind> {
         .get(60..80)
         .is_some_and(|label| label == b"RINEX VERSION / TYPE")
     {
-        return Some(Kind::Other(
+        return Some(LogFormat::Other(
             "a RINEX file",
             "rnx2rtkp -o fixes.pos rover.obs base.obs FILE.nav",
         ));
@@ -408,7 +408,7 @@ pub fn recognise(head: &[u8]) -> Option<Kind> {
     head.windows(2)
         .enumerate()
         .any(|(i, w)| w == UBX_SYNC && is_ubx(&head[i..]))
-        .then_some(Kind::Ubx)
+        .then_some(LogFormat::Ubx)
 }
 
 /// Name of the first file in a zip archive.
@@ -443,9 +443,9 @@ pub(crate) fn ubx_checksum(bytes: &[u8]) -> [u8; 2] {
 
 /// Error of reading a log; what to do about it is its [`hint`](Self::hint).
 #[derive(Debug)]
-pub struct Error {
+pub struct LogError {
     /// Kind of the error.
-    pub fault: Fault,
+    pub fault: LogFault,
     /// Byte of the file; that of the chunk for what is packed within it.
     pub offset: Option<u64>,
     /// Topic, where one was being read.
@@ -456,7 +456,7 @@ pub struct Error {
 /// Kinds of errors.
 #[derive(Debug)]
 #[non_exhaustive]
-pub enum Fault {
+pub enum LogFault {
     /// The operating system refused.
     Io(io::Error),
     /// The file ends where its writer did not end it.
@@ -472,10 +472,10 @@ pub enum Fault {
     /// No topic has what is wanted.
     NoTopic,
     /// A format that is known by its first bytes, and is not read.
-    NotRead(Kind),
+    NotRead(LogFormat),
 }
 
-impl Display for Error {
+impl Display for LogError {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         if let Some(offset) = self.offset {
             write!(f, "byte {offset}")?;
@@ -487,17 +487,17 @@ impl Display for Error {
     }
 }
 
-impl std::error::Error for Error {}
+impl std::error::Error for LogError {}
 
-impl From<io::Error> for Error {
+impl From<io::Error> for LogError {
     fn from(e: io::Error) -> Self {
         let message = e.to_string();
-        Self::new(Fault::Io(e), message)
+        Self::new(LogFault::Io(e), message)
     }
 }
 
-impl Error {
-    pub(crate) fn new(fault: Fault, message: impl Into<String>) -> Self {
+impl LogError {
+    pub(crate) fn new(fault: LogFault, message: impl Into<String>) -> Self {
         Self {
             fault,
             offset: None,
@@ -506,7 +506,7 @@ impl Error {
         }
     }
 
-    pub(crate) fn at(offset: u64, fault: Fault, message: impl Into<String>) -> Self {
+    pub(crate) fn at(offset: u64, fault: LogFault, message: impl Into<String>) -> Self {
         Self {
             offset: Some(offset),
             ..Self::new(fault, message)
@@ -514,13 +514,13 @@ impl Error {
     }
 
     pub(crate) fn malformed(offset: u64, message: impl Into<String>) -> Self {
-        Self::at(offset, Fault::Damage, message)
+        Self::at(offset, LogFault::Damage, message)
     }
 
     /// A record beyond the end of the file.
     pub(crate) fn truncated(offset: u64, needed: u64, left: u64) -> Self {
         let message = format!("cut off, a record of {needed} bytes has {left}");
-        Self::at(offset, Fault::Cut, message)
+        Self::at(offset, LogFault::Cut, message)
     }
 
     /// A length beyond what any such message has.
@@ -533,7 +533,7 @@ impl Error {
 
     pub(crate) fn encoding(offset: u64, encoding: &[u8]) -> Self {
         let message = format!("unknown encoding {:?}", text(encoding));
-        Self::at(offset, Fault::Encoding, message)
+        Self::at(offset, LogFault::Encoding, message)
     }
 
     /// No topic of what is wanted among these.
@@ -543,15 +543,15 @@ impl Error {
             _ => format!("; there are {}", topics.join(", ")),
         };
         let fault = match topics {
-            [] => Fault::NoTopic,
-            _ => Fault::Topic,
+            [] => LogFault::NoTopic,
+            _ => LogFault::Topic,
         };
         Self::new(fault, format!("no topic has {what}{there}"))
     }
 
     /// Byte at which a file ends that its writer did not end.
     pub(crate) fn cut(&self) -> Option<u64> {
-        self.offset.filter(|_| matches!(self.fault, Fault::Cut))
+        self.offset.filter(|_| matches!(self.fault, LogFault::Cut))
     }
 
     /// The same, said of a topic.
@@ -564,8 +564,8 @@ impl Error {
     #[must_use]
     pub const fn hint(&self) -> Option<&'static str> {
         match self.fault {
-            Fault::Cut | Fault::Damage => Some("the file is damaged: copy it again"),
-            Fault::NotRead(kind) => kind.conversion(),
+            LogFault::Cut | LogFault::Damage => Some("the file is damaged: copy it again"),
+            LogFault::NotRead(kind) => kind.conversion(),
             _ => None,
         }
     }

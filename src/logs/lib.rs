@@ -45,6 +45,6 @@ mod ulog;
 // L4
 mod log;
 
-pub use channel::{Channel, Clock, Content, Fix, ImuSample, Stamp, in_seconds};
-pub use input::{Error, Fault, HEAD, Kind, recognise};
-pub use log::{Damage, Log};
+pub use channel::{Clock, Content, ImuReading, LogChannel, LogFix, Stamp, in_seconds};
+pub use input::{HEAD, LogError, LogFault, LogFormat, recognise};
+pub use log::{Log, Truncation};

@@ -1,9 +1,11 @@
 //! A log of any format.
 
-use crate::channel::{Channel, Content, Fix, ImuSample, Sample, Scan, Stamp, choose, in_seconds};
+use crate::channel::{
+    Content, ImuReading, LogChannel, LogFix, LogSample, Scan, Stamp, choose, in_seconds,
+};
 #[cfg(any(feature = "mcap", feature = "bag"))]
 use crate::container;
-use crate::input::{Error, Fault, HEAD, Input, Kind, recognise};
+use crate::input::{HEAD, LogError, LogFault, LogFormat, LogInput, recognise};
 use std::path::{Path, PathBuf};
 
 /// Log whose channels are known.
@@ -27,17 +29,17 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct Log {
     path: PathBuf,
-    kind: Kind,
-    channels: Vec<Channel>,
-    damage: Option<Damage>,
+    kind: LogFormat,
+    channels: Vec<LogChannel>,
+    damage: Option<Truncation>,
     read: Read,
 }
 
 /// End of a file that was cut off, at which the reading ended.
 #[derive(Debug)]
-pub struct Damage {
+pub struct Truncation {
     /// The error that it would have been.
-    pub error: Error,
+    pub error: LogError,
     /// Bytes before it.
     pub read_bytes: u64,
     /// Bytes of the file.
@@ -45,31 +47,31 @@ pub struct Damage {
 }
 
 /// Counts the channels of a file, or reads one, in order of time.
-type Read = fn(&mut Input, &mut Scan<'_>) -> Result<(), Error>;
+type Read = fn(&mut LogInput, &mut Scan<'_>) -> Result<(), LogError>;
 
 impl Log {
     /// Opens a file and finds its channels.
     ///
     /// # Errors
     /// When the format is not one that is read, or the file is damaged before its end.
-    pub fn open(path: &Path) -> Result<Self, Error> {
-        let mut input = Input::open(path)?;
+    pub fn open(path: &Path) -> Result<Self, LogError> {
+        let mut input = LogInput::open(path)?;
         let file_bytes = input.length();
         let head = file_bytes.min(HEAD as u64);
         let kind = recognise(&input.bytes(head, head)?)
-            .ok_or_else(|| Error::at(0, Fault::Encoding, "not a known log"))?;
+            .ok_or_else(|| LogError::at(0, LogFault::Encoding, "not a known log"))?;
         let read: Read = match kind {
             #[cfg(feature = "mcap")]
-            Kind::Mcap => container::scan,
+            LogFormat::Mcap => container::scan,
             #[cfg(feature = "bag")]
-            Kind::Bag => container::scan,
+            LogFormat::Bag => container::scan,
             #[cfg(feature = "ulog")]
-            Kind::Ulog => crate::ulog::scan,
+            LogFormat::Ulog => crate::ulog::scan,
             #[cfg(feature = "ubx")]
-            Kind::Ubx => crate::ubx::scan,
+            LogFormat::Ubx => crate::ubx::scan,
             _ => {
                 let message = format!("{}, which is not read", kind.name());
-                return Err(Error::new(Fault::NotRead(kind), message));
+                return Err(LogError::new(LogFault::NotRead(kind), message));
             }
         };
         input.seek(0)?;
@@ -78,14 +80,14 @@ impl Log {
             Ok(()) => None,
             Err(error) => match error.cut() {
                 None => return Err(error),
-                Some(read_bytes) => Some(Damage {
+                Some(read_bytes) => Some(Truncation {
                     error,
                     read_bytes,
                     file_bytes,
                 }),
             },
         };
-        let mut channels: Vec<Channel> = scan.channels.into_values().collect();
+        let mut channels: Vec<LogChannel> = scan.channels.into_values().collect();
         channels.sort_by(|a, b| a.topic.cmp(&b.topic));
         Ok(Self {
             path: path.to_owned(),
@@ -98,19 +100,19 @@ impl Log {
 
     /// Format of the file.
     #[must_use]
-    pub const fn kind(&self) -> Kind {
+    pub const fn kind(&self) -> LogFormat {
         self.kind
     }
 
     /// Channels, in order of their topics.
     #[must_use]
-    pub fn channels(&self) -> &[Channel] {
+    pub fn channels(&self) -> &[LogChannel] {
         &self.channels
     }
 
     /// Cut at which the file is taken to end.
     #[must_use]
-    pub const fn damage(&self) -> Option<&Damage> {
+    pub const fn damage(&self) -> Option<&Truncation> {
         self.damage.as_ref()
     }
 
@@ -118,7 +120,7 @@ impl Log {
     ///
     /// # Errors
     /// When there is no such topic, or several and none is named.
-    pub fn channel(&self, content: Content, topic: Option<&str>) -> Result<&Channel, Error> {
+    pub fn channel(&self, content: Content, topic: Option<&str>) -> Result<&LogChannel, LogError> {
         choose(&self.channels, content, topic)
     }
 
@@ -126,10 +128,10 @@ impl Log {
     ///
     /// # Errors
     /// When the file is damaged before, or stamps go back.
-    pub fn imu(&self, channel: &Channel, stamp: Stamp) -> Result<Vec<ImuSample>, Error> {
+    pub fn imu(&self, channel: &LogChannel, stamp: Stamp) -> Result<Vec<ImuReading>, LogError> {
         self.samples(channel, stamp, |sample| match sample {
-            Sample::Imu(sample) => Some(sample),
-            Sample::Fix(_) => None,
+            LogSample::Imu(sample) => Some(sample),
+            LogSample::Fix(_) => None,
         })
     }
 
@@ -137,24 +139,24 @@ impl Log {
     ///
     /// # Errors
     /// Those of [`Self::imu`].
-    pub fn fixes(&self, channel: &Channel, stamp: Stamp) -> Result<Vec<Fix>, Error> {
+    pub fn fixes(&self, channel: &LogChannel, stamp: Stamp) -> Result<Vec<LogFix>, LogError> {
         self.samples(channel, stamp, |sample| match sample {
-            Sample::Imu(_) => None,
-            Sample::Fix(fix) => Some(*fix),
+            LogSample::Imu(_) => None,
+            LogSample::Fix(fix) => Some(*fix),
         })
     }
 
     fn samples<T>(
         &self,
-        channel: &Channel,
+        channel: &LogChannel,
         stamp: Stamp,
-        of: fn(Sample) -> Option<T>,
-    ) -> Result<Vec<T>, Error> {
+        of: fn(LogSample) -> Option<T>,
+    ) -> Result<Vec<T>, LogError> {
         let mut scan = Scan {
             wanted: Some((channel, stamp)),
             ..Scan::default()
         };
-        let outcome = (self.read)(&mut Input::open(&self.path)?, &mut scan);
+        let outcome = (self.read)(&mut LogInput::open(&self.path)?, &mut scan);
         let stamps = scan.samples.iter().map(|(_, sample)| sample.stamp_ns());
         let mut steps = stamps.zip(scan.samples.iter().skip(1));
         let back = steps.find(|(from_ns, (_, sample))| sample.stamp_ns() < *from_ns);
@@ -162,7 +164,7 @@ impl Log {
             Some((from_ns, (offset, sample))) => {
                 let [from, to] = [from_ns, sample.stamp_ns()].map(in_seconds);
                 let message = format!("time goes back from {from} s to {to} s");
-                Err(Error::at(*offset, Fault::TimeBack, message))
+                Err(LogError::at(*offset, LogFault::TimeBack, message))
             }
             None => outcome,
         };

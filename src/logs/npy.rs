@@ -1,6 +1,6 @@
 //! Arrays in NumPy's own format, `.npy` (`numpy.lib.format`).
 
-use crate::input::{Bytes, Error, Input, Number};
+use crate::input::{Bytes, LogError, LogInput, Number};
 use std::io;
 use std::io::Read;
 use std::path::Path;
@@ -23,35 +23,35 @@ pub struct Array {
 ///
 /// # Errors
 /// When it is cut off, or no array of real numbers.
-pub fn read(path: &Path) -> Result<Array, Error> {
-    let input = Input::open(path)?;
+pub fn read(path: &Path) -> Result<Array, LogError> {
+    let input = LogInput::open(path)?;
     let size = input.length();
     read_from(&mut input.take(size), size, 0)
 }
 
 /// Reads an array that has so many bytes with its header.
-pub(crate) fn read_from(from: &mut impl Read, size: u64, offset: u64) -> Result<Array, Error> {
+pub(crate) fn read_from(from: &mut impl Read, size: u64, offset: u64) -> Result<Array, LogError> {
     let fault = |error: io::Error| match error.kind() {
-        io::ErrorKind::UnexpectedEof => Error::truncated(offset, size + 1, size),
-        _ => Error::malformed(offset, format!("not a NumPy array: {error}")),
+        io::ErrorKind::UnexpectedEof => LogError::truncated(offset, size + 1, size),
+        _ => LogError::malformed(offset, format!("not a NumPy array: {error}")),
     };
     let (text, header_bytes) = header_text(from).map_err(fault)?;
     let unparsed = || {
         let text = text.trim();
-        Error::malformed(
+        LogError::malformed(
             offset,
             format!("the header of an array does not parse: {text}"),
         )
     };
     let (kind, shape, is_fortran) = parse(&text).ok_or_else(unparsed)?;
-    let known = number(kind).ok_or_else(|| Error::encoding(offset, kind.as_bytes()));
+    let known = number(kind).ok_or_else(|| LogError::encoding(offset, kind.as_bytes()));
     let (is_big_endian, number) = known?;
     let count = shape.iter().try_fold(1_usize, |n, of| n.checked_mul(*of));
     let bytes = count.and_then(|count| count.checked_mul(number.size()));
     let left = size.saturating_sub(header_bytes);
     let needed = bytes.map_or(u64::MAX, |bytes| bytes as u64);
     let Some(bytes) = bytes.filter(|_| needed <= left) else {
-        return Err(Error::truncated(offset + header_bytes, needed, left));
+        return Err(LogError::truncated(offset + header_bytes, needed, left));
     };
     let mut values = Vec::new();
     let mut block = vec![0; BLOCK * number.size()];

@@ -13,7 +13,7 @@
 //! # }
 //! ```
 
-use crate::input::Error;
+use crate::input::LogError;
 use crate::npy;
 use crate::npy::Array;
 use std::fs::File;
@@ -37,7 +37,7 @@ impl Archive {
     ///
     /// # Errors
     /// When it is no zip archive, or its directory is damaged.
-    pub fn open(path: &Path) -> Result<Self, Error> {
+    pub fn open(path: &Path) -> Result<Self, LogError> {
         let archive = ZipArchive::new(BufReader::new(File::open(path)?));
         Ok(Self(archive.map_err(|e| refused(0, &e))?))
     }
@@ -54,27 +54,30 @@ impl Archive {
     ///
     /// # Errors
     /// When there is none of that name, or it is damaged or not of numbers.
-    pub fn read(&mut self, name: &str) -> Result<Array, Error> {
+    pub fn read(&mut self, name: &str) -> Result<Array, LogError> {
         self.array(name).map_err(|error| error.of_topic(name))
     }
 
-    fn array(&mut self, name: &str) -> Result<Array, Error> {
+    fn array(&mut self, name: &str) -> Result<Array, LogError> {
         let Some(index) = self.0.index_for_name(&format!("{name}{ENDING}")) else {
-            return Err(Error::no_topic(&format!("the name {name}"), &self.names()));
+            return Err(LogError::no_topic(
+                &format!("the name {name}"),
+                &self.names(),
+            ));
         };
         let mut file = self.0.by_index(index).map_err(|e| refused(0, &e))?;
         let (offset, bytes, limit) = (file.header_start(), file.size(), LARGEST_ARRAY);
         if bytes > limit {
-            return Err(Error::too_large(offset, bytes, limit));
+            return Err(LogError::too_large(offset, bytes, limit));
         }
         let array = npy::read_from(&mut file, bytes, offset)?;
         // the checksum is looked at where the file ends
         let rest = io::copy(&mut file, &mut io::sink());
-        rest.map_err(|e| Error::malformed(offset, e.to_string()))?;
+        rest.map_err(|e| LogError::malformed(offset, e.to_string()))?;
         Ok(array)
     }
 }
 
-fn refused(offset: u64, e: &ZipError) -> Error {
-    Error::malformed(offset, e.to_string())
+fn refused(offset: u64, e: &ZipError) -> LogError {
+    LogError::malformed(offset, e.to_string())
 }

@@ -3,8 +3,8 @@
 //! A receiver's log is a stream of bytes with other protocols between: what is no message with its checksum is passed
 //! over, also one that is cut off at the end.
 
-use crate::channel::{Channel, Clock, Content, Fix, ImuSample, NS, Sample, Scan, stated};
-use crate::input::{Bytes, Error, Input, UBX_SYNC, ubx_checksum};
+use crate::channel::{Clock, Content, ImuReading, LogChannel, LogFix, LogSample, NS, Scan, stated};
+use crate::input::{Bytes, LogError, LogInput, UBX_SYNC, ubx_checksum};
 use chrono::NaiveDate;
 
 /// Class and number of messages, as one number.
@@ -15,14 +15,14 @@ const REJECTED: u32 = u32::MAX;
 const MS: i64 = NS / 1000;
 
 /// Counts the messages of each kind, or reads the samples or fixes of one.
-pub(crate) fn scan(input: &mut Input, scan: &mut Scan<'_>) -> Result<(), Error> {
-    let mut measured = Measured::default();
+pub(crate) fn scan(input: &mut LogInput, scan: &mut Scan<'_>) -> Result<(), LogError> {
+    let mut measured = UbxAxes::default();
     messages(input, |id, offset, payload| {
         if let Some((channel, _)) = scan.wanted {
             let sample = match id {
                 _ if id != channel.id => None,
-                ESF_MEAS => measured.add(payload).map(Sample::Imu),
-                _ => pvt(payload).map(|fix| Sample::Fix(Box::new(fix))),
+                ESF_MEAS => measured.add(payload).map(LogSample::Imu),
+                _ => pvt(payload).map(|fix| LogSample::Fix(Box::new(fix))),
             };
             scan.samples.extend(sample.map(|sample| (offset, sample)));
             return;
@@ -40,32 +40,32 @@ pub(crate) fn scan(input: &mut Input, scan: &mut Scan<'_>) -> Result<(), Error> 
     })
 }
 
-fn new_channel(id: u32) -> Channel {
+fn new_channel(id: u32) -> LogChannel {
     let (topic, type_name, content, clock) = match id {
         NAV_PVT => ("NAV-PVT", "UBX-NAV-PVT", Content::Fix, Clock::Unix),
         ESF_MEAS => ("ESF-MEAS", "UBX-ESF-MEAS", Content::Imu, Clock::Boot),
         REJECTED => ("UBX", "checksum failed", Content::Other, Clock::Unix),
         _ => {
             let topic = format!("UBX-{:02X}-{:02X}", id >> 8, id & 0xff);
-            return Channel {
+            return LogChannel {
                 type_name: topic.clone(),
                 topic,
-                ..Channel::default()
+                ..LogChannel::default()
             };
         }
     };
-    Channel {
+    LogChannel {
         topic: topic.to_owned(),
         type_name: type_name.to_owned(),
         content,
         clock,
         id,
-        ..Channel::default()
+        ..LogChannel::default()
     }
 }
 
 /// Shows the messages of a file, each with its number and its byte.
-fn messages(input: &mut Input, mut each: impl FnMut(u32, u64, &[u8])) -> Result<(), Error> {
+fn messages(input: &mut LogInput, mut each: impl FnMut(u32, u64, &[u8])) -> Result<(), LogError> {
     while input.left() >= 8 {
         let offset = input.position();
         let (sync, head): ([u8; 2], [u8; 4]) = (input.array()?, input.array()?);
@@ -88,7 +88,7 @@ fn messages(input: &mut Input, mut each: impl FnMut(u32, u64, &[u8])) -> Result<
 
 /// A fix of NAV-PVT in three dimensions, flagged good, at a date and time that are valid. Its accuracies are taken as one
 /// standard deviation of each axis, as the ROS driver of u-blox does (`ublox_gps`, `NavSatFix` of NAV-PVT).
-fn pvt(payload: &[u8]) -> Option<Fix> {
+fn pvt(payload: &[u8]) -> Option<LogFix> {
     const GNSS_3D: u8 = 3;
     const WITH_SENSORS: u8 = 4;
     // nanoseconds since 1970 end in 2262
@@ -115,7 +115,7 @@ fn pvt(payload: &[u8]) -> Option<Fix> {
     // a leap second has the number 60
     let minute = date.and_hms_opt(hour.into(), minute.into(), 0)?;
     let before = minute.and_utc().timestamp();
-    Some(Fix {
+    Some(LogFix {
         stamp_ns: (before + i64::from(second)) * NS + i64::from(nano),
         lat_deg: lat / 1e7,
         lon_deg: lon / 1e7,
@@ -133,16 +133,16 @@ fn time_tag_ns(payload: &[u8]) -> Option<i64> {
 
 /// Axes measured at one time.
 #[derive(Default)]
-struct Measured {
+struct UbxAxes {
     time_ns: i64,
     gyro_rad_s: [Option<f64>; 3],
     accel_m_s2: [Option<f64>; 3],
 }
 
-impl Measured {
+impl UbxAxes {
     /// Adds the axes of an ESF-MEAS; a sample when all six of a time are there, as some receivers send gyroscopes
     /// and accelerometers one after the other.
-    fn add(&mut self, payload: &[u8]) -> Option<ImuSample> {
+    fn add(&mut self, payload: &[u8]) -> Option<ImuReading> {
         let time_ns = time_tag_ns(payload)?;
         if time_ns != self.time_ns {
             *self = Self {
@@ -156,7 +156,7 @@ impl Measured {
             self.put(bytes.u32()?);
         }
         let all = |axes: [Option<f64>; 3]| Some([axes[0]?, axes[1]?, axes[2]?]);
-        let sample = ImuSample {
+        let sample = ImuReading {
             stamp_ns: time_ns,
             accel_m_s2: all(self.accel_m_s2)?,
             gyro_rad_s: all(self.gyro_rad_s)?,

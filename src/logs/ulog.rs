@@ -1,16 +1,18 @@
 //! Logs of PX4 (<https://docs.px4.io/main/en/dev_log/ulog_file_format.html>).
 
-use crate::channel::{Channel, Clock, Content, Fix, ImuSample, Sample, Scan, Stamp, stated};
-use crate::input::{Bytes, Error, Input, Number, text};
+use crate::channel::{
+    Clock, Content, ImuReading, LogChannel, LogFix, LogSample, Scan, Stamp, stated,
+};
+use crate::input::{Bytes, LogError, LogInput, Number, text};
 use std::collections::HashMap;
 
 /// Counts the messages of each topic, or reads the samples or fixes of one.
-pub(crate) fn scan(input: &mut Input, scan: &mut Scan<'_>) -> Result<(), Error> {
+pub(crate) fn scan(input: &mut LogInput, scan: &mut Scan<'_>) -> Result<(), LogError> {
     messages(input, |topic, offset, message| {
         if let Some((channel, stamp)) = scan.wanted {
             if topic.id == channel.id {
                 let sample = sample(channel.content, &topic.layout, message, stamp);
-                let short = || Error::malformed(offset, "a message is shorter than its format");
+                let short = || LogError::malformed(offset, "a message is shorter than its format");
                 let sample = sample.ok_or_else(short)?;
                 scan.samples.extend(sample.map(|sample| (offset, sample)));
             }
@@ -23,7 +25,7 @@ pub(crate) fn scan(input: &mut Input, scan: &mut Scan<'_>) -> Result<(), Error> 
                 0 => topic.name.clone(),
                 instance => format!("{}.{instance}", topic.name),
             };
-            Channel {
+            LogChannel {
                 topic: named,
                 type_name: topic.name.clone(),
                 // one that lacks fields is another topic
@@ -31,7 +33,7 @@ pub(crate) fn scan(input: &mut Input, scan: &mut Scan<'_>) -> Result<(), Error> 
                 rank,
                 clock: Clock::Boot,
                 id: topic.id,
-                ..Channel::default()
+                ..LogChannel::default()
             }
         };
         let channel = scan.channels.entry(topic.id).or_insert_with(new);
@@ -51,12 +53,12 @@ type Formats = HashMap<String, String>;
 /// Places of a message's own fields, up to a format within it: no sample and no fix has one.
 #[derive(Default)]
 struct Layout {
-    fields: HashMap<String, Field>,
+    fields: HashMap<String, UlogField>,
 }
 
 /// Field of a message.
 #[derive(Clone, Copy)]
-struct Field {
+struct UlogField {
     at: usize,
     number: Number,
     count: usize,
@@ -87,7 +89,7 @@ impl Layout {
             let Some(number) = number(type_name) else {
                 break;
             };
-            let own = Field { at, number, count };
+            let own = UlogField { at, number, count };
             layout.fields.insert(field.to_owned(), own);
             at = at.checked_add(number.size().checked_mul(count)?)?;
         }
@@ -95,7 +97,7 @@ impl Layout {
     }
 
     /// A field of so many numbers.
-    fn field(&self, name: &str, count: usize) -> Option<Field> {
+    fn field(&self, name: &str, count: usize) -> Option<UlogField> {
         let field = self.fields.get(name).copied();
         field.filter(|field| field.count == count)
     }
@@ -148,11 +150,11 @@ struct Topic {
 
 /// Shows the messages of topics, each with its byte.
 fn messages(
-    input: &mut Input,
-    mut each: impl FnMut(&Topic, u64, &[u8]) -> Result<(), Error>,
-) -> Result<(), Error> {
+    input: &mut LogInput,
+    mut each: impl FnMut(&Topic, u64, &[u8]) -> Result<(), LogError>,
+) -> Result<(), LogError> {
     if input.array()? != MAGIC {
-        return Err(Error::malformed(0, "not the start of a ULog file"));
+        return Err(LogError::malformed(0, "not the start of a ULog file"));
     }
     // version and time of the start
     input.skip(9)?;
@@ -171,7 +173,7 @@ fn messages(
         let body = input.bytes(size, size)?;
         let fault = || {
             let kind = char::from(kind);
-            Error::malformed(offset, format!("message {kind:?} does not parse"))
+            LogError::malformed(offset, format!("message {kind:?} does not parse"))
         };
         let mut bytes = Bytes::little(&body);
         match kind {
@@ -205,7 +207,7 @@ fn messages(
                 let flags = bytes.take(8).ok_or_else(fault)?;
                 if flags[0] & !APPENDED != 0 || flags[1..].iter().any(|flags| *flags != 0) {
                     let flags = format!("ULog flags {flags:02x?}");
-                    return Err(Error::encoding(offset, flags.as_bytes()));
+                    return Err(LogError::encoding(offset, flags.as_bytes()));
                 }
                 if flags[0] & APPENDED != 0 {
                     let mut starts = || Some([bytes.u64()?, bytes.u64()?, bytes.u64()?]);
@@ -237,7 +239,7 @@ fn sample(
     layout: &Layout,
     message: &[u8],
     stamp: Stamp,
-) -> Option<Option<Sample>> {
+) -> Option<Option<LogSample>> {
     let one = |name| layout.numbers::<1>(name, message).map(|[value]| value);
     let three = |name| layout.numbers::<3>(name, message);
     // 0 is a time that was not set
@@ -254,7 +256,7 @@ fn sample(
             Some((dv.map(|v| v / dv_s), dtheta.map(|a| a / dtheta_s)))
         };
         let (accel_m_s2, gyro_rad_s) = rates().or_else(increments)?;
-        return Some(Some(Sample::Imu(ImuSample {
+        return Some(Some(LogSample::Imu(ImuReading {
             stamp_ns,
             accel_m_s2,
             gyro_rad_s,
@@ -268,7 +270,7 @@ fn sample(
     let speed = one("s_variance_m_s")?;
     let has_velocity = one("vel_ned_valid")? != 0.0;
     let velocity = [one("vel_n_m_s")?, one("vel_e_m_s")?, one("vel_d_m_s")?];
-    let fix = Fix {
+    let fix = LogFix {
         stamp_ns,
         lat_deg: place("latitude_deg", "lat", 1e7)?,
         lon_deg: place("longitude_deg", "lon", 1e7)?,
@@ -277,5 +279,5 @@ fn sample(
         v_ned_m_s: has_velocity.then_some(velocity),
         sd_v_ned_m_s: stated([speed; 3]).filter(|_| has_velocity),
     };
-    Some((one("fix_type")? >= THREE_DIMENSIONS).then(|| Sample::Fix(Box::new(fix))))
+    Some((one("fix_type")? >= THREE_DIMENSIONS).then(|| LogSample::Fix(Box::new(fix))))
 }

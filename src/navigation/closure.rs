@@ -10,7 +10,7 @@ use crate::trajectory::Trajectory;
 use crate::trajectory::ideal_imu::ideal_imu;
 use crate::units::Refused;
 
-/// How far the mechanised samples come away from the trajectory.
+/// Difference between the mechanised samples and the trajectory.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize)]
 pub struct Closure {
     /// IMU rate (Hz).
@@ -27,7 +27,7 @@ pub struct Closure {
     pub attitude_rad: f64,
 }
 
-/// What a closure must not exceed.
+/// Bounds on a closure.
 #[derive(Debug, Clone, Copy, serde::Serialize)]
 pub struct Bounds {
     /// Distance (m).
@@ -103,7 +103,7 @@ impl Closure {
         self.attitude_rad = larger(self.attitude_rad, turned);
     }
 
-    /// Whether it is within the bounds; what is not finite is within none.
+    /// Returns true if it is within the bounds; values that are not finite are not.
     pub fn within(&self, bounds: &Bounds) -> bool {
         self.position_m <= bounds.position_m
             && self.velocity_m_s <= bounds.velocity_m_s
@@ -127,7 +127,7 @@ fn damp(ins: &mut Strapdown, truth: &NavState, dt: f64) {
 mod tests {
     use super::*;
     use crate::trajectory::profile::{
-        Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
+        Acceleration, Bank, Length, Profile, ProfileStart, Segment, SegmentKind, Turning,
     };
     use glam::{DQuat, DVec3};
 
@@ -135,25 +135,25 @@ mod tests {
     #[test]
     fn ten_hours_close() {
         let cycle = [
-            Kind::Accelerate {
+            SegmentKind::Accelerate {
                 to_speed: 15.0,
                 by: Acceleration::Duration(20.0),
             },
-            Kind::Straight(Length::Duration(820.0)),
-            Kind::Turn {
+            SegmentKind::Straight(Length::Duration(820.0)),
+            SegmentKind::Turn {
                 angle: 1.5,
                 by: Turning::Duration(20.0),
             },
-            Kind::Accelerate {
+            SegmentKind::Accelerate {
                 to_speed: 8.0,
                 by: Acceleration::Duration(20.0),
             },
-            Kind::Turn {
+            SegmentKind::Turn {
                 angle: -1.4,
                 by: Turning::Duration(20.0),
             },
         ];
-        let segment = |kind: &Kind| Segment {
+        let segment = |kind: &SegmentKind| Segment {
             kind: kind.clone(),
             climb_m: 0.0,
             ramp_s: None,
@@ -164,7 +164,7 @@ mod tests {
             .take(40 * cycle.len())
             .map(segment)
             .collect();
-        let start = Start {
+        let start = ProfileStart {
             t_s: 0.0,
             lat: 0.8,
             lon: 0.1,

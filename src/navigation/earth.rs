@@ -113,7 +113,7 @@ pub fn radii<R: Real>(sin_lat: R) -> Radii<R> {
     Parallel::at(sin_lat).radii()
 }
 
-/// How gravity falls with height.
+/// Model of the decrease of gravity with height.
 #[derive(
     Debug,
     Clone,

@@ -61,9 +61,9 @@ impl GnssVelocity {
 /// Standard deviations of fixes that state none: north, east, down.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct FixSigma {
-    /// Of the position (m).
+    /// Standard deviations of the position (m).
     pub pos_m: [f64; 3],
-    /// Of the velocity (m/s).
+    /// Standard deviations of the velocity (m/s).
     pub vel_m_s: Option<[f64; 3]>,
 }
 
@@ -83,8 +83,8 @@ impl GnssFix {
         self
     }
 
-    /// How many components were measured: what is open adds nothing to the NIS, and counts for nothing in it. They stand
-    /// in the order of north, east, down of the position and of the velocity.
+    /// Number of measured components, in the order north, east, down of the position and of the
+    /// velocity. A component that was not measured does not count in the NIS.
     pub fn components(&self) -> usize {
         self.sigmas().count()
     }

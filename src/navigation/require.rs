@@ -30,9 +30,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::str::FromStr;
 
-/// What is limited at the end of an outage.
+/// Quantity with a limit at the end of an outage.
 #[derive(Debug, Clone, Copy)]
-pub enum Quantity {
+pub enum LimitQuantity {
     /// 95 % quantile of the horizontal error (m).
     P95,
     /// Its median (m).
@@ -47,7 +47,7 @@ pub enum Quantity {
     Yaw,
 }
 
-nav_sim_signal::named!(Quantity {
+nav_sim_signal::named!(LimitQuantity {
     P95 = "p95_m",
     P50 = "p50_m",
     Rmse = "rmse_m",
@@ -56,7 +56,7 @@ nav_sim_signal::named!(Quantity {
     Yaw = "yaw_deg",
 }, in files);
 
-impl Quantity {
+impl LimitQuantity {
     /// Roll, pitch or yaw, from 0.
     fn angle(self) -> Option<usize> {
         (self as usize).checked_sub(Self::Roll as usize)
@@ -78,7 +78,7 @@ impl Quantity {
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Limit {
     /// The quantity.
-    pub quantity: Quantity,
+    pub quantity: LimitQuantity,
     /// Its largest value allowed (m or degrees).
     #[serde(rename = "limit")]
     pub most: f64,
@@ -93,7 +93,7 @@ impl FromStr for Limit {
             let quantity = name.parse().ok()?;
             Some(Self { quantity, most })
         };
-        let names = Quantity::NAMES.join(", ");
+        let names = LimitQuantity::NAMES.join(", ");
         let expected = "expected NAME<=LIMIT with a positive limit, NAME one of";
         read().ok_or_else(|| format!("{expected} {names}"))
     }
@@ -101,7 +101,7 @@ impl FromStr for Limit {
 
 /// The limit that is the hardest to keep, and where.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub struct Worst {
+pub struct HardestLimit {
     /// The limit.
     #[serde(flatten)]
     pub limit: Limit,
@@ -111,7 +111,7 @@ pub struct Worst {
     pub place: usize,
 }
 
-impl Worst {
+impl HardestLimit {
     /// Logarithm of limit over error: above 0 there is a reserve.
     pub fn margin(&self) -> f64 {
         // In logarithms limits of different units compare, and the margin is nearly linear in the logarithm
@@ -171,7 +171,7 @@ pub enum RequireError {
 /// True errors at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drift {
-    /// How long the outage has lasted (s).
+    /// Time since the start of the outage (s).
     pub after_s: f64,
     /// Mean of the position error, north and east (m).
     pub mean_m: [f64; 2],
@@ -194,19 +194,19 @@ impl Drift {
     }
 
     /// The value of a quantity (m or degrees).
-    pub fn value(&self, quantity: Quantity) -> f64 {
+    pub fn value(&self, quantity: LimitQuantity) -> f64 {
         match quantity {
-            Quantity::P50 => self.quantile(0.5),
-            Quantity::P95 => self.quantile(0.95),
-            Quantity::Rmse => self.square(quantity).sqrt(),
-            Quantity::Roll => self.angles_deg[0],
-            Quantity::Pitch => self.angles_deg[1],
-            Quantity::Yaw => self.angles_deg[2],
+            LimitQuantity::P50 => self.quantile(0.5),
+            LimitQuantity::P95 => self.quantile(0.95),
+            LimitQuantity::Rmse => self.square(quantity).sqrt(),
+            LimitQuantity::Roll => self.angles_deg[0],
+            LimitQuantity::Pitch => self.angles_deg[1],
+            LimitQuantity::Yaw => self.angles_deg[2],
         }
     }
 
     /// The mean square behind a quantity (m² or degrees²), in which the parts of independent sources add.
-    fn square(&self, quantity: Quantity) -> f64 {
+    fn square(&self, quantity: LimitQuantity) -> f64 {
         match quantity.angle() {
             Some(i) => self.angles_deg[i].powi(2),
             // The quantiles have no sum over sources: shares are of the mean square whatever quantile is
@@ -217,11 +217,11 @@ impl Drift {
         }
     }
 
-    /// What a value is at most, at next to no cost.
-    fn bound(&self, quantity: Quantity) -> f64 {
+    /// Upper bound of a value, at next to no cost.
+    fn bound(&self, quantity: LimitQuantity) -> f64 {
         match quantity {
-            Quantity::P50 => self.quantile_bound(0.5),
-            Quantity::P95 => self.quantile_bound(0.95),
+            LimitQuantity::P50 => self.quantile_bound(0.5),
+            LimitQuantity::P95 => self.quantile_bound(0.95),
             _ => self.value(quantity),
         }
     }
@@ -233,14 +233,14 @@ impl Drift {
         self.mean_m[0].hypot(self.mean_m[1]) + (-2.0 * (1.0 - probability).ln() * largest).sqrt()
     }
 
-    /// Whether a limit is exceeded, or the value is not a number.
+    /// Returns true if a limit is exceeded, or the value is not a number.
     pub fn exceeds(&self, limit: &Limit) -> bool {
         let is_within = |value: f64| value <= limit.most;
         !is_within(self.bound(limit.quantity)) && !is_within(self.value(limit.quantity))
     }
 
     /// The largest value of a quantity and where it is; what is not a number is the largest.
-    pub fn largest(drifts: &[Self], quantity: Quantity) -> Option<(usize, f64)> {
+    pub fn largest(drifts: &[Self], quantity: LimitQuantity) -> Option<(usize, f64)> {
         let bound = |drift: &Self| {
             Some(drift.bound(quantity))
                 .filter(|b| !b.is_nan())
@@ -273,13 +273,13 @@ impl Drift {
 }
 
 /// A trajectory with an outage at several places, each alone.
-pub struct Course<'a> {
+pub struct OutagePlacements<'a> {
     trajectory: &'a Trajectory,
     track: Track,
     outages: Vec<Outage>,
 }
 
-impl<'a> Course<'a> {
+impl<'a> OutagePlacements<'a> {
     /// Linearises along the trajectory; of the scenario, receiver, barometer and start count. Outages may overlap.
     ///
     /// # Errors
@@ -345,7 +345,7 @@ impl<'a> Course<'a> {
         scenario: &Scenario,
         model: &Model,
         limits: &[Limit],
-    ) -> Result<Worst, BeliefError> {
+    ) -> Result<HardestLimit, BeliefError> {
         Ok(hardest(limits, &self.drifts(scenario, model)?))
     }
 
@@ -386,8 +386,8 @@ impl<'a> Course<'a> {
     }
 }
 
-fn hardest(limits: &[Limit], drifts: &[Drift]) -> Worst {
-    Worst::of(limits, drifts).expect("at least one limit and one place")
+fn hardest(limits: &[Limit], drifts: &[Drift]) -> HardestLimit {
+    HardestLimit::of(limits, drifts).expect("at least one limit and one place")
 }
 
 /// Outages of one length at `places` times, the first at `first_s`, evenly to the end of the trajectory.
@@ -413,7 +413,7 @@ pub fn evenly(first_s: f64, end_s: f64, length_s: f64, places: u32) -> Vec<Outag
 
 // The IMU that a limit needs: white noise and bias instability of each sensor, each with a quarter of the budget.
 
-/// How many intensities an IMU has here.
+/// Number of noise intensities of an IMU.
 pub const IMU_PARAMETERS: usize = 4;
 
 /// Intensities of an IMU, all axes alike.
@@ -435,7 +435,7 @@ const START: [f64; IMU_PARAMETERS] = [1e-3, 3e-4, 5e-5, 1e-5];
 const POOREST: f64 = 300.0;
 /// An intensity times this is as good as none.
 const NONE: f64 = 1e-5;
-/// How far from the start an intensity is sought, as a logarithm: beyond, any will do.
+/// Searched range of the logarithm of an intensity about the start: beyond, any value will do.
 const RANGE: f64 = 9.0;
 /// A logarithm of limit over error that is left: the search ends on either side of what it aims at, within [`EXACT`], its
 /// steps of up to a second leave up to 0.12 % less than those of `run` (biases, in outages of 5 s; 0.01 % from 10 s on, in the
@@ -496,7 +496,7 @@ impl ImuParameters {
         "gyroscope bias instability (deg/h)",
     ];
 
-    /// As good as without noise.
+    /// An IMU with practically no noise.
     fn perfect(t_corr_s: f64) -> Self {
         // 1e-5 of a consumer IMU, not zero: intensities are sought as logarithms.
         Self {
@@ -516,7 +516,7 @@ impl ImuParameters {
 
 /// An intensity that keeps the limits, or none that matters.
 #[derive(Debug, Clone, Copy)]
-pub enum Answer {
+pub enum IntensityBound {
     /// At most this.
     AtMost(f64),
     /// Any value will do.
@@ -525,10 +525,10 @@ pub enum Answer {
     Never,
 }
 
-/// What is asked of an IMU.
-pub struct Need<'a> {
+/// Requirements on an IMU.
+pub struct ImuSearch<'a> {
     /// The trajectory and the places of the outage.
-    pub course: &'a Course<'a>,
+    pub course: &'a OutagePlacements<'a>,
     /// Receiver, start and IMU rate.
     pub scenario: &'a Scenario,
     /// At least one.
@@ -537,7 +537,7 @@ pub struct Need<'a> {
     pub t_corr_s: f64,
 }
 
-impl Need<'_> {
+impl ImuSearch<'_> {
     /// The IMU that meets the limits with 1.5 thousandths in reserve, its four intensities with equal shares in the
     /// variance that GNSS and start leave.
     ///
@@ -586,16 +586,16 @@ impl Need<'_> {
         Ok(self.at_limit(&imu, [1.0; IMU_PARAMETERS])?.1)
     }
 
-    /// What an intensity may be where the others are multiplied by `others`.
+    /// Largest value of an intensity when the others are multiplied by `others`.
     ///
     /// # Errors
     /// When the model has no filter.
-    pub fn alone(
+    pub fn limit_of(
         &self,
         imu: &ImuParameters,
         which: usize,
         others: f64,
-    ) -> Result<Answer, BeliefError> {
+    ) -> Result<IntensityBound, BeliefError> {
         let base = imu.times(std::array::from_fn(
             |i| if i == which { 1.0 } else { others },
         ));
@@ -605,21 +605,25 @@ impl Need<'_> {
         Ok(match margin {
             // Regula falsi may end at a bracket without the last digit: ten times the tolerance is still a
             // crossing.
-            m if m.abs() <= 10.0 * EXACT => Answer::AtMost(found.values[which]),
-            m if m > 0.0 => Answer::Any,
-            _ => Answer::Never,
+            m if m.abs() <= 10.0 * EXACT => IntensityBound::AtMost(found.values[which]),
+            m if m > 0.0 => IntensityBound::Any,
+            _ => IntensityBound::Never,
         })
     }
 
-    /// As [`Self::alone`], the others as good as none.
+    /// Largest value of an intensity when the others are practically zero.
     ///
     /// # Errors
     /// When the model has no filter.
-    pub fn quite_alone(&self, imu: &ImuParameters, which: usize) -> Result<Answer, BeliefError> {
-        self.alone(imu, which, NONE)
+    pub fn limit_with_others_perfect(
+        &self,
+        imu: &ImuParameters,
+        which: usize,
+    ) -> Result<IntensityBound, BeliefError> {
+        self.limit_of(imu, which, NONE)
     }
 
-    fn worst(&self, imu: &ImuParameters) -> Result<Worst, BeliefError> {
+    fn worst(&self, imu: &ImuParameters) -> Result<HardestLimit, BeliefError> {
         self.course.worst(
             self.scenario,
             &imu.model(self.scenario.imu.rate_hz),
@@ -667,7 +671,7 @@ impl Need<'_> {
     fn squares(
         &self,
         imu: &ImuParameters,
-    ) -> Result<(Worst, [f64; IMU_PARAMETERS + 1]), BeliefError> {
+    ) -> Result<(HardestLimit, [f64; IMU_PARAMETERS + 1]), BeliefError> {
         let worst = self.worst(imu)?;
         let (course, model) = (self.course, imu.model(self.scenario.imu.rate_hz));
         let belief = course.belief(self.scenario, &model)?;
@@ -692,16 +696,16 @@ impl Need<'_> {
 
 // How far a given IMU is from its limits, and what one without errors would leave.
 
-/// How an IMU stands to its limits.
+/// Margins of an IMU to its limits.
 #[derive(Debug, Clone, Serialize)]
 pub struct Margins {
-    /// Whether the limits are kept.
+    /// True if the limits are kept.
     pub met: bool,
     /// The hardest limit.
     #[serde(flatten)]
-    pub worst: Worst,
+    pub worst: HardestLimit,
     /// The same for an IMU without errors: what GNSS and start leave.
-    pub without_imu_errors: Worst,
+    pub without_imu_errors: HardestLimit,
 }
 
 /// Correlation time of the biases of an IMU that has next to none (s): any would do.
@@ -713,7 +717,7 @@ impl Margins {
     /// # Errors
     /// When the model has no such filter.
     pub fn of(
-        course: &Course<'_>,
+        course: &OutagePlacements<'_>,
         scenario: &Scenario,
         model: &Model,
         limits: &[Limit],

@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Scenario {
-    /// How many runs, from which seed, by which method.
+    /// Number of runs, seed, method.
     pub run: RunSettings,
     /// The filter.
     pub filter: FilterSettings,
@@ -36,7 +36,7 @@ pub struct Scenario {
     pub gnss: GnssSettings,
     /// A barometer, if there is one.
     pub baro: Option<BaroSettings>,
-    /// What the vehicle knows of its own motion.
+    /// Vehicle constraints and sensors.
     #[serde(skip_serializing_if = "AidingSettings::is_none")]
     pub aiding: AidingSettings,
     /// The start.
@@ -61,7 +61,7 @@ pub struct RunSettings {
     pub runs: u64,
     /// Seed of all random numbers; without it 1.
     pub seed: Option<u64>,
-    /// How the statistics are found.
+    /// Source of the statistics.
     pub method: Method,
     /// Level of the coverage statistic.
     #[schemars(with = "Probability")]
@@ -79,7 +79,7 @@ impl Default for RunSettings {
     }
 }
 
-/// How the statistics are found.
+/// Source of the statistics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
@@ -98,19 +98,19 @@ nav_sim_signal::named!(Method { MonteCarlo = "monte-carlo", Lincov = "lincov", B
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FilterSettings {
-    /// How the noise model becomes states.
+    /// Representation of the noise model in the filter.
     pub states: FilterStates,
-    /// How the filter of 15 states is made of a larger model.
+    /// Criterion that reduces a larger model to 15 states.
     pub reduction: Reduction,
-    /// How gravity decreases with height, for truth and filter alike.
+    /// Decrease of gravity with height, for truth and filter alike.
     pub gravity: GravityModel,
-    /// How the filter uses a fix.
+    /// Measurement update with a fix: standard or iterated.
     pub update: FixUpdate,
-    /// Where sampled runs take the gains of the filter from.
+    /// Source of the filter gains in sampled runs.
     pub gains: Gains,
 }
 
-/// How a noise model is reduced to white noise and one Gauss-Markov bias per axis.
+/// Criterion of the reduction of a noise model to white noise and one Gauss-Markov bias per axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reduction {
@@ -194,7 +194,7 @@ impl Scenario {
         Track::along(&self.experiment(trajectory, Truth::Model(model), &[], outages, 0))
     }
 
-    /// What the filter believes of a model at the IMU's rate, reduced for these outages along the track.
+    /// Filter model of a noise model at the IMU's rate, reduced for these outages along the track.
     ///
     /// # Errors
     /// When the model has no such filter.
@@ -222,7 +222,7 @@ impl Scenario {
             .with_vehicle(self.aiding.state_sigmas()))
     }
 
-    /// Where fixes are too rare for a reduction, the key that makes them so.
+    /// Names the key at fault where fixes are too rare for a reduction.
     fn blame(&self, error: BeliefError) -> BeliefError {
         match error {
             BeliefError::Reduction {
@@ -279,7 +279,7 @@ impl Scenario {
 // What is true and the filter does not expect.
 
 impl Scenario {
-    /// Whether no error of the true IMU, the receiver or the aiding is stated.
+    /// Returns true if the scenario states no error of the true IMU, receiver or aiding.
     pub fn has_no_errors(&self) -> bool {
         self.imu.is_ideal() && self.aiding.errors().is_empty() && self.unexpected().is_empty()
     }

@@ -14,7 +14,7 @@ use crate::simulation::REPORTED;
 use crate::simulation::lincov::{FilterPass, Judged, Track, TruthSide};
 use crate::trajectory::Trajectory;
 use crate::trajectory::profile::{
-    Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
+    Acceleration, Bank, Length, Profile, ProfileStart, Segment, SegmentKind, Turning,
 };
 use crate::units::DEG;
 
@@ -24,8 +24,8 @@ pub(crate) const OUTAGE: Outage = Outage {
     end_s: 85.0,
 };
 
-fn drive(speed: f64, kinds: Vec<Kind>) -> Trajectory {
-    let start = Start {
+fn drive(speed: f64, kinds: Vec<SegmentKind>) -> Trajectory {
+    let start = ProfileStart {
         t_s: 0.0,
         lat: 0.8,
         lon: 0.1,
@@ -51,12 +51,12 @@ fn drive(speed: f64, kinds: Vec<Kind>) -> Trajectory {
 
 /// A street with bends, a stop from 44 s to 58 s, and a way on.
 pub(crate) fn town() -> Trajectory {
-    let straight = |s: f64| Kind::Straight(Length::Duration(s));
-    let accelerate = |to_speed: f64, s: f64| Kind::Accelerate {
+    let straight = |s: f64| SegmentKind::Straight(Length::Duration(s));
+    let accelerate = |to_speed: f64, s: f64| SegmentKind::Accelerate {
         to_speed,
         by: Acceleration::Duration(s),
     };
-    let turn = |deg: f64, s: f64| Kind::Turn {
+    let turn = |deg: f64, s: f64| SegmentKind::Turn {
         angle: deg * DEG,
         by: Turning::Duration(s),
     };
@@ -307,7 +307,7 @@ fn runs_have_the_errors_that_the_analysis_states() {
 #[test]
 fn the_scale_of_a_wheel_moves_a_position_along_the_track() {
     let (speed, seconds) = (20.0, 60.0);
-    let trajectory = drive(speed, vec![Kind::Straight(Length::Duration(100.0))]);
+    let trajectory = drive(speed, vec![SegmentKind::Straight(Length::Duration(100.0))]);
     let odometer = OdometerSettings {
         rate_hz: 10.0,
         sigma_m_s: 0.001,
@@ -353,7 +353,7 @@ fn the_scale_of_a_wheel_moves_a_position_along_the_track() {
 /// after a measurement settles at (√(q² + 4 q r) − q)/2, the root of P = (P + q) r/(P + q + r).
 #[test]
 fn zero_velocity_at_rest_has_the_steady_state_of_the_scalar_filter() {
-    let trajectory = drive(0.0, vec![Kind::Straight(Length::Duration(120.0))]);
+    let trajectory = drive(0.0, vec![SegmentKind::Straight(Length::Duration(120.0))]);
     let zupt = Some(ZuptSettings {
         sigma_m_s: 0.03,
         ..ZuptSettings::default()

@@ -3,7 +3,7 @@
 use super::*;
 use crate::noise::{Composite, Process};
 use crate::simulation::lincov::FilterPass;
-use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
+use crate::trajectory::profile::{Bank, Length, Profile, ProfileStart, Segment, SegmentKind};
 
 #[test]
 fn an_empty_file_is_the_papers_setting() {
@@ -113,7 +113,7 @@ fn what_the_filter_does_not_expect_is_found_of_each_sensor() {
 
 /// Ten seconds at rest.
 fn standing() -> Trajectory {
-    let start = Start {
+    let start = ProfileStart {
         t_s: 0.0,
         lat: 0.8,
         lon: 0.1,
@@ -121,7 +121,7 @@ fn standing() -> Trajectory {
         heading: 0.0,
         speed: 0.0,
     };
-    let kind = Kind::Straight(Length::Duration(10.0));
+    let kind = SegmentKind::Straight(Length::Duration(10.0));
     let segments = vec![Segment {
         kind,
         climb_m: 0.0,

@@ -57,7 +57,7 @@ pub struct Strapdown<L = Lanes> {
     gravity: GravityModel,
 }
 
-/// What one step passed through, for the filter that linearises about it.
+/// Intermediate results of a step, about which the filter linearises.
 #[derive(Debug, Clone, Copy)]
 pub struct StepTrace<L> {
     /// Attitude matrix at the middle of the step, takes b, returns n.
@@ -208,7 +208,7 @@ impl<L: Real> Strapdown<L> {
 
     /// Velocity, rates, radii and gravity at the middle of the interval, extrapolated by half of it.
     #[inline(always)]
-    fn at_middle(&self, dv_sf_n: Vec3<L>, dt: f64) -> Middle<L> {
+    fn at_middle(&self, dv_sf_n: Vec3<L>, dt: f64) -> MidStep<L> {
         let (s, c) = self.lat.sin_cos();
         let parallel = Parallel::at(s);
         let r = parallel.radii();
@@ -228,7 +228,7 @@ impl<L: Real> Strapdown<L> {
         let (sin_lat, cos_lat) = (s + c * half_dlat, c - s * half_dlat);
         let per_cos_lat = L::from(1.0) / cos_lat;
         let east = v_n[1] * per_transverse;
-        Middle {
+        MidStep {
             v_n,
             omega_ie_n: Vec3([cos_lat * OMEGA_IE, L::from(0.0), sin_lat * -OMEGA_IE]),
             omega_en_n: Vec3([
@@ -245,7 +245,7 @@ impl<L: Real> Strapdown<L> {
 }
 
 /// Quantities at the middle of a step.
-struct Middle<L> {
+struct MidStep<L> {
     v_n: Vec3<L>,
     omega_ie_n: Vec3<L>,
     omega_en_n: Vec3<L>,

@@ -15,19 +15,19 @@ pub(crate) const CONFIDENCE: f64 = 0.95;
 
 /// A wavelet variance with its intervals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Band {
+pub struct VarianceBand {
     /// Wavelet variance (units²).
     pub wv: Vec<f64>,
     /// Lower ends of its 95 % intervals.
     pub ci_low: Vec<f64>,
     /// Upper ends.
     pub ci_high: Vec<f64>,
-    /// How each robust variance came about.
+    /// Status of each robust variance.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub status: Vec<String>,
 }
 
-impl Band {
+impl VarianceBand {
     fn new(wv: Vec<f64>, edof: &[f64], status: Vec<String>) -> Self {
         let (ci_low, ci_high) = wv
             .iter()
@@ -59,9 +59,9 @@ pub struct SignalCurves {
     /// Equivalent degrees of freedom of the classical variance.
     pub edof: Vec<f64>,
     /// Classical.
-    pub classical: Band,
+    pub classical: VarianceBand,
     /// Robust.
-    pub robust: Band,
+    pub robust: VarianceBand,
 }
 
 impl SignalCurves {
@@ -88,8 +88,8 @@ impl SignalCurves {
             axis: channel.axis,
             samples: replicate.samples,
             tau_s: (1..=edof.len() as u32).map(|j| tau_s(j, rate_hz)).collect(),
-            classical: Band::new(replicate.classical.clone(), &edof, Vec::new()),
-            robust: Band::new(values, &robust_edof, status),
+            classical: VarianceBand::new(replicate.classical.clone(), &edof, Vec::new()),
+            robust: VarianceBand::new(values, &robust_edof, status),
             edof,
         }
     }
@@ -105,7 +105,7 @@ impl SignalCurves {
     }
 }
 
-/// What `wv` prints.
+/// JSON answer of `wv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SignalsFile {
     /// Layout version.
@@ -114,7 +114,7 @@ pub struct SignalsFile {
     pub rate_hz: f64,
     /// Efficiency of the robust variance; its degrees of freedom are edof times this.
     pub efficiency: f64,
-    /// Where the degrees of freedom are from: `eta3` or `large-sample`.
+    /// Source of the degrees of freedom: `eta3` or `large-sample`.
     pub edof_method: String,
     /// Confidence of the intervals.
     pub confidence: f64,
@@ -257,7 +257,7 @@ fn fitted(outcome: &Outcome, replicates: &[Replicate], settings: &Settings) -> F
         estimator,
         ..
     } = outcome;
-    let band = Band::new(curve.wv.clone(), &curve.edof, Vec::new());
+    let band = VarianceBand::new(curve.wv.clone(), &curve.edof, Vec::new());
     let model = &fit.composite;
     let over_levels = |f: &dyn Fn(u32) -> f64| curve.levels.iter().map(|level| f(*level)).collect();
     let parts = model.labels().into_iter().zip(&model.processes);

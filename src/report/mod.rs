@@ -14,7 +14,7 @@ pub(crate) use tables::{gnss_csv, imu_csv, initial_toml};
 
 pub(crate) use verdict::{integration_line, reduction_doubt, reduction_line, tone};
 
-use nav_sim_document::{Axis, Chart, Colour, Mark, Panel, Series};
+use nav_sim_document::{Chart, ChartAxis, Colour, Mark, Panel, Series};
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 
 #[cfg(test)]
@@ -42,7 +42,7 @@ pub(crate) fn error_charts(sets: &[ErrorSet<'_>], outages: &[(f64, f64)]) -> Vec
                 Series::line(error, *real, line.collect()),
             ]
         };
-        let axis = Axis::linear("").including(0.0, 0.0);
+        let axis = ChartAxis::linear("").including(0.0, 0.0);
         let panel = Panel::new(axis, sets.iter().flat_map(series).collect());
         Chart::over_time(REPORTED_NAMES[i], vec![panel], outages).small()
     };
@@ -59,7 +59,7 @@ pub(crate) type ErrorSet<'a> = (Vec<ErrorRow>, [&'a str; 2], [Colour; 2]);
 pub(crate) type ErrorRow = (f64, [f64; REPORTED], [f64; REPORTED]);
 
 /// The first of these names, and how many more there are.
-pub(crate) fn some(names: &[String]) -> String {
+pub(crate) fn first_names(names: &[String]) -> String {
     const NAMED: usize = 3;
     let shown = names[..names.len().min(NAMED)].join(", ");
     match names.len().saturating_sub(NAMED) {

@@ -2,7 +2,7 @@
 
 use nav_sim_document::{Tone, readable, short_names, window};
 use nav_sim_navigation::metrics::{
-    ALL_STATES, Basis, Met, ReductionQuality, Summary, Verdict, VerdictKind,
+    ALL_STATES, Basis, ReductionQuality, RequirementResult, Summary, Verdict, VerdictKind,
 };
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 use serde::Deserialize;
@@ -154,7 +154,7 @@ pub(crate) fn deciding(verdict: &Verdict) -> String {
     }
 }
 
-/// How far errors are from what the filter believes, in which state and when.
+/// Largest ratio of errors to the filter's sigma, with its state and time.
 fn departure(verdict: &Verdict, outages: &[(f64, f64)]) -> String {
     let place = match verdict.worst_outage.and_then(|k| outages.get(k)) {
         Some((start_s, end_s)) => format!("at the end of outage {}", window(*start_s, *end_s)),
@@ -228,7 +228,7 @@ pub(crate) fn verdict_counts(verdicts: &[(&str, &Value)]) -> (VerdictKind, Vec<S
 // Limits that errors must keep, in words.
 
 /// `required p95_m<=5: NOT MET, 7.41 m at the end of the outage 300–390 s`
-pub(crate) fn requirement_line(met: &Met, summary: &Summary) -> String {
+pub(crate) fn requirement_line(met: &RequirementResult, summary: &Summary) -> String {
     if met.name == "consistent" {
         let word = if met.met { "met" } else { "NOT MET" };
         return format!(
@@ -276,7 +276,7 @@ fn unit(name: &str) -> &'static str {
 
 // The reported states in words; the colour of a verdict.
 
-/// As they stand in a sentence.
+/// Names in a sentence.
 pub(crate) const SPOKEN: [&str; REPORTED] = [
     "North position",
     "East position",
@@ -289,7 +289,7 @@ pub(crate) const SPOKEN: [&str; REPORTED] = [
     "yaw",
 ];
 
-/// As they stand in the head of a table.
+/// Names in the head of a table.
 pub(crate) fn axis_of(state: usize) -> &'static str {
     SPOKEN[state].trim_end_matches(" position")
 }
@@ -316,7 +316,8 @@ pub(crate) fn integration_line(rate_hz: f64, over_sigma: f64) -> Option<String> 
     })
 }
 
-/// What a filter reduced to 15 states is like, in one line: its NEES, its errors above those of the full filter.
+/// Quality of a filter reduced to 15 states, in one line: its NEES, its errors above those of the
+/// full filter.
 pub(crate) fn reduction_line(quality: &ReductionQuality) -> String {
     let more = |ratio: f64| format!("{:+.1} %", 100.0 * (ratio - 1.0));
     let cost = quality

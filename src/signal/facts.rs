@@ -69,7 +69,7 @@ fn median(values: impl Iterator<Item = f64> + Clone) -> f64 {
 
 /// Step of a quantiser, and the median change from one sample to the next in such steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grain {
+pub struct QuantizerStep {
     /// Smallest change (unit of the column).
     pub step: f64,
     /// Median of the changes that are not zero, in steps.
@@ -89,10 +89,10 @@ fn step(axis: &[f64]) -> Option<f64> {
 
 /// The grain of a column; none of a constant one.
 #[must_use]
-pub fn grain(axis: &[f64]) -> Option<Grain> {
+pub fn grain(axis: &[f64]) -> Option<QuantizerStep> {
     let step = step(axis)?;
     let changes = median(changes(axis)) / step;
-    Some(Grain { step, changes })
+    Some(QuantizerStep { step, changes })
 }
 
 /// The values that are there.
@@ -200,7 +200,7 @@ pub fn clipped(axis: &[f64]) -> Option<(f64, f64)> {
 
 /// Rows that repeat the one before on all axes of a sensor.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Repeats {
+pub struct RepeatedRows {
     /// Share of the rows that repeat the one before, beyond chance.
     pub share: f64,
     /// Rows of a sample of the sensor, and the first row of each sample, where the sensor has a rate of its own.
@@ -224,7 +224,7 @@ fn runs<'a>(axes: &'a [&'a [f64]]) -> impl Iterator<Item = (usize, usize)> + Clo
 /// The repeated rows of a sensor, if there are more than its steps explain. Stretches far longer than the usual one are
 /// frozen, not repeated, and do not count.
 #[must_use]
-pub fn repeats(axes: &[&[f64]]) -> Option<Repeats> {
+pub fn repeats(axes: &[&[f64]]) -> Option<RepeatedRows> {
     /// Share of repeated rows that changes no figure.
     const LEAST: [f64; 2] = [0.005, 0.05];
     let runs = runs(axes);
@@ -258,7 +258,7 @@ pub fn repeats(axes: &[&[f64]]) -> Option<Repeats> {
     let total = axes[0].len();
     let per_sample = total as f64 / firsts.len() as f64;
     let repeated = counted.flat_map(|(from, rows)| from + 1..from + rows);
-    Some(Repeats {
+    Some(RepeatedRows {
         share,
         rows: repeated.filter(|_| is_rare).collect(),
         held: is_regular(&firsts, total).then_some((per_sample, firsts)),

@@ -102,7 +102,7 @@ pub struct ImuSample {
 }
 
 impl ImuSample {
-    /// What a sensor measures of it: specific force (m/s²) or angular rate (rad/s).
+    /// Component vector of one sensor: specific force (m/s²) or angular rate (rad/s).
     pub const fn of(&self, sensor: Sensor) -> DVec3 {
         match sensor {
             Sensor::Accel => self.f_ib_b,
@@ -155,7 +155,7 @@ impl Recording {
     pub fn len(&self) -> usize {
         self.signals.first().map_or(0, |s| s.samples.len())
     }
-    /// Whether it holds no samples.
+    /// Returns true if it holds no samples.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

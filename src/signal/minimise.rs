@@ -15,7 +15,7 @@ const MORE: f64 = 5.0;
 const LESS: f64 = 0.2;
 const MOST_ITERATIONS: u64 = 300;
 
-/// How far a descent goes.
+/// Bounds, damping and stopping rule of a descent.
 #[derive(Debug, Clone, Copy)]
 pub struct Descent<'a> {
     /// Smallest and largest value of each variable.
@@ -31,9 +31,9 @@ pub struct Descent<'a> {
 pub struct Minimum<V> {
     /// The variables.
     pub at: Vec<f64>,
-    /// What was evaluated there.
+    /// Value of the objective there.
     pub value: V,
-    /// Whether a step no longer changes anything.
+    /// True if the last step changed nothing to the stopping tolerance.
     pub has_converged: bool,
 }
 
@@ -188,7 +188,7 @@ pub fn line_minimum(low: f64, high: f64, tolerance: f64, f: impl Fn(f64) -> f64)
     best.copied().unwrap_or(0.5 * (low + high))
 }
 
-/// Where a condition on a positive number ends to hold, to a relative tolerance.
+/// Largest positive number at which `holds` is still true, to a relative tolerance.
 pub fn bisection(mut low: f64, mut high: f64, tolerance: f64, holds: impl Fn(f64) -> bool) -> f64 {
     while high - low > tolerance * high {
         let middle = 0.5 * (low + high);
@@ -232,7 +232,7 @@ pub struct Bounded {
 
 /// Place of a parameter: between its bounds, or on one.
 #[derive(Clone, Copy, PartialEq)]
-enum Place {
+enum BoundState {
     Free,
     Lower,
     Upper,
@@ -264,8 +264,14 @@ impl Bounded {
     /// The same, sooner where the parameters between their bounds are those of `is_free`, the others on their lower ones.
     pub fn minimise_near(&self, is_free: [bool; MOST]) -> Vector {
         let mut x = self.lower;
-        let mut places = [Place::Lower; MOST];
-        let near = is_free.map(|free| if free { Place::Free } else { Place::Lower });
+        let mut places = [BoundState::Lower; MOST];
+        let near = is_free.map(|free| {
+            if free {
+                BoundState::Free
+            } else {
+                BoundState::Lower
+            }
+        });
         let is_inside = |goal: &Vector| {
             (0..self.n).all(|i| goal[i] >= self.lower[i] && goal[i] <= self.upper[i])
         };
@@ -282,7 +288,7 @@ impl Bounded {
                 break;
             };
             let before = places[entering];
-            places[entering] = Place::Free;
+            places[entering] = BoundState::Free;
             if self.descend(&mut x, &mut places, entering) {
                 refused = [false; MOST];
             } else {
@@ -304,15 +310,15 @@ impl Bounded {
     fn steepest(
         &self,
         x: &Vector,
-        places: &[Place; MOST],
+        places: &[BoundState; MOST],
         refused: &[bool; MOST],
     ) -> Option<usize> {
         let mut best = (FLAT, None);
         for i in (0..self.n).filter(|i| !refused[*i]) {
             let w = self.downhill(x, i);
             let pull = match places[i] {
-                Place::Lower if self.upper[i] > self.lower[i] => w,
-                Place::Upper => -w,
+                BoundState::Lower if self.upper[i] > self.lower[i] => w,
+                BoundState::Upper => -w,
                 _ => continue,
             };
             if pull > best.0 {
@@ -324,7 +330,7 @@ impl Bounded {
 
     /// Moves to the minimum over the free parameters, binding those that meet a bound on the way; false if
     /// the one that enters cannot move.
-    fn descend(&self, x: &mut Vector, places: &mut [Place; MOST], entering: usize) -> bool {
+    fn descend(&self, x: &mut Vector, places: &mut [BoundState; MOST], entering: usize) -> bool {
         let start = x[entering];
         loop {
             // Only the first solution can fail: afterwards the free columns get fewer, and those left are
@@ -333,7 +339,7 @@ impl Bounded {
                 return false;
             };
             let mut blocking = (1.0, None);
-            for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
+            for i in (0..self.n).filter(|i| places[*i] == BoundState::Free) {
                 let step = goal[i] - x[i];
                 let room = if step < 0.0 {
                     self.lower[i] - x[i]
@@ -344,21 +350,21 @@ impl Bounded {
                 // all stops the step.
                 if step.abs() > room.abs() && room / step < blocking.0 {
                     let place = if step < 0.0 {
-                        Place::Lower
+                        BoundState::Lower
                     } else {
-                        Place::Upper
+                        BoundState::Upper
                     };
                     blocking = ((room / step).max(0.0), Some((i, place)));
                 }
             }
-            for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
+            for i in (0..self.n).filter(|i| places[*i] == BoundState::Free) {
                 x[i] += blocking.0 * (goal[i] - x[i]);
             }
             let Some((i, place)) = blocking.1 else {
                 return true;
             };
             // The bound itself: the sum above meets it to rounding only.
-            x[i] = if place == Place::Lower {
+            x[i] = if place == BoundState::Lower {
                 self.lower[i]
             } else {
                 self.upper[i]
@@ -371,17 +377,17 @@ impl Bounded {
     }
 
     /// The unconstrained minimum over the free parameters, the others kept; none if G is singular there.
-    fn solve_free(&self, x: &Vector, places: &[Place; MOST]) -> Option<Vector> {
+    fn solve_free(&self, x: &Vector, places: &[BoundState; MOST]) -> Option<Vector> {
         let mut free = [0; MOST];
         let mut count = 0;
-        for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
+        for i in (0..self.n).filter(|i| places[*i] == BoundState::Free) {
             free[count] = i;
             count += 1;
         }
         let free = &free[..count];
         let mut right = [0.0; MOST];
         for (a, &i) in free.iter().enumerate() {
-            let bound = (0..self.n).filter(|j| places[*j] != Place::Free);
+            let bound = (0..self.n).filter(|j| places[*j] != BoundState::Free);
             right[a] = self.right[i] - bound.map(|j| self.gram[i][j] * x[j]).sum::<f64>();
         }
         let solution = cholesky_solve(|a, b| self.gram[free[a]][free[b]], right, count)?;

@@ -27,7 +27,7 @@ pub struct SettingError {
     pub key: String,
     /// The value refused.
     pub value: String,
-    /// What would be accepted, in words.
+    /// Accepted values, in words.
     pub requirement: String,
     /// Advice, where the requirement alone does not say what to do.
     pub advice: Option<&'static str>,

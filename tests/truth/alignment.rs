@@ -14,7 +14,7 @@ use nav_sim::navigation::sensors::defects::ImuSettings;
 use nav_sim::navigation::sensors::gnss::GnssSettings;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
-use nav_sim::navigation::simulation::{Plan, Recording, record};
+use nav_sim::navigation::simulation::{Plan, SimulatedRecording as Recording, record};
 use nav_sim::navigation::trajectory::{Trajectory, TrajectorySample};
 use nav_sim::signal::imu::Sensor;
 use nav_sim::signal::noise::Model;

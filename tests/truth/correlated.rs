@@ -70,7 +70,7 @@ fn told_of([tau_s, of_velocity_s]: [f64; 2], runs: u64) -> Told {
         for (sum, solution) in told
             .nees
             .iter_mut()
-            .zip([weighed.judged(), &weighed.solution])
+            .zip([weighed.with_stated_sigmas(), &weighed.solution])
         {
             *sum += outcome(solution, &[]).reference.unwrap().nees_mean / runs as f64;
         }

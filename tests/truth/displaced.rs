@@ -4,7 +4,7 @@ use crate::fusion::{belief, model, recorded, run, settings, shipped};
 use glam::{DQuat, DVec3};
 use nav_sim::navigation::fusion::{Displaced, Recorded, Settings, Start, displaced, outcome};
 use nav_sim::navigation::sensors::gnss::GnssSettings;
-use nav_sim::navigation::simulation::Recording;
+use nav_sim::navigation::simulation::SimulatedRecording as Recording;
 use nav_sim::navigation::trajectory::reference::Reference;
 use nav_sim::navigation::trajectory::{Trajectory, TrajectorySample};
 

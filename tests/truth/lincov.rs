@@ -9,7 +9,8 @@ use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::navigation::trajectory::profile::{
-    Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
+    Acceleration, Bank, Length, Profile, ProfileStart as Start, Segment, SegmentKind as Kind,
+    Turning,
 };
 use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::simulation::lincov::{DRIFT, FilterPass, TruthSide, assess};

@@ -8,7 +8,7 @@ use nav_sim::navigation::frames::RollPitchYaw;
 use nav_sim::navigation::fusion::alignment::coarse;
 use nav_sim::navigation::fusion::mounting::{Mounting, find};
 use nav_sim::navigation::fusion::{Recorded, Settings, fuse};
-use nav_sim::navigation::simulation::Recording;
+use nav_sim::navigation::simulation::SimulatedRecording as Recording;
 use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::navigation::trajectory::reference::Reference;
 use nav_sim::signal::imu::ImuIncrement;

@@ -3,14 +3,16 @@
 use nav_sim::io::datasheet::{Figure, catalogued};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::require::{
-    Answer, Course, Drift, IMU_PARAMETERS, Limit, Margins, Need, Quantity, RequireError,
+    Drift, IMU_PARAMETERS, ImuSearch, IntensityBound, Limit, LimitQuantity, Margins,
+    OutagePlacements, RequireError,
 };
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::navigation::trajectory::profile::{
-    Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
+    Acceleration, Bank, Length, Profile, ProfileStart as Start, Segment, SegmentKind as Kind,
+    Turning,
 };
 use nav_sim::signal::imu::Sensor;
 use nav_sim::signal::noise::{Composite, Model, Process};
@@ -65,7 +67,7 @@ fn trajectory() -> Trajectory {
     .unwrap()
 }
 
-fn limit(quantity: Quantity, most: f64) -> [Limit; 1] {
+fn limit(quantity: LimitQuantity, most: f64) -> [Limit; 1] {
     [Limit { quantity, most }]
 }
 
@@ -74,9 +76,9 @@ fn limit(quantity: Quantity, most: f64) -> [Limit; 1] {
 #[test]
 fn the_imu_that_is_named_meets_the_limit_in_sampled_runs() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
-    let course = Course::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
-    let limits = limit(Quantity::P95, 12.0);
-    let need = Need {
+    let course = OutagePlacements::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
+    let limits = limit(LimitQuantity::P95, 12.0);
+    let need = ImuSearch {
         course: &course,
         scenario: &scenario,
         limits: &limits,
@@ -109,9 +111,12 @@ fn the_imu_that_is_named_meets_the_limit_in_sampled_runs() {
 #[test]
 fn answers_are_monotone() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
-    let course = Course::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
-    let limits = [limit(Quantity::P95, 30.0), limit(Quantity::P95, 10.0)];
-    let need = |k: usize| Need {
+    let course = OutagePlacements::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
+    let limits = [
+        limit(LimitQuantity::P95, 30.0),
+        limit(LimitQuantity::P95, 10.0),
+    ];
+    let need = |k: usize| ImuSearch {
         course: &course,
         scenario: &scenario,
         limits: &limits[k],
@@ -123,9 +128,10 @@ fn answers_are_monotone() {
         "{loose:?} {tight:?}"
     );
     for i in 0..IMU_PARAMETERS {
-        let beside = need(0).alone(&loose, i, 0.1).unwrap();
-        let alone = need(0).quite_alone(&loose, i).unwrap();
-        let (Answer::AtMost(beside), Answer::AtMost(alone)) = (beside, alone) else {
+        let beside = need(0).limit_of(&loose, i, 0.1).unwrap();
+        let alone = need(0).limit_with_others_perfect(&loose, i).unwrap();
+        let (IntensityBound::AtMost(beside), IntensityBound::AtMost(alone)) = (beside, alone)
+        else {
             panic!("{beside:?} {alone:?}")
         };
         assert!(
@@ -139,9 +145,9 @@ fn answers_are_monotone() {
 #[test]
 fn what_gnss_alone_misses_is_refused() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
-    let course = Course::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
-    let limits = limit(Quantity::Rmse, 0.05);
-    let need = Need {
+    let course = OutagePlacements::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
+    let limits = limit(LimitQuantity::Rmse, 0.05);
+    let need = ImuSearch {
         course: &course,
         scenario: &scenario,
         limits: &limits,
@@ -163,10 +169,10 @@ fn the_imu_that_is_named_keeps_the_limit_at_every_beginning() {
         end_s: f64::from(start_s) + 20.0,
     };
     let outages: Vec<Outage> = (60..=160).map(begins).collect();
-    let course = Course::new(&scenario, &trajectory, &outages).unwrap();
+    let course = OutagePlacements::new(&scenario, &trajectory, &outages).unwrap();
     for most in [3.0, 10.0] {
-        let limits = limit(Quantity::P95, most);
-        let need = Need {
+        let limits = limit(LimitQuantity::P95, most);
+        let need = ImuSearch {
             course: &course,
             scenario: &scenario,
             limits: &limits,
@@ -174,13 +180,13 @@ fn the_imu_that_is_named_keeps_the_limit_at_every_beginning() {
         };
         let model = need.allocated().unwrap().model(scenario.imu.rate_hz);
         let drifts = course.drifts(&scenario, &model).unwrap();
-        let (place, worst) = Drift::largest(&drifts, Quantity::P95).unwrap();
+        let (place, worst) = Drift::largest(&drifts, LimitQuantity::P95).unwrap();
         assert!(
             (0.9975..=1.0).contains(&(worst / most)),
             "{worst} of {most} at {:?}",
             outages[place]
         );
-        let values: Vec<f64> = drifts.iter().map(|d| d.value(Quantity::P95)).collect();
+        let values: Vec<f64> = drifts.iter().map(|d| d.value(LimitQuantity::P95)).collect();
         assert_eq!(worst, values.iter().copied().fold(0.0, f64::max));
         let least = values.iter().copied().fold(f64::MAX, f64::min);
         assert!(
@@ -199,9 +205,9 @@ fn the_imu_that_is_named_keeps_the_limit_in_the_steps_of_a_run() {
             start_s,
             end_s: start_s + length_s,
         }];
-        let course = Course::new(&scenario, &trajectory, &outages).unwrap();
-        let limits = limit(Quantity::Rmse, 1.0 + 0.005 * length_s * length_s);
-        let need = Need {
+        let course = OutagePlacements::new(&scenario, &trajectory, &outages).unwrap();
+        let limits = limit(LimitQuantity::Rmse, 1.0 + 0.005 * length_s * length_s);
+        let need = ImuSearch {
             course: &course,
             scenario: &scenario,
             limits: &limits,
@@ -272,7 +278,7 @@ fn outages_beside_one_another_are_as_each_alone() {
             (end_s - 20.0, end_s),
         ];
         let outages = outages.map(|(start_s, end_s)| Outage { start_s, end_s });
-        let drifts = Course::new(&scenario, &trajectory, &outages)
+        let drifts = OutagePlacements::new(&scenario, &trajectory, &outages)
             .unwrap()
             .drifts(&scenario, &model)
             .unwrap();
@@ -283,7 +289,7 @@ fn outages_beside_one_another_are_as_each_alone() {
                 .merged();
             let alone = end_of_outage(&scenario, &trajectory, &model, outage, &track);
             let found = [
-                drift.value(Quantity::Rmse),
+                drift.value(LimitQuantity::Rmse),
                 drift.angles_deg[0],
                 drift.angles_deg[2],
             ];
@@ -304,22 +310,23 @@ fn outages_beside_one_another_are_as_each_alone() {
 #[test]
 fn a_curve_holds_the_ends_of_all_shorter_outages() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
-    let limits = limit(Quantity::P95, 20.0);
-    let course =
-        |end_s: f64| Course::new(&scenario, &trajectory, &[Outage { end_s, ..OUTAGE }]).unwrap();
+    let limits = limit(LimitQuantity::P95, 20.0);
+    let course = |end_s: f64| {
+        OutagePlacements::new(&scenario, &trajectory, &[Outage { end_s, ..OUTAGE }]).unwrap()
+    };
     let at_end = course(170.0);
-    let need = Need {
+    let need = ImuSearch {
         course: &at_end,
         scenario: &scenario,
         limits: &limits,
         t_corr_s: 300.0,
     };
     let model = need.allocated().unwrap().model(scenario.imu.rate_hz);
-    let end = at_end.drifts(&scenario, &model).unwrap()[0].value(Quantity::P95);
+    let end = at_end.drifts(&scenario, &model).unwrap()[0].value(LimitQuantity::P95);
     let curve = &course(190.0).curves(&scenario, &model).unwrap()[0];
     let short = curve.iter().find(|drift| drift.after_s == 20.0).unwrap();
     assert!(
-        (short.value(Quantity::P95) / end - 1.0).abs() < 1e-9,
+        (short.value(LimitQuantity::P95) / end - 1.0).abs() < 1e-9,
         "{short:?} {end}"
     );
     assert!(curve.last().is_some_and(|drift| drift.after_s == 40.0) && curve.len() == 40);
@@ -334,7 +341,7 @@ fn quantiles_of_a_horizontal_error_have_their_closed_forms() {
         covariance_m2: [[variance, 0.0], [0.0, variance]],
         angles_deg: [0.0; 3],
     };
-    for (found, probability) in [(Quantity::P50, 0.5_f64), (Quantity::P95, 0.95)] {
+    for (found, probability) in [(LimitQuantity::P50, 0.5_f64), (LimitQuantity::P95, 0.95)] {
         let rayleigh = 2.0 * (-2.0 * (1.0 - probability).ln()).sqrt();
         assert!((drift([0.0; 2], 4.0).value(found) / rayleigh - 1.0).abs() < 1e-9);
         assert!((drift([3.0, -4.0], 0.0).value(found) - 5.0).abs() < 1e-9);
@@ -342,7 +349,7 @@ fn quantiles_of_a_horizontal_error_have_their_closed_forms() {
         let normal = [0.0, 1.644_853_627][usize::from(probability > 0.9)];
         assert!((drift([3.0, -4.0], 1e-4).value(found) - 5.0 - 0.01 * normal).abs() < 2e-5);
     }
-    assert!((drift([3.0, -4.0], 2.0).value(Quantity::Rmse) - 29.0_f64.sqrt()).abs() < 1e-12);
+    assert!((drift([3.0, -4.0], 2.0).value(LimitQuantity::Rmse) - 29.0_f64.sqrt()).abs() < 1e-12);
 }
 
 /// An accelerometer bias b that no fix corrects moves a vehicle by b t²/2 in an outage; an IMU without errors leaves what
@@ -358,8 +365,8 @@ fn an_imu_without_errors_leaves_what_gnss_and_start_leave() {
         end_s: 20.0,
     }];
     let margins = |scenario: &Scenario| {
-        let course = Course::new(scenario, &trajectory, &start).unwrap();
-        Margins::of(&course, scenario, &model, &limit(Quantity::Rmse, 6.0)).unwrap()
+        let course = OutagePlacements::new(scenario, &trajectory, &start).unwrap();
+        Margins::of(&course, scenario, &model, &limit(LimitQuantity::Rmse, 6.0)).unwrap()
     };
     scenario.initial.att_sigma_deg = [1e-3; 3];
     scenario.initial.vel_sigma_m_s = [1e-3; 3];
@@ -422,8 +429,8 @@ fn flicker_noise(density: f64, floor: f64) -> Composite {
 #[test]
 fn a_datasheet_is_not_read_optimistically() {
     let (scenario, trajectory) = (Scenario::default(), trajectory());
-    let course = Course::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
-    let p95 = |model: &Model| course.drifts(&scenario, model).unwrap()[0].value(Quantity::P95);
+    let course = OutagePlacements::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
+    let p95 = |model: &Model| course.drifts(&scenario, model).unwrap()[0].value(LimitQuantity::P95);
     for name in ["vn100", "adis16488"] {
         let sheet = catalogued(name).unwrap().unwrap();
         let figures =

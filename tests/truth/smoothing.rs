@@ -13,7 +13,7 @@ use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::gnss::GnssSettings;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
-use nav_sim::navigation::simulation::{Plan, Recording, record};
+use nav_sim::navigation::simulation::{Plan, SimulatedRecording as Recording, record};
 use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::earth::radii;

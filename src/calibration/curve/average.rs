@@ -45,12 +45,12 @@ nav_sim_signal::named!(
 );
 
 impl Estimator {
-    /// Whether it uses the robust wavelet variance.
+    /// Returns true for an estimator that uses the robust wavelet variance.
     pub const fn is_robust(self) -> bool {
         matches!(self, Self::SrAwv | Self::DrAwv | Self::Rgmwm)
     }
 
-    /// Whether it takes one replicate at a time.
+    /// Returns true for an estimator that takes one replicate at a time.
     pub const fn is_single(self) -> bool {
         matches!(self, Self::Gmwm | Self::Rgmwm | Self::Avlr | Self::Given)
     }
@@ -141,7 +141,8 @@ impl Replicate {
         }
     }
 
-    /// Whether that is the robust one: on coarse steps a robust estimator too takes the classical one.
+    /// Returns true if the variance used at a level is the robust one. On coarse quantization steps
+    /// a robust estimator falls back to the classical variance.
     pub(crate) fn is_robust(&self, estimator: Estimator, index: usize) -> bool {
         estimator.is_robust() && self.robust[index].status != Status::Coarse
     }
@@ -179,9 +180,9 @@ impl Replicate {
     }
 }
 
-/// What a calibration fails by, where advice depends on it.
+/// Reason for which a calibration fails, where the advice depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cause {
+pub enum CalibrationFault {
     /// A signal too short for its scales.
     TooShort,
     /// A trim that leaves no replicate.
@@ -201,18 +202,18 @@ pub enum Cause {
 #[error("{message}")]
 pub struct CalibrationError {
     /// Its cause.
-    pub cause: Cause,
+    pub cause: CalibrationFault,
     message: String,
 }
 
 impl CalibrationError {
-    pub(crate) fn new(cause: Cause, message: impl ToString) -> Self {
+    pub(crate) fn new(cause: CalibrationFault, message: impl ToString) -> Self {
         let message = message.to_string();
         Self { cause, message }
     }
 
     pub(crate) fn other(message: impl ToString) -> Self {
-        Self::new(Cause::Other, message)
+        Self::new(CalibrationFault::Other, message)
     }
 
     /// The same, of a group or a signal.
@@ -269,7 +270,7 @@ pub fn average(
         let message = format!(
             "trimming {trim} replicates at each end needs at least {least} replicates; there are {count}"
         );
-        return Err(CalibrationError::new(Cause::Trim, message));
+        return Err(CalibrationError::new(CalibrationFault::Trim, message));
     }
     let quantization = estimator.is_robust().then(|| *tuning.quantization());
     let kept_of_all = (count - 2 * dropped(count)) as f64;
@@ -509,9 +510,9 @@ impl Group {
 /// Rule by which signals are replicates of one another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pool {
-    /// Those of one axis: a model an axis.
+    /// Signals of one axis: one model per axis.
     Axes,
-    /// Those of all axes of a sensor: one model a sensor.
+    /// Signals of all axes of a sensor: one model per sensor.
     Sensor,
 }
 
@@ -532,7 +533,7 @@ pub fn replicates(
         let levels = levels.unwrap_or_else(|| default_levels(samples));
         let error = |e: WaveletError| {
             let message = format!("{}, {channel}: {e}", recording.name);
-            CalibrationError::new(Cause::TooShort, message)
+            CalibrationError::new(CalibrationFault::TooShort, message)
         };
         let (classical, robust, coverage) = if signal.samples.iter().any(|x| x.is_nan()) {
             let Gappy {

@@ -5,9 +5,9 @@ pub(crate) mod sampling;
 mod stationarity;
 
 pub use average::{
-    CalibrationError, Cause, Estimator, Group, Pool, Replicate, Scope, Trim, average, grouped,
-    log_bias, median, replicates, robust_bias, trend,
+    CalibrationError, CalibrationFault, Estimator, Group, Pool, Replicate, Scope, Trim, average,
+    grouped, log_bias, median, replicates, robust_bias, trend,
 };
 pub(crate) use average::{LARGEST_BIAS, MAD_TO_DEVIATION, falling_root, p_value};
 pub use sampling::implied;
-pub use stationarity::{Beginning, WarmUp, warm_up};
+pub use stationarity::{RecordingWarmUp, WarmUp, warm_up};

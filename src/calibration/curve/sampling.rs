@@ -4,7 +4,7 @@
 //! of the model ([Percival](crate::bibliography::Percival95)). Each nu_j is taken as chi-square with the degrees of
 //! freedom 2 nu²/var that follow, joined by the correlations that follow; where the record has few lengths of the
 //! scale, with those of var = 2/M² Σ (M − |k|) s_k² over the lags there are, s_k the autocovariance of the
-//! coefficients, and of a shape of its own ([`Shape`]). Drift is not noise: it adds to nu and, but for its product with
+//! coefficients, and of a shape of its own ([`VarianceLaw`]). Drift is not noise: it adds to nu and, but for its product with
 //! the mean of the coefficients, not to its scatter. Quantization noise is not Gaussian: what that leaves of the scatter
 //! of a robust variance is in [`SamplingLaw::robust_edof`].
 
@@ -30,11 +30,11 @@ pub(crate) struct SamplingLaw {
     pub(crate) quantization: Vec<f64>,
     /// Squares of the autocorrelations of the coefficients of the last levels ([`squared_autocorrelations`]); none of others.
     autocorrelations: Vec<Vec<f64>>,
-    /// Of what a robust variance scatters more than the classical one, the part that is left in correlated coefficients, of each
-    /// level ([`fourth_powers`]).
+    /// Excess scatter of the robust variance over the classical one, at each level: the part that
+    /// remains in correlated coefficients ([`fourth_powers`]).
     fourth: Vec<f64>,
     /// Shape of the law of each level: a chi-square's but at the last levels.
-    pub(crate) shapes: Vec<Shape>,
+    pub(crate) shapes: Vec<VarianceLaw>,
     /// Correlations between levels, and the lower Cholesky factor.
     pub(crate) correlation: DMatrix<f64>,
     factor: DMatrix<f64>,
@@ -196,19 +196,20 @@ fn fourth_powers(model: &Composite, level: usize) -> f64 {
 }
 
 /// The shape of the law of a level's wavelet variance; a chi-square's for a level that is not among the last.
-fn shape(model: &Composite, level: usize, levels: usize) -> Shape {
+fn shape(model: &Composite, level: usize, levels: usize) -> VarianceLaw {
     /// Frequencies to a gain's main lobe, 1/tau wide: eight make the sums of powers of it integrals.
     const TO_A_LOBE: usize = 8;
     if !is_last(level, levels) {
-        return Shape::default();
+        return VarianceLaw::default();
     }
     let m = f64::from(level as u32 - 1).exp2();
     // Up to 8/tau, beyond which there is a thousandth of a random walk's power and a hundredth of white noise's.
     let weight = |k: usize| gain(model, (k as f64 + 0.5) / (TO_A_LOBE as f64 * 2.0 * m), m);
-    Shape::new(&(0..8 * TO_A_LOBE).map(weight).collect::<Vec<f64>>())
+    VarianceLaw::new(&(0..8 * TO_A_LOBE).map(weight).collect::<Vec<f64>>())
 }
 
-/// Whether a record may hold a level's scale few times. Below level 4 a sixteenth of the scale is less than a sample.
+/// Returns true at a level whose scale fits only a few times into the record. Below level 4 a
+/// sixteenth of the scale is less than a sample.
 const fn is_last(level: usize, levels: usize) -> bool {
     level + LAST > levels && level >= 4
 }
@@ -330,22 +331,22 @@ const MANY_DEGREES: f64 = 60.0;
 
 /// Law of nu over its mean; the default is the chi-square's.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Shape {
+pub(crate) struct VarianceLaw {
     /// Points of the law of one degree of freedom a weight, rising; none: a chi-square.
-    points: Vec<Point>,
+    points: Vec<ScorePoint>,
     /// Degrees of freedom of that law.
     degrees: f64,
 }
 
 /// A value and what its normal score consists of: the score is w·√k + c/√k, with k degrees of freedom a weight.
 #[derive(Debug, Clone)]
-struct Point {
+struct ScorePoint {
     ln: f64,
     w: f64,
     c: f64,
 }
 
-impl Shape {
+impl VarianceLaw {
     /// The shape of a mean of squares with these weights, of any scale; the chi-square's where there is none.
     pub(crate) fn new(weights: &[f64]) -> Self {
         let sum: f64 = weights.iter().sum();
@@ -367,7 +368,7 @@ impl Shape {
                 k2 += 2.0 * (w / d).powi(2);
             }
             let w = (2.0 * (s * k1 - k)).max(0.0).sqrt().copysign(s);
-            Point {
+            ScorePoint {
                 ln: k1.ln(),
                 w,
                 c: (s * k2.sqrt() / w).ln() / w,
@@ -434,7 +435,7 @@ impl Shape {
     /// ln of nu over its mean, between the points; beyond the last of them as there.
     fn ln(&self, z: f64, edof: f64) -> f64 {
         let root = (edof / self.degrees).sqrt();
-        let score = |p: &Point| p.w * root + p.c / root;
+        let score = |p: &ScorePoint| p.w * root + p.c / root;
         let above = self
             .points
             .partition_point(|p| score(p) < z)

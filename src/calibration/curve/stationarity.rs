@@ -33,10 +33,10 @@ pub struct WarmUp {
 
 /// Recording that does not begin as it goes on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Beginning {
+pub struct RecordingWarmUp {
     /// The recording.
     pub recording: String,
-    /// Those of its signals of which that is so.
+    /// Its signals with a warm-up.
     pub signals: Vec<WarmUp>,
     /// Seconds to leave out from the beginning of the file; none where that does not help.
     pub skip_s: Option<f64>,
@@ -123,7 +123,7 @@ fn look(samples: &[f64]) -> Option<usize> {
     found
 }
 
-/// Whether a value is out of place among others.
+/// Returns true if `first` is an outlier among the other values.
 fn out_of_place(first: f64, others: &[f64]) -> bool {
     let count = others.len() as f64;
     let mean = others.iter().sum::<f64>() / count;

@@ -1,6 +1,6 @@
 //! All recordings against one another, by one test.
 
-use super::contrasts::{Found, Noise, Table, alarms};
+use super::contrasts::{AbnormalFile, LogVarianceTable, Noise, alarms};
 use super::diagnose::Alarm;
 use crate::curve::sampling::{SamplingLaw, drift_share};
 use crate::curve::{Estimator, Group, Replicate};
@@ -10,17 +10,22 @@ use crate::outcome::{Outcome, tau_s};
 use crate::wavelet::interval::edof_robust;
 
 /// All recordings against one another by one test.
-pub(super) struct Comparison {
+pub(super) struct RecordingComparison {
     axes: Vec<Axis>,
-    table: Table,
+    table: LogVarianceTable,
     noise: Vec<Noise>,
-    found: Vec<Found>,
+    found: Vec<AbnormalFile>,
 }
 
-impl Comparison {
-    pub(super) fn new(pieces: &[Piece<'_>], sensor: Sensor, test: Test, efficiency: f64) -> Self {
+impl RecordingComparison {
+    pub(super) fn new(
+        pieces: &[AxisReplicates<'_>],
+        sensor: Sensor,
+        test: Test,
+        efficiency: f64,
+    ) -> Self {
         let levels = test.most_levels(pieces);
-        let of_piece = |p: &Piece<'_>| {
+        let of_piece = |p: &AxisReplicates<'_>| {
             let logs = |r: &Replicate| {
                 (0..test.levels(p, r))
                     .map(|j| test.value(p, r, j))
@@ -28,7 +33,7 @@ impl Comparison {
             };
             p.replicates.iter().map(|r| r.map(logs)).collect()
         };
-        let noise = |p: &Piece<'_>| {
+        let noise = |p: &AxisReplicates<'_>| {
             let longest = p
                 .replicates
                 .iter()
@@ -42,7 +47,7 @@ impl Comparison {
             };
             Noise::new(p.law.first(levels), p.replicates.iter().map(edof).collect())
         };
-        let table = Table {
+        let table = LogVarianceTable {
             logs: pieces.iter().map(of_piece).collect(),
             above_only: test == Test::Outliers,
         };
@@ -55,8 +60,8 @@ impl Comparison {
     }
 
     fn of(
-        pieces: &[Piece<'_>],
-        table: Table,
+        pieces: &[AxisReplicates<'_>],
+        table: LogVarianceTable,
         noise: Vec<Noise>,
         sensor: Sensor,
         name: &str,
@@ -71,15 +76,15 @@ impl Comparison {
 
     /// The change of the level within each recording, in standard deviations of the fitted model; their strengths may differ as
     /// those of the noise at the longest scales do.
-    pub(super) fn drift(pieces: &[Piece<'_>], sensor: Sensor, noise: &Self) -> Self {
-        let deviations = |p: &Piece<'_>| {
+    pub(super) fn drift(pieces: &[AxisReplicates<'_>], sensor: Sensor, noise: &Self) -> Self {
+        let deviations = |p: &AxisReplicates<'_>| {
             // The Haar coefficient of a scale as long as the record is half the trend, and its variance is nu
             // there.
             let deviation =
                 |r: &Replicate| vec![0.5 * r.trend / wv_of_length(p.model, r.samples).sqrt()];
             p.replicates.iter().map(|r| r.map(deviation)).collect()
         };
-        let table = Table {
+        let table = LogVarianceTable {
             logs: pieces.iter().map(deviations).collect::<Vec<Vec<_>>>(),
             above_only: false,
         };
@@ -143,15 +148,16 @@ const LARGE_SAMPLE: f64 = 30.0;
 const MOST_DRIFT: f64 = 0.02;
 
 /// The replicates of one axis, by recording.
-pub(super) struct Piece<'a> {
+pub(super) struct AxisReplicates<'a> {
     pub(super) axis: Axis,
     pub(super) model: &'a Composite,
     pub(super) law: SamplingLaw,
     pub(super) replicates: Vec<Option<&'a Replicate>>,
 }
 
-impl Piece<'_> {
-    /// Whether drift makes so much of the wavelet variance at a level (index) that its scatter is not known.
+impl AxisReplicates<'_> {
+    /// Returns true if drift dominates the wavelet variance at a level (index), so that its scatter
+    /// is not known.
     pub(super) fn drifts(&self, level: usize) -> bool {
         drift_share(self.model, level as u32 + 1) > MOST_DRIFT
     }
@@ -162,7 +168,7 @@ pub(super) fn axes<'a>(
     own: &[&'a Group],
     names: &[&str],
     outcomes: &'a [Outcome],
-) -> Vec<Piece<'a>> {
+) -> Vec<AxisReplicates<'a>> {
     let levels = own
         .iter()
         .flat_map(|g| &g.replicates)
@@ -186,7 +192,7 @@ pub(super) fn axes<'a>(
                 .find(|r| r.name == **name && r.axis == Some(axis))
         };
         let law = SamplingLaw::new(model, levels);
-        Some(Piece {
+        Some(AxisReplicates {
             axis,
             model,
             law,
@@ -212,7 +218,7 @@ pub(super) fn excess_of_classical(r: &Replicate, level: usize) -> f64 {
 
 impl Test {
     /// The quantity at a level; NaN where it is no evidence.
-    pub(super) fn value(self, piece: &Piece<'_>, r: &Replicate, level: usize) -> f64 {
+    pub(super) fn value(self, piece: &AxisReplicates<'_>, r: &Replicate, level: usize) -> f64 {
         match self {
             _ if piece.drifts(level) => f64::NAN,
             Self::Noise => r.value(Estimator::SrAwv, level).ln(),
@@ -232,7 +238,7 @@ impl Test {
     }
 
     /// Number of levels at which a replicate can be compared with others.
-    pub(super) fn levels(self, piece: &Piece<'_>, replicate: &Replicate) -> usize {
+    pub(super) fn levels(self, piece: &AxisReplicates<'_>, replicate: &Replicate) -> usize {
         let edof = piece
             .law
             .edof(replicate.samples)
@@ -243,8 +249,8 @@ impl Test {
     }
 
     /// The most levels at which any can be.
-    pub(super) fn most_levels(self, pieces: &[Piece<'_>]) -> usize {
-        let of_piece = |p: &Piece<'_>| {
+    pub(super) fn most_levels(self, pieces: &[AxisReplicates<'_>]) -> usize {
+        let of_piece = |p: &AxisReplicates<'_>| {
             p.replicates
                 .iter()
                 .flatten()

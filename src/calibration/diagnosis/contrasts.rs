@@ -22,13 +22,13 @@ const FEWEST_TO_PASS_OVER: usize = 6;
 type Files = Vec<Option<Vec<f64>>>;
 
 /// ln nu of every file on the axes of a sensor, `[axis][file][level]`; not every file has every axis.
-pub(super) struct Table {
+pub(super) struct LogVarianceTable {
     pub(super) logs: Vec<Files>,
     /// Only what lies above the others counts.
     pub(super) above_only: bool,
 }
 
-impl Table {
+impl LogVarianceTable {
     /// New files of the same noise, that differ by Gaussian numbers besides, of the standard deviation given
     /// for each level, independent from level to level; of their variance the axes of a file share a part.
     fn drawn(
@@ -83,7 +83,7 @@ impl Table {
     fn shared(&self, noise: &[Noise], between: &[f64], active: &[bool]) -> f64 {
         let (mut covariance, mut variance) = (0.0, 0.0);
         for (j, between) in between.iter().enumerate() {
-            let contrasts = self.contrasts(noise, Window { first: j, width: 1 }, j, active);
+            let contrasts = self.contrasts(noise, ScaleWindow { first: j, width: 1 }, j, active);
             for (i, one) in contrasts.iter().enumerate() {
                 for other in &contrasts[..i] {
                     let pairs = one.values.iter().zip(&other.values);
@@ -113,7 +113,7 @@ impl Table {
     pub(super) fn between(&self, noise: &[Noise], active: &[bool]) -> Vec<f64> {
         let levels = noise.first().map_or(0, Noise::levels);
         let level = |j: usize| {
-            let contrasts = self.contrasts(noise, Window { first: j, width: 1 }, j, active);
+            let contrasts = self.contrasts(noise, ScaleWindow { first: j, width: 1 }, j, active);
             let (mut squares, mut freedom, mut own) = (0.0, 0.0, 0.0);
             for axis in &contrasts {
                 squares += axis.squares;
@@ -136,7 +136,7 @@ impl Table {
     fn contrasts(
         &self,
         noise: &[Noise],
-        window: Window,
+        window: ScaleWindow,
         index: usize,
         active: &[bool],
     ) -> Vec<Contrast> {
@@ -280,25 +280,25 @@ fn distance(contrasts: &[Contrast], file: usize, pass_over: bool) -> Option<Dist
 
 /// The largest distances of a file: against all others, and with one of them passed over (0 if too few).
 #[derive(Debug, Clone)]
-struct Furthest {
+struct LargestDistances {
     /// The two F.
     f: [f64; 2],
     /// The window of each, with the deviations there.
-    at: [Option<(Window, Distance)>; 2],
+    at: [Option<(ScaleWindow, Distance)>; 2],
 }
 
 /// The largest distances of every file.
-fn furthest(table: &Table, noise: &[Noise], active: &[bool]) -> Vec<Furthest> {
+fn furthest(table: &LogVarianceTable, noise: &[Noise], active: &[bool]) -> Vec<LargestDistances> {
     let levels = noise.first().map_or(0, Noise::levels);
     let count = active.iter().filter(|on| **on).count();
     let mut all = vec![
-        Furthest {
+        LargestDistances {
             f: [0.0; 2],
             at: [None, None]
         };
         active.len()
     ];
-    for (index, window) in Window::all(levels).into_iter().enumerate() {
+    for (index, window) in ScaleWindow::all(levels).into_iter().enumerate() {
         let contrasts = table.contrasts(noise, window, index, active);
         for (file, furthest) in all.iter_mut().enumerate().filter(|(k, _)| active[*k]) {
             for pass_over in [false, true] {
@@ -330,14 +330,14 @@ const WIDTHS: [usize; 3] = [1, 3, 5];
 
 /// Neighbouring scales.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Window {
+pub(super) struct ScaleWindow {
     /// Index of the first.
     pub(super) first: usize,
     /// Number of scales.
     pub(super) width: usize,
 }
 
-impl Window {
+impl ScaleWindow {
     /// All windows over so many scales.
     fn all(levels: usize) -> Vec<Self> {
         let of_width = |width: usize| {
@@ -415,7 +415,7 @@ impl Noise {
                     .collect()
             })
             .collect();
-        let of_window = |window: Window| {
+        let of_window = |window: ScaleWindow| {
             let of_file = |s: &Vec<f64>| {
                 let pair = |i: usize| {
                     window
@@ -427,7 +427,10 @@ impl Noise {
             };
             deviations.iter().map(of_file).collect()
         };
-        let variances = Window::all(levels).into_iter().map(of_window).collect();
+        let variances = ScaleWindow::all(levels)
+            .into_iter()
+            .map(of_window)
+            .collect();
         Self {
             kind: NoiseKind::Law(law),
             edof,
@@ -454,16 +457,21 @@ const FEWEST_TO_SHARE: usize = 4;
 const SEED: u64 = 1;
 
 /// An abnormal file, and where it is so.
-pub(super) struct Found {
+pub(super) struct AbnormalFile {
     pub(super) file: usize,
     /// Probability that the most unusual of alike files is as unusual.
     pub(super) p_value: f64,
-    pub(super) window: Window,
+    pub(super) window: ScaleWindow,
     pub(super) distance: Distance,
 }
 
 /// The abnormal files, the most abnormal first. `source` and `process` name the streams.
-pub(super) fn alarms(table: &Table, noise: &[Noise], source: &str, process: &str) -> Vec<Found> {
+pub(super) fn alarms(
+    table: &LogVarianceTable,
+    noise: &[Noise],
+    source: &str,
+    process: &str,
+) -> Vec<AbnormalFile> {
     let files = table.logs.first().map_or(0, Vec::len);
     let mut active = vec![true; files];
     let mut found = Vec::new();
@@ -483,12 +491,12 @@ pub(super) fn alarms(table: &Table, noise: &[Noise], source: &str, process: &str
 }
 
 fn most_abnormal(
-    table: &Table,
+    table: &LogVarianceTable,
     noise: &[Noise],
     active: &[bool],
     source: &str,
     process: &str,
-) -> Option<Found> {
+) -> Option<AbnormalFile> {
     let mut own = furthest(table, noise, active);
     // With the furthest in it: F itself compares each with the others alone, and sets of alike recordings have a furthest one too.
     // Drawn with the spread of the others, which the furthest leaves too small, alike sets of four were alarmed in 17 %.
@@ -526,12 +534,12 @@ fn most_abnormal(
             .fold(0.0, f64::max)
     };
     let file = (0..own.len()).max_by(|a, b| joint(&own[*a].f).total_cmp(&joint(&own[*b].f)))?;
-    let Furthest { f, at } = own.swap_remove(file);
+    let LargestDistances { f, at } = own.swap_remove(file);
     let kind = usize::from(f[1] / limits[1] > f[0] / limits[0]);
     let larger = draws.iter().filter(|d| joint(d) >= joint(&f)).count();
     let [plain, passed] = at;
     let (window, distance) = if kind == 0 { plain } else { passed }?;
-    Some(Found {
+    Some(AbnormalFile {
         file,
         p_value: (1 + larger) as f64 / (1 + DRAWS) as f64,
         window,
@@ -571,7 +579,7 @@ mod tests {
     #[test]
     fn a_distance_by_hand() {
         let values = [-1.0, -1.0, 1.0, 1.0, 6.0];
-        let table = Table {
+        let table = LogVarianceTable {
             logs: vec![values.iter().map(|v| Some(vec![*v])).collect()],
             above_only: false,
         };
@@ -595,7 +603,7 @@ mod tests {
     #[test]
     fn distances_follow_fishers_law() {
         let mut generator = Generator::seed_from_u64(5);
-        let alike = Table {
+        let alike = LogVarianceTable {
             logs: vec![vec![Some(vec![0.0]); 8]; 3],
             above_only: false,
         };
@@ -611,7 +619,7 @@ mod tests {
     #[test]
     fn one_of_the_others_is_passed_over() {
         let values = [0.0, 0.1, -0.1, 0.05, -0.05, 5.0, 5.0];
-        let table = Table {
+        let table = LogVarianceTable {
             logs: vec![values.iter().map(|v| Some(vec![*v])).collect()],
             above_only: false,
         };
@@ -656,7 +664,7 @@ mod alarm_tests {
         let alarmed = |set: usize| {
             let files: Vec<[Vec<f64>; 3]> = (0..4).map(|_| file()).collect();
             let axis = |a: usize| files.iter().map(|file| Some(file[a].clone())).collect();
-            let table = Table {
+            let table = LogVarianceTable {
                 logs: (0..3).map(axis).collect(),
                 above_only: false,
             };

@@ -1,6 +1,6 @@
 //! Each recording against the others, sensor by sensor.
 
-use super::comparison::{Comparison, Piece, Test, axes, excess_of_classical};
+use super::comparison::{AxisReplicates, RecordingComparison, Test, axes, excess_of_classical};
 use super::contrasts::{FALSE_ALARM, FEWEST};
 use crate::curve::{Group, Replicate};
 use crate::imu::{Axis, Sensor};
@@ -41,22 +41,22 @@ fn of_sensor(
         pieces
     };
     let [noise, outliers] = [Test::Noise, Test::Outliers]
-        .map(|test| Comparison::new(&pieces, sensor, test, settings.tuning.efficiency()));
-    let drift = Comparison::drift(&pieces, sensor, &noise);
+        .map(|test| RecordingComparison::new(&pieces, sensor, test, settings.tuning.efficiency()));
+    let drift = RecordingComparison::drift(&pieces, sensor, &noise);
     let diagnosis = |(index, name): (usize, &&str)| {
         let [of_noise, of_outliers] =
             [&noise, &outliers].map(|test| test.alarm(index, settings.rate_hz));
-        let change = |p: &Piece<'_>| Some((p.axis, p.replicates[index]?.trend));
+        let change = |p: &AxisReplicates<'_>| Some((p.axis, p.replicates[index]?.trend));
         let of_drift = drift.alarm(index, settings.rate_hz).map(|alarm| Alarm {
             tau_s: Vec::new(),
             change: pieces.iter().filter_map(change).collect(),
             ..alarm
         });
         let verdict = match (&of_noise, &of_outliers, &of_drift) {
-            (Some(_), _, _) => Verdict::Noise,
-            (None, Some(_), _) => Verdict::Outliers,
-            (None, None, Some(_)) => Verdict::Drift,
-            (None, None, None) => Verdict::Normal,
+            (Some(_), _, _) => RecordingVerdict::Noise,
+            (None, Some(_), _) => RecordingVerdict::Outliers,
+            (None, None, Some(_)) => RecordingVerdict::Drift,
+            (None, None, None) => RecordingVerdict::Normal,
         };
         Diagnosis {
             name: (*name).to_owned(),
@@ -133,7 +133,7 @@ pub struct CommonFinding {
 }
 
 /// The median over the signals of ln (classical / robust) at a scale, less what is expected.
-struct Excess {
+struct RobustExcess {
     tau_s: f64,
     /// Excess with the allowance for the noise of a quantizer.
     quantizer: f64,
@@ -141,47 +141,48 @@ struct Excess {
     gaussian: f64,
     /// Standard deviation of either.
     sigma: f64,
-    /// Whether half of the signals or more have coarse steps there.
     is_stepped: bool,
 }
 
-impl Excess {
+impl RobustExcess {
     fn alarms(&self, excess: f64) -> bool {
         excess.is_finite() && excess > ALARM * self.sigma && excess.exp_m1() > LEAST
     }
 }
 
 /// The findings of all signals of a sensor together.
-fn common(pieces: &[Piece<'_>], settings: &Settings) -> Vec<CommonFinding> {
+fn common(pieces: &[AxisReplicates<'_>], settings: &Settings) -> Vec<CommonFinding> {
     let all = (0..Test::Outliers.most_levels(pieces)).map(|level| excess(pieces, level, settings));
-    let (stepped, fine): (Vec<Excess>, Vec<Excess>) = all.partition(|e| e.is_stepped);
-    let found: Vec<Excess> = fine.into_iter().filter(|e| e.alarms(e.quantizer)).collect();
+    let (stepped, fine): (Vec<RobustExcess>, Vec<RobustExcess>) = all.partition(|e| e.is_stepped);
+    let found: Vec<RobustExcess> = fine.into_iter().filter(|e| e.alarms(e.quantizer)).collect();
     let mut findings = Vec::new();
     if found.is_empty() {
         let differ = stepped
             .into_iter()
             .filter(|e| e.alarms(e.gaussian.abs()))
             .collect::<Vec<_>>();
-        findings.extend(seen(CommonCause::CoarseSteps, &differ, |e| e.gaussian));
+        findings.extend(finding_at(CommonCause::CoarseSteps, &differ, |e| {
+            e.gaussian
+        }));
     } else if found.iter().all(|e| !e.alarms(e.gaussian.abs())) {
         // Outliers raise the classical variance by anything; that they make up for the allowance, no more and no less, at
         // every scale is not to be expected.
-        findings.extend(seen(CommonCause::GaussianQuantization, &found, |e| {
+        findings.extend(finding_at(CommonCause::GaussianQuantization, &found, |e| {
             e.quantizer - e.gaussian
         }));
     } else {
         // Outliers of the finer scales explain what coarser steps show.
-        findings.extend(seen(CommonCause::Outliers, &found, |e| e.quantizer));
+        findings.extend(finding_at(CommonCause::Outliers, &found, |e| e.quantizer));
     }
     findings.extend(drifts(pieces, settings.rate_hz));
     findings
 }
 
 /// The finding of scales at which a logarithm is far from 0.
-fn seen(
+fn finding_at(
     cause: CommonCause,
-    scales: &[Excess],
-    log: impl Fn(&Excess) -> f64,
+    scales: &[RobustExcess],
+    log: impl Fn(&RobustExcess) -> f64,
 ) -> Option<CommonFinding> {
     let most = scales
         .iter()
@@ -201,7 +202,7 @@ fn seen(
 /// freedom if recordings drift by chance. The fitted model is not asked: a random walk fitted to the drift would explain it.
 /// Where recordings scatter unequally (one is shorter), t exceeds its limit for 2.5 % the more rarely
 /// ([Ibragimov and Müller](crate::bibliography::IbragimovMuller10)).
-fn drifts(pieces: &[Piece<'_>], rate_hz: f64) -> Vec<CommonFinding> {
+fn drifts(pieces: &[AxisReplicates<'_>], rate_hz: f64) -> Vec<CommonFinding> {
     let is_drift = |p: &Process| p.kind() == Kind::Drift;
     if pieces
         .iter()
@@ -253,7 +254,7 @@ fn student(values: &[f64]) -> Option<(f64, f64, f64)> {
     Some((mean, t, 2.0 * law.sf(t.abs())))
 }
 
-fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
+fn excess(pieces: &[AxisReplicates<'_>], level: usize, settings: &Settings) -> RobustExcess {
     let (test, tuning) = (Test::Outliers, &settings.tuning);
     let (mut of_quantizer, mut of_gaussian, mut variance, mut stepped) =
         (Vec::new(), Vec::new(), 0.0, 0);
@@ -276,7 +277,7 @@ fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
             variance += 2.0 / eta;
         }
     }
-    Excess {
+    RobustExcess {
         tau_s: tau_s(level as u32 + 1, settings.rate_hz),
         quantizer: crate::curve::median(&of_quantizer),
         gaussian: crate::curve::median(&of_gaussian),
@@ -289,7 +290,7 @@ fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
 
 /// Verdict on a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
+pub enum RecordingVerdict {
     /// Nothing.
     Normal,
     /// Its classical wavelet variance is above its robust one, more than in the others: outliers within it.
@@ -301,7 +302,7 @@ pub enum Verdict {
 }
 
 nav_sim_signal::named!(
-    Verdict {
+    RecordingVerdict {
         Normal = "normal",
         Outliers = "outliers",
         Drift = "drift",
@@ -321,7 +322,8 @@ pub struct Alarm {
     /// First and last of the neighbouring scales (s) at which it is most unusual.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tau_s: Vec<f64>,
-    /// Of a drift: mean of the later half less that of the earlier one, of each axis (units).
+    /// Drift of each axis: mean of the later half minus that of the earlier one (units of the
+    /// sensor).
     #[serde(serialize_with = "by_axis", skip_serializing_if = "Vec::is_empty")]
     pub change: Vec<(Axis, f64)>,
     /// Deviations from the others there, axis by axis, in standard deviations.
@@ -343,7 +345,7 @@ pub struct Diagnosis {
     /// Sensor.
     pub sensor: Sensor,
     /// The verdict.
-    pub verdict: Verdict,
+    pub verdict: RecordingVerdict,
     /// Why its noise is not that of the others.
     pub noise: Option<Alarm>,
     /// Why there are outliers within it.

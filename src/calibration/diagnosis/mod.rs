@@ -13,7 +13,7 @@ mod contrasts;
 mod diagnose;
 
 pub use contrasts::FEWEST as FEWEST_TO_COMPARE;
-pub use diagnose::{Alarm, CommonCause, CommonFinding, Diagnosis, Verdict, diagnose};
+pub use diagnose::{Alarm, CommonCause, CommonFinding, Diagnosis, RecordingVerdict, diagnose};
 
 #[cfg(test)]
 mod tests;

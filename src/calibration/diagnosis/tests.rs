@@ -177,7 +177,7 @@ fn false_alarm_rates() {
     );
 }
 
-fn verdicts(all: &[Diagnosis]) -> Vec<Verdict> {
+fn verdicts(all: &[Diagnosis]) -> Vec<RecordingVerdict> {
     all.iter().map(|d| d.verdict).collect()
 }
 
@@ -198,7 +198,7 @@ fn outliers_and_another_noise_are_told_apart() {
             _ => {}
         },
     );
-    use Verdict::{Noise, Normal, Outliers};
+    use RecordingVerdict::{Noise, Normal, Outliers};
     assert_eq!(
         verdicts(&all),
         [Normal, Normal, Outliers, Normal, Normal, Noise, Normal]
@@ -232,7 +232,7 @@ fn two_abnormal_recordings_do_not_hide_each_other() {
     let noisy: Vec<usize> = all
         .iter()
         .enumerate()
-        .filter(|(_, d)| d.verdict == Verdict::Noise)
+        .filter(|(_, d)| d.verdict == RecordingVerdict::Noise)
         .map(|(i, _)| i)
         .collect();
     assert_eq!(noisy, [1, 6]);
@@ -245,7 +245,7 @@ fn outliers_in_all_recordings_are_told() {
     let all = set(9, 6, NONE, |_, _, signal| {
         (0..20).for_each(|i| signal[50 + 100 * i] += 8.0)
     });
-    assert!(all.iter().all(|d| d.verdict == Verdict::Normal));
+    assert!(all.iter().all(|d| d.verdict == RecordingVerdict::Normal));
     let common = of_cause(&all, CommonCause::Outliers).unwrap();
     assert!(
         (common.size / 0.64 - 1.0).abs() < 0.3 && common.tau_s.contains(&2.0),
@@ -335,6 +335,6 @@ fn a_slow_drift_is_found() {
 #[test]
 fn three_recordings_cannot_say_which() {
     let all = set(7, 3, NONE, |_, _, _| ());
-    assert!(all.iter().all(|d| d.verdict == Verdict::Normal));
+    assert!(all.iter().all(|d| d.verdict == RecordingVerdict::Normal));
     assert!(set(7, 1, NONE, |_, _, _| ()).is_empty());
 }

@@ -20,7 +20,7 @@
 
 use super::least_squares::{Fit, outside, too_few_scales};
 use super::search::Termination;
-use crate::curve::{CalibrationError, Cause};
+use crate::curve::{CalibrationError, CalibrationFault};
 use crate::model::ModelSpec;
 use crate::noise::{Composite, Kind, Process};
 use crate::wavelet::Curve;
@@ -102,13 +102,13 @@ fn term(kind: Kind, points: &[(f64, f64)]) -> Result<Process, CalibrationError> 
         Kind::Ar1 | Kind::GaussMarkov | Kind::Ma1 => {
             let code = kind.code();
             let message = format!("{code} has no slope of its own in the Allan deviation");
-            return Err(CalibrationError::new(Cause::NoSlope, message));
+            return Err(CalibrationError::new(CalibrationFault::NoSlope, message));
         }
     };
     Process::new(kind, 0.0, value, 1.0).map_err(outside)
 }
 
-/// Whether the first scales have a slope.
+/// Returns true if the first two points have this slope (in log-log).
 fn begins(points: &[(f64, f64)], slope: f64) -> bool {
     let ((x0, y0), (x1, y1)) = (points[0], points[1]);
     ((y1 - y0) / (x1 - x0) - slope).abs() <= NEAR

@@ -1,7 +1,7 @@
 //! Least squares: theta = argmin Σ Omega_j (nu_j − nu_j(theta))².
 
-use super::search::{Component, Effort, Found, Objective, Range, Termination, search};
-use crate::curve::{CalibrationError, Cause, falling_root, implied};
+use super::search::{Component, Effort, Objective, Range, SearchResult, Termination, search};
+use crate::curve::{CalibrationError, CalibrationFault, falling_root, implied};
 use crate::model::ModelSpec;
 use crate::noise::{Composite, Kind, ParameterError, ParameterRef, Process};
 use crate::wavelet::Curve;
@@ -174,7 +174,7 @@ fn settled(
         .expect("two fits"))
 }
 
-/// Whether the weights of a fit are those of its own result.
+/// Returns true if the weights of a fit reproduce themselves: they follow from its own result.
 fn is_settled(curve: &Curve, fit: &Fit) -> bool {
     let nu = expected(curve, fit);
     nu.iter()
@@ -311,7 +311,7 @@ pub(crate) fn too_few_scales(
     scales: usize,
 ) -> CalibrationError {
     let message = format!("{spec} has {parameters} parameters, the curve {scales} scales");
-    CalibrationError::new(Cause::TooFewScales, message)
+    CalibrationError::new(CalibrationFault::TooFewScales, message)
 }
 
 fn check(curve: &Curve, spec: &ModelSpec) -> Result<(), CalibrationError> {
@@ -323,7 +323,10 @@ fn check(curve: &Curve, spec: &ModelSpec) -> Result<(), CalibrationError> {
         let message = format!(
             "the wavelet variance at scale 2^{level} is {value}: it must be a number from 1e-100 to 1e100"
         );
-        return Err(CalibrationError::new(Cause::NotPositive, message));
+        return Err(CalibrationError::new(
+            CalibrationFault::NotPositive,
+            message,
+        ));
     }
     if let Some(i) = bad(&curve.edof, Curve::EDOF_RANGE) {
         let (level, value) = (curve.levels[i], curve.edof[i]);
@@ -374,12 +377,16 @@ pub(crate) fn outside(e: ParameterError) -> CalibrationError {
     CalibrationError::other(format!("the fit left the domain of its parameters: {e}"))
 }
 
-fn assemble(objective: &Objective, found: &Found, rate_hz: f64) -> Result<Fit, CalibrationError> {
+fn assemble(
+    objective: &Objective,
+    found: &SearchResult,
+    rate_hz: f64,
+) -> Result<Fit, CalibrationError> {
     let unit = objective.length * objective.length;
     let best = &found.ends[0];
     let solution = objective.solve(&best.coordinates, None);
     let mut terms = terms(objective, &best.coordinates, &solution.amplitudes);
-    let by_time = |a: &Term, b: &Term| b.coordinate.total_cmp(&a.coordinate);
+    let by_time = |a: &FittedTerm, b: &FittedTerm| b.coordinate.total_cmp(&a.coordinate);
     terms.sort_by(|a, b| a.kind.cmp(&b.kind).then_with(|| by_time(a, b)));
     let processes = terms
         .iter()
@@ -387,7 +394,8 @@ fn assemble(objective: &Objective, found: &Found, rate_hz: f64) -> Result<Fit, C
         .collect::<Result<_, _>>()
         .map_err(outside)?;
     let composite = Composite::new(processes);
-    let those = |test: fn(&Term) -> bool| (0..terms.len()).filter(|i| test(&terms[*i])).collect();
+    let those =
+        |test: fn(&FittedTerm) -> bool| (0..terms.len()).filter(|i| test(&terms[*i])).collect();
     // Local minima differ by far more than 1e-6 of the objective; the ε² is for a curve that the model meets
     // exactly.
     let agreeing = |cost: f64| cost <= best.cost * (1.0 + 1e-6) + f64::EPSILON * f64::EPSILON;
@@ -420,7 +428,7 @@ fn assemble(objective: &Objective, found: &Found, rate_hz: f64) -> Result<Fit, C
 const KEPT: usize = 4;
 
 /// The ends that differ, best first.
-fn minima(found: &Found) -> Vec<Vec<f64>> {
+fn minima(found: &SearchResult) -> Vec<Vec<f64>> {
     let mut minima: Vec<Vec<f64>> = Vec::new();
     for end in &found.ends {
         // A descent from a start 0.1 % off ends in the same minimum.
@@ -437,14 +445,14 @@ fn minima(found: &Found) -> Vec<Vec<f64>> {
 }
 
 /// One process of the result.
-struct Term {
+struct FittedTerm {
     kind: Kind,
     amplitude: f64,
     coordinate: f64,
     at_end: bool,
 }
 
-fn terms(objective: &Objective, coordinates: &[f64], amplitudes: &[f64]) -> Vec<Term> {
+fn terms(objective: &Objective, coordinates: &[f64], amplitudes: &[f64]) -> Vec<FittedTerm> {
     let mut next = coordinates.iter();
     let term = |(component, amplitude): (&Component, &f64)| {
         let (coordinate, at_end) = match component.coordinate {
@@ -455,7 +463,7 @@ fn terms(objective: &Objective, coordinates: &[f64], amplitudes: &[f64]) -> Vec<
                 (u, high > low && (u - low < 1e-6 || high - u < 1e-6))
             }
         };
-        Term {
+        FittedTerm {
             kind: component.kind,
             amplitude: *amplitude,
             coordinate,
@@ -470,7 +478,7 @@ fn terms(objective: &Objective, coordinates: &[f64], amplitudes: &[f64]) -> Vec<
         .collect()
 }
 
-impl Term {
+impl FittedTerm {
     fn process(&self, rate_hz: f64) -> Result<Process, ParameterError> {
         let kappa = self.coordinate.exp();
         let amplitude = match self.kind.power() {
@@ -611,7 +619,7 @@ mod tests {
             let [variance, degrees] = [refused(value, 50.0), refused(0.5, value)];
             assert_eq!(
                 (variance.cause, degrees.cause),
-                (Cause::NotPositive, Cause::Other)
+                (CalibrationFault::NotPositive, CalibrationFault::Other)
             );
             let place = format!("at scale 2^2 is {value}: ");
             assert!(variance.to_string().contains(&place), "{variance}");

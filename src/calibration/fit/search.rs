@@ -50,24 +50,24 @@ impl Effort {
 }
 
 /// Result of the search.
-pub(crate) struct Found {
+pub(crate) struct SearchResult {
     /// The ends of all starts, best first; one at least.
-    pub(crate) ends: Vec<End>,
+    pub(crate) ends: Vec<LocalMinimum>,
     /// Combinations of shapes that were tried.
     pub(crate) combinations: usize,
 }
 
 /// Searches all coordinates, on a grid and from the `known` minima of a similar curve.
-pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) -> Found {
+pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) -> SearchResult {
     let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
     if dimensions.is_empty() {
         let cost = objective.solve(&[], None).cost();
-        let end = End {
+        let end = LocalMinimum {
             coordinates: Vec::new(),
             cost,
             termination: Termination::Linear,
         };
-        return Found {
+        return SearchResult {
             ends: vec![end],
             combinations: 1,
         };
@@ -87,7 +87,7 @@ pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) 
         // The grid first: of ends with the same cost the sort keeps that order, whatever is known.
         starts.splice(0..0, grid.starts(&choices, effort.starts));
     }
-    let mut ends: Vec<End> = starts
+    let mut ends: Vec<LocalMinimum> = starts
         .par_iter()
         .map(|start| {
             let end = descend(objective, start, &Precision::ROUGH);
@@ -101,7 +101,7 @@ pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) 
     if !effort.is_exact {
         ends[0] = descend(objective, &ends[0].coordinates, &Precision::FINE);
     }
-    Found {
+    SearchResult {
         ends,
         combinations: tried,
     }
@@ -111,10 +111,11 @@ pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) 
 struct Grid<'a> {
     objective: &'a Objective,
     points: Vec<Vec<f64>>,
-    /// Whether a dimension is alike the one before it, so that only ascending pairs are needed.
+    /// True for a dimension of the same kind as the one before it: only ascending pairs are
+    /// searched.
     repeats: Vec<bool>,
     /// Shapes of the components without a coordinate, then those of the points of each dimension.
-    shapes: Vec<Shape>,
+    shapes: Vec<UnitVariance>,
     /// True if the columns serve for every combination.
     is_linear: bool,
     /// Inner products of the columns of all shapes, and with the target.
@@ -141,13 +142,13 @@ impl<'a> Grid<'a> {
             .collect();
         let fixed = (0..objective.components.len())
             .filter(|i| objective.components[*i].coordinate.is_none());
-        let mut shapes: Vec<Shape> = fixed.map(|i| objective.shape(i, 0.0)).collect();
+        let mut shapes: Vec<UnitVariance> = fixed.map(|i| objective.shape(i, 0.0)).collect();
         for ((owner, _), points) in dimensions.iter().zip(&points) {
             shapes.extend(points.iter().map(|u| objective.shape(*owner, *u)));
         }
         let is_linear = objective.is_linear() || responses.is_some();
         let responses = responses.unwrap_or_else(|| objective.plain_responses());
-        let columns: Vec<Column> = shapes
+        let columns: Vec<DesignColumn> = shapes
             .iter()
             .map(|shape| objective.column(shape, &responses))
             .collect();
@@ -187,7 +188,8 @@ impl<'a> Grid<'a> {
             n += 1;
         }
         if !self.is_linear {
-            let mut shapes: Vec<&Shape> = selected[..n].iter().map(|i| &self.shapes[*i]).collect();
+            let mut shapes: Vec<&UnitVariance> =
+                selected[..n].iter().map(|i| &self.shapes[*i]).collect();
             // The amplitudes and their bounds are in the order of the components.
             shapes.sort_unstable_by_key(|shape| shape.component);
             return self.objective.cost_near(&shapes);
@@ -278,8 +280,9 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// As many points as leave the number of combinations of alike dimensions at `most`, at least one more than there are
-/// dimensions. Unlike dimensions (an AR1 and an MA1) have up to k! times as many combinations.
+/// Largest number of points per dimension that keeps the combinations of dimensions of one kind at
+/// `most`, and at least one more than there are dimensions. Dimensions of two kinds (an AR1 and an
+/// MA1) have up to k! times as many combinations.
 fn points_per_dimension(dimensions: usize, most: usize) -> usize {
     // n·(n − 1)···/k! of k alike dimensions, of which ascending choices are all there are.
     let combinations = |n: usize| (0..dimensions).fold(1, |c, k| c * (n - k) / (k + 1));
@@ -338,7 +341,7 @@ impl Component {
 
 /// Wavelet variance of a component per unit of its amplitude, at all levels, in the weights of the curve.
 #[derive(Debug, Clone)]
-pub(crate) struct Shape {
+pub(crate) struct UnitVariance {
     component: usize,
     values: Vec<f64>,
     /// Derivative with respect to the coordinate.
@@ -346,7 +349,7 @@ pub(crate) struct Shape {
 }
 
 /// A column of the linear problem, at unit length.
-struct Column {
+struct DesignColumn {
     values: Vec<f64>,
     /// The length taken out.
     pub(crate) length: f64,
@@ -355,11 +358,11 @@ struct Column {
 /// Solution of the linear problem: amplitudes where the shapes are given.
 struct LinearBest {
     responses: Vec<Response>,
-    columns: Vec<Column>,
+    columns: Vec<DesignColumn>,
     gram: Matrix,
     /// Amplitudes, in units of their columns' lengths.
     x: Vector,
-    /// Those on no bound.
+    /// Variables that are not at a bound.
     is_free: [bool; MOST],
     residuals: Vec<f64>,
 }
@@ -404,7 +407,7 @@ pub(crate) struct Objective {
 
 /// The best amplitudes for given coordinates.
 #[derive(Debug, Clone)]
-pub(crate) struct Solution {
+pub(crate) struct LinearSolution {
     /// Amplitudes, in the parameters' units.
     pub(crate) amplitudes: Vec<f64>,
     /// target − model, in units of the target's length.
@@ -418,7 +421,7 @@ pub(crate) struct Solution {
     is_free: [bool; MOST],
 }
 
-impl Solution {
+impl LinearSolution {
     /// Σ residual².
     pub(crate) fn cost(&self) -> f64 {
         dot(&self.residuals, &self.residuals)
@@ -474,7 +477,7 @@ impl Objective {
         }
     }
 
-    /// Whether the model is linear in its amplitudes.
+    /// Returns true if the model is linear in its amplitudes.
     const fn is_linear(&self) -> bool {
         self.quantization.is_none()
     }
@@ -487,14 +490,14 @@ impl Objective {
             .filter_map(|(i, c)| Some((i, c.coordinate?)))
     }
 
-    fn shape(&self, component: usize, u: f64) -> Shape {
+    fn shape(&self, component: usize, u: f64) -> UnitVariance {
         let process = &self.components[component];
         let weighted = |(level, root): (&u32, &f64)| {
             let (value, slope) = process.shape(u, *level);
             (root * value, root * slope)
         };
         let (values, slopes) = self.levels.iter().zip(&self.roots).map(weighted).unzip();
-        Shape {
+        UnitVariance {
             component,
             values,
             slopes,
@@ -502,14 +505,14 @@ impl Objective {
     }
 
     /// The column of a shape where the curve responds so, level by level.
-    fn column(&self, shape: &Shape, responses: &[Response]) -> Column {
+    fn column(&self, shape: &UnitVariance, responses: &[Response]) -> DesignColumn {
         let mut values = self.read(shape.component, &shape.values, responses);
         // Unit columns: the Gram matrix has a unit diagonal, and its condition is that of the shapes, not of
         // the units.
         let length = dot(&values, &values).sqrt();
         let scale = 1.0 / length;
         values.iter_mut().for_each(|v| *v *= scale);
-        Column { values, length }
+        DesignColumn { values, length }
     }
 
     /// The variance that the curve shows of a component at each level.
@@ -528,7 +531,7 @@ impl Objective {
 
     /// Derivatives of the implied curve with respect to the wavelet variances of the components, level by
     /// level.
-    fn responses(&self, shapes: &[&Shape], amplitudes: &[f64]) -> Vec<Response> {
+    fn responses(&self, shapes: &[&UnitVariance], amplitudes: &[f64]) -> Vec<Response> {
         let Some(quantization) = &self.quantization else {
             return self.plain_responses();
         };
@@ -551,7 +554,11 @@ impl Objective {
     }
 
     /// The best amplitudes for the coordinates given (one for each component that has one).
-    pub(crate) fn solve(&self, coordinates: &[f64], near: Option<&Solution>) -> Solution {
+    pub(crate) fn solve(
+        &self,
+        coordinates: &[f64],
+        near: Option<&LinearSolution>,
+    ) -> LinearSolution {
         self.solve_to(Settling::WHOLE, coordinates, near)
     }
 
@@ -560,8 +567,8 @@ impl Objective {
         &self,
         settling: Settling,
         coordinates: &[f64],
-        near: Option<&Solution>,
-    ) -> Solution {
+        near: Option<&LinearSolution>,
+    ) -> LinearSolution {
         let mut next = coordinates.iter();
         let mut coordinate_of = |c: &Component| {
             c.coordinate
@@ -569,20 +576,20 @@ impl Objective {
                 .copied()
                 .unwrap_or(0.0)
         };
-        let shapes: Vec<Shape> = self
+        let shapes: Vec<UnitVariance> = self
             .components
             .iter()
             .enumerate()
             .map(|(i, c)| self.shape(i, coordinate_of(c)))
             .collect();
-        let shapes: Vec<&Shape> = shapes.iter().collect();
+        let shapes: Vec<&UnitVariance> = shapes.iter().collect();
         let best = self.best_amplitudes(&shapes, settling, near);
         let jacobian = self
             .shaped()
             .map(|(i, _)| self.tangent(&best, shapes[i], i))
             .collect();
         let amplitudes = self.amplitudes(&best.columns, &best.x);
-        Solution {
+        LinearSolution {
             amplitudes,
             residuals: best.residuals,
             jacobian,
@@ -592,7 +599,7 @@ impl Objective {
     }
 
     /// Σ residual² for shapes of all components, in their order; the shares of quantization noise are nearly settled.
-    fn cost_near(&self, shapes: &[&Shape]) -> f64 {
+    fn cost_near(&self, shapes: &[&UnitVariance]) -> f64 {
         let residuals = self
             .best_amplitudes(shapes, Settling::NEARLY, None)
             .residuals;
@@ -602,9 +609,9 @@ impl Objective {
     /// The best amplitudes for shapes of all components, in their order.
     fn best_amplitudes(
         &self,
-        shapes: &[&Shape],
+        shapes: &[&UnitVariance],
         settling: Settling,
-        near: Option<&Solution>,
+        near: Option<&LinearSolution>,
     ) -> LinearBest {
         let (responses, is_free) = match near {
             Some(near) => (near.responses.clone(), near.is_free),
@@ -634,11 +641,11 @@ impl Objective {
     /// The best amplitudes where the curve responds so; `near`: those that are perhaps on no bound.
     fn linear_best(
         &self,
-        shapes: &[&Shape],
+        shapes: &[&UnitVariance],
         responses: Vec<Response>,
         near: [bool; MOST],
     ) -> LinearBest {
-        let columns: Vec<Column> = shapes
+        let columns: Vec<DesignColumn> = shapes
             .iter()
             .map(|shape| self.column(shape, &responses))
             .collect();
@@ -671,7 +678,7 @@ impl Objective {
     }
 
     /// −amplitude × the part of the slope of the i-th column that the active columns cannot follow.
-    fn tangent(&self, best: &LinearBest, shape: &Shape, i: usize) -> Vec<f64> {
+    fn tangent(&self, best: &LinearBest, shape: &UnitVariance, i: usize) -> Vec<f64> {
         let slopes = self.read(i, &shape.slopes, &best.responses);
         // d(residual)/du with the amplitudes fixed, less its part within the columns, which the amplitudes take
         // up.
@@ -689,14 +696,14 @@ impl Objective {
     }
 
     /// Amplitudes in the parameters' units.
-    fn amplitudes(&self, columns: &[Column], x: &Vector) -> Vec<f64> {
+    fn amplitudes(&self, columns: &[DesignColumn], x: &Vector) -> Vec<f64> {
         x.iter()
             .zip(columns)
             .map(|(x, c)| x * self.length / c.length)
             .collect()
     }
 
-    fn linear_problem(&self, columns: &[Column]) -> Bounded {
+    fn linear_problem(&self, columns: &[DesignColumn]) -> Bounded {
         let mut problem = Bounded::new(columns.len());
         for (i, a) in columns.iter().enumerate() {
             for (j, b) in columns.iter().enumerate().take(i + 1) {
@@ -708,7 +715,7 @@ impl Objective {
         problem
     }
 
-    fn residuals(&self, columns: &[Column], x: &Vector) -> Vec<f64> {
+    fn residuals(&self, columns: &[DesignColumn], x: &Vector) -> Vec<f64> {
         let mut residuals = self.target.clone();
         for (column, amplitude) in columns.iter().zip(x) {
             residuals
@@ -722,7 +729,7 @@ impl Objective {
 
 /// Coefficients of the projection of `vector` on the free columns, 0 of the others; none if these depend on one another.
 fn project(
-    columns: &[Column],
+    columns: &[DesignColumn],
     is_free: &[bool; MOST],
     gram: &Matrix,
     vector: &[f64],
@@ -777,7 +784,7 @@ nav_sim_signal::named!(
 );
 
 /// Local minimum to which a start led.
-pub(crate) struct End {
+pub(crate) struct LocalMinimum {
     pub(crate) coordinates: Vec<f64>,
     /// Σ residual², in units of the target's length.
     pub(crate) cost: f64,
@@ -814,14 +821,14 @@ impl Precision {
 }
 
 /// Descends from a start to the local minimum.
-fn descend(objective: &Objective, start: &[f64], precision: &Precision) -> End {
+fn descend(objective: &Objective, start: &[f64], precision: &Precision) -> LocalMinimum {
     let ranges: Vec<(f64, f64)> = objective.shaped().map(|(_, r)| (r.low, r.high)).collect();
     let descent = Descent {
         ranges: &ranges,
         damping: 1e-6,
         enough: precision.enough,
     };
-    let last: RefCell<Option<Solution>> = RefCell::new(None);
+    let last: RefCell<Option<LinearSolution>> = RefCell::new(None);
     let found = descent.minimum(
         start,
         |u| {
@@ -829,14 +836,14 @@ fn descend(objective: &Objective, start: &[f64], precision: &Precision) -> End {
             last.replace(Some(solution.clone()));
             solution
         },
-        Solution::cost,
+        LinearSolution::cost,
         |u, at| {
             let gradient = (0..u.len()).map(|i| at.gradient(i)).collect();
             let newton = precision.is_newton.then(|| curvature(objective, u, at));
             (gradient, newton.flatten().unwrap_or_else(|| at.curvature()))
         },
     );
-    End {
+    LocalMinimum {
         cost: found.value.cost(),
         termination: if found.has_converged {
             Termination::Converged
@@ -852,7 +859,7 @@ fn descend(objective: &Objective, start: &[f64], precision: &Precision) -> End {
 const DIFFERENCE: f64 = 1e-5;
 
 /// Half the second derivatives of the cost; none where they are not positive definite.
-fn curvature(objective: &Objective, u: &[f64], at: &Solution) -> Option<Matrix> {
+fn curvature(objective: &Objective, u: &[f64], at: &LinearSolution) -> Option<Matrix> {
     let n = u.len();
     let mut hessian = [[0.0; MOST]; MOST];
     for j in 0..n {

@@ -3,7 +3,7 @@
 //! Each draw makes K new replicates. Their ln nu at all levels have the variances and the correlations that the
 //! recorded ones show (Gaussian scores; chi-square in shape, so that the mean of nu is that of the fitted model): what
 //! replicates differ by and the scatter within each are in these together, so that nothing is assumed of either, and what
-//! few replicates leave unknown is Student's t ([`Spread::student`]). The draws for full weighting, which needs more
+//! few replicates leave unknown is Student's t ([`ReplicateSpread::student`]). The draws for full weighting, which needs more
 //! than the rank of K replicates, and those of a single recording have the scatter *within* a recording of the
 //! large-sample law (of the model's own wavelet variance and the length; divided by the efficiency where robust) and,
 //! *between* replicates, the excess over it. Robust variances of few coefficients read high, in a draw as in a recording.
@@ -11,13 +11,14 @@
 //! scatters by its own degrees of freedom.
 
 use super::intervals::{intervals, practical_intervals};
-use super::spread::{LEVEL as ALIKE_LEVEL, Spread, alike_p_value};
+use super::spread::{LEVEL as ALIKE_LEVEL, ReplicateSpread, alike_p_value};
 use super::varying::{parameter_spreads, simpler};
 use crate::curve::sampling::{SamplingLaw, implied};
 use crate::curve::{Estimator, Group, LARGEST_BIAS, Replicate, average, median, p_value};
 use crate::fit::Fit;
 use crate::outcome::{
-    Advance, Bootstrap, Goodness, Indistinct, Inference, LevelSpread, Outcome, Settings, tau_s,
+    Advance, Bootstrap, Goodness, IndistinctProcesses, Inference, LevelSpread, Outcome, Settings,
+    tau_s,
 };
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Curve, RobustVariance, Status};
@@ -45,7 +46,7 @@ pub(crate) struct CurveSampler<'a> {
     settings: &'a Settings,
     pub(crate) law: SamplingLaw,
     /// Spread of the replicates; none for a curve from elsewhere.
-    pub(crate) spread: Option<Spread>,
+    pub(crate) spread: Option<ReplicateSpread>,
     /// The curve that the model implies.
     centre: Vec<f64>,
 }
@@ -73,7 +74,7 @@ impl<'a> CurveSampler<'a> {
         let levels = curve.levels.iter().copied().max().unwrap_or(1) as usize;
         let law = SamplingLaw::new(&fit.composite, levels);
         let spread = (!replicates.is_empty())
-            .then(|| Spread::new(replicates, estimator, &law, &settings.tuning));
+            .then(|| ReplicateSpread::new(replicates, estimator, &law, &settings.tuning));
         Self {
             group,
             replicates,
@@ -153,7 +154,7 @@ impl<'a> CurveSampler<'a> {
                 nu * ratio * (1.0 + bias)
             };
             let levels = levels.take(replicate.levels()).enumerate();
-            like(replicate, levels.map(drawn).collect())
+            with_variances(replicate, levels.map(drawn).collect())
         };
         let pairs = self.replicates.iter().zip(ratios).zip(edof);
         let replicates: Vec<Replicate> = pairs.map(drawn_replicate).collect();
@@ -193,7 +194,7 @@ impl<'a> CurveSampler<'a> {
 }
 
 /// A replicate of the same length with other variances, classical where that replicate's are.
-pub(crate) fn like(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
+pub(crate) fn with_variances(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
     let status = |j: usize| match replicate.robust.get(j).map(|robust| robust.status) {
         Some(Status::Coarse) => Status::Coarse,
         _ => Status::Ok,
@@ -253,7 +254,7 @@ pub(crate) fn inference(
     if let Some((simple, processes, p_value)) = simpler(group, outcome, settings) {
         // By recursion: the simpler model may itself have processes that are not told apart.
         let intervals = inference(group, &simple, settings, bootstrap, &|_| {}).intervals;
-        let indistinct = Indistinct {
+        let indistinct = IndistinctProcesses {
             processes,
             spec: simple.spec,
             p_value,
@@ -301,7 +302,7 @@ pub(crate) fn by_bootstrap(
             .collect();
     }
     let spread = sampler.spread.as_ref();
-    let stretch = spread.map_or(1.0, Spread::student);
+    let stretch = spread.map_or(1.0, ReplicateSpread::student);
     let intervals = intervals(outcome, &fits, stretch);
     let alike = spread
         .and_then(|s| alike_p_value(&group.replicates, outcome.estimator, s, &sampler.law, &name));
@@ -330,7 +331,7 @@ pub(crate) fn by_bootstrap(
 }
 
 /// Deviations within recordings and between them, scale by scale.
-fn level_spreads(spread: &Spread, levels: &[u32], rate_hz: f64) -> Vec<LevelSpread> {
+fn level_spreads(spread: &ReplicateSpread, levels: &[u32], rate_hz: f64) -> Vec<LevelSpread> {
     let deviations = spread.within.iter().zip(&spread.between);
     let of_level = |(&level, (&within, &between)): (&u32, (&f64, &f64))| LevelSpread {
         tau_s: tau_s(level, rate_hz),
@@ -346,7 +347,7 @@ mod goodness_tests;
 
 #[cfg(test)]
 mod inference_tests {
-    use super::{like, *};
+    use super::{with_variances, *};
     use crate::imu::{Axis, Channel, Sensor};
     use crate::noise::{Composite, Kind, Model, Process, VirtualImu};
     use crate::wavelet::{Tuning, classical};
@@ -403,7 +404,7 @@ mod inference_tests {
                 trend: f64::NAN,
                 mean: f64::NAN,
             };
-            (CHANNEL, like(&template, nu))
+            (CHANNEL, with_variances(&template, nu))
         };
         grouped(
             replicates.iter().enumerate().map(recording).collect(),

@@ -1,7 +1,7 @@
 //! Intervals of parameters from draws around their estimates.
 
 use crate::fit::{Fit, Range, correlated};
-use crate::noise::practical::{Bias, Curve, Horizon, Minimum, Policy};
+use crate::noise::practical::{AllanCurve, AllanMinimum, Bias, Horizon, Policy};
 use crate::noise::{Composite, Kind, Parameter, ParameterRef, Process};
 use crate::outcome::{Outcome, ParameterInterval, Practical, PracticalIntervals, Undetermined};
 
@@ -43,7 +43,7 @@ pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<Pa
         // By draws mirrored at the estimate, and the quantiles of the draws themselves.
         let of_parameter = |(p, (&parameter, value)): (usize, (&Parameter, f64))| {
             let drawn = there.iter().map(|process| process.values()[p]).collect();
-            let draws = Draws::new(parameter, drawn, stretch);
+            let draws = ParameterDraws::new(parameter, drawn, stretch);
             // Amplitudes are not negative.
             let least = if parameter.is_shape() {
                 f64::NEG_INFINITY
@@ -101,7 +101,8 @@ pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<Pa
 /// makes wider where there are few replicates, the square.
 pub const WIDEST: f64 = 100.0;
 
-/// Whether an interval of a correlation time ends where nothing was sought: by the draws it may be any.
+/// Returns true if the interval of a correlation time reaches the end of the searched range: the
+/// time is then unbounded on that side.
 fn leaves_search(searched: Range, process: &Process, interval: &ParameterInterval) -> bool {
     let kappa = |end: f64| match interval.of.parameter {
         Parameter::Phi => Some(-end.ln()),
@@ -213,14 +214,14 @@ const fn hull(mirrored: [f64; 2], quantiles: [f64; 2]) -> [f64; 2] {
 /// is a chi-square; the same as the quantiles themselves where the draws are symmetric in the logarithm); theta
 /// of MA1 likewise with differences. The distances of the quantiles from the median are multiplied by `stretch`. Where
 /// the estimate or a quantile is at the bound, 0, the ends are the quantiles themselves.
-struct Draws {
+struct ParameterDraws {
     parameter: Parameter,
     quantiles: [f64; 2],
     median: f64,
     stretch: f64,
 }
 
-impl Draws {
+impl ParameterDraws {
     fn new(parameter: Parameter, mut drawn: Vec<f64>, stretch: f64) -> Self {
         drawn.sort_by(f64::total_cmp);
         let [low, median, high] = [TAIL, 0.5, 1.0 - TAIL].map(|p| quantile(&drawn, p));
@@ -265,7 +266,7 @@ impl Draws {
 /// The 95 % interval of what is positive and follows from a whole model, from what follows from the models of draws:
 /// as that of an amplitude. Such a figure is there whatever the model, not shown because it came out large.
 pub fn derived_interval(estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
-    Draws::new(Parameter::Sigma2, drawn, stretch).around(estimate)
+    ParameterDraws::new(Parameter::Sigma2, drawn, stretch).around(estimate)
 }
 
 /// The 95 % interval of a positive quantity that some of `draws` draws have; none where more of them lack it than the
@@ -274,7 +275,7 @@ fn scale_interval(estimate: f64, drawn: Vec<f64>, draws: usize, stretch: f64) ->
     if (drawn.len() as f64) < (1.0 - TAIL) * draws as f64 || drawn.is_empty() {
         return None;
     }
-    let draws = Draws::new(Parameter::Sigma2, drawn, stretch);
+    let draws = ParameterDraws::new(Parameter::Sigma2, drawn, stretch);
     let ends = holding(estimate, draws.around(estimate));
     ends.iter()
         .all(|end| end.is_finite())
@@ -321,11 +322,11 @@ impl Outcome {
 impl Practical {
     /// The parameters of a model, without intervals.
     fn of(model: &Composite, rate_hz: f64, range_s: f64) -> Option<Self> {
-        let curve = Curve::largest(&[model], rate_hz, Horizon::default()).ok()?;
+        let curve = AllanCurve::largest(&[model], rate_hz, Horizon::default()).ok()?;
         let walk = curve.pair(Policy::Matched, Bias::Walk);
         Some(Self {
             walk,
-            minimum: Minimum::of(&[model], rate_hz, range_s),
+            minimum: AllanMinimum::of(&[model], rate_hz, range_s),
             intervals: PracticalIntervals::default(),
             range_s,
             walk_until_s: walk.departs_s(model, rate_hz, range_s, Self::BESIDE),
@@ -364,9 +365,9 @@ pub fn figures_with_intervals(
     range_s: f64,
 ) -> [(Option<f64>, Option<[f64; 2]>); 3] {
     let read = |model: &Composite| -> Option<[Option<f64>; 3]> {
-        let curve = Curve::largest(&[model], rate_hz, Horizon::default()).ok()?;
+        let curve = AllanCurve::largest(&[model], rate_hz, Horizon::default()).ok()?;
         let pair = curve.pair(Policy::Matched, Bias::Walk);
-        let minimum = Minimum::of(&[model], rate_hz, range_s);
+        let minimum = AllanMinimum::of(&[model], rate_hz, range_s);
         let instability = minimum.map(|m| m.deviation);
         Some([Some(pair.density), Some(pair.walk), instability])
     };
@@ -477,17 +478,18 @@ mod tests {
         let drawn = (0..4000)
             .map(|_| 3.0 * generator.sample(law) / 8.0)
             .collect();
-        let [low, high] = Draws::new(Parameter::Sigma2, drawn, 1.0).around(3.0);
+        let [low, high] = ParameterDraws::new(Parameter::Sigma2, drawn, 1.0).around(3.0);
         assert!(
             (low / (24.0 / 17.53) - 1.0).abs() < 0.064
                 && (high / (24.0 / 2.18) - 1.0).abs() < 0.125,
             "{low} {high}"
         );
         assert_eq!(
-            Draws::new(Parameter::Sigma2, vec![0.0, 0.0, 1.0], 1.0).around(0.0),
+            ParameterDraws::new(Parameter::Sigma2, vec![0.0, 0.0, 1.0], 1.0).around(0.0),
             [0.0, 1.0]
         );
-        let [low, high] = Draws::new(Parameter::Phi, vec![0.85, 0.9, 0.93], 1.0).around(0.9);
+        let [low, high] =
+            ParameterDraws::new(Parameter::Phi, vec![0.85, 0.9, 0.93], 1.0).around(0.9);
         assert!(
             0.0 < low && low < 0.9 && 0.9 < high && high < 1.0,
             "{low} {high}"
@@ -502,7 +504,7 @@ mod tests {
             .map(|k| 0.25 * f64::from(k).mul_add(0.01, 0.0).exp2())
             .collect();
         let hull_of = |stretch| {
-            let draws = Draws::new(Parameter::Sigma2, drawn.clone(), stretch);
+            let draws = ParameterDraws::new(Parameter::Sigma2, drawn.clone(), stretch);
             hull(draws.around(1.0), draws.stretched())
         };
         let [low, high] = hull_of(1.0);

@@ -9,7 +9,7 @@
 //! one and the same other. That is right whatever they share, from nothing to all, and says what it knows: as many degrees of
 //! freedom as there are recordings, less one, where `between` rules, and as there are signals, less one, where it does not.
 
-use crate::curve::sampling::{SamplingLaw, Shape, variance_of_log};
+use crate::curve::sampling::{SamplingLaw, VarianceLaw, variance_of_log};
 use crate::curve::{Estimator, MAD_TO_DEVIATION, Replicate, falling_root, median, p_value};
 use crate::imu::Axis;
 use crate::outcome::{AxesDiffer, LevelSpread, Outcome};
@@ -26,7 +26,7 @@ const NORMAL_975: f64 = 1.959_963_984_540_054;
 const CLIP: f64 = 3.0;
 
 /// The spread of replicates around an estimator's curve.
-pub(crate) struct Spread {
+pub(crate) struct ReplicateSpread {
     /// Standard deviation of ln nu of a replicate of the same noise, of each level.
     pub(crate) within: Vec<f64>,
     /// Standard deviation of what replicates differ by beyond that.
@@ -37,7 +37,7 @@ pub(crate) struct Spread {
     /// more for the shorter and less for the longer of them.
     total: Vec<Vec<f64>>,
     /// Shape of the law at each level.
-    shapes: Vec<Shape>,
+    shapes: Vec<VarianceLaw>,
     /// Residuals of each replicate over their standard deviation, 0 where it has none, so that Σ over replicates of their
     /// squares is K − 1: their combinations with normal weights over √(K − 1) have unit variance and the replicates'
     /// correlations between levels.
@@ -80,7 +80,7 @@ fn ranks<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<usize> {
     values.map(rank).collect()
 }
 
-impl Spread {
+impl ReplicateSpread {
     pub(crate) fn new(
         replicates: &[Replicate],
         estimator: Estimator,
@@ -141,7 +141,8 @@ impl Spread {
     pub(crate) fn draw(&self, generator: &mut Generator) -> Vec<Vec<f64>> {
         let of_replicate = |(scores, total): (Vec<f64>, &Vec<f64>)| {
             // The law whose logarithm has the observed variance: the skew of few degrees of freedom comes with it.
-            let ratio = |((score, total), shape): ((f64, &f64), &Shape)| shape.ratio(score, *total);
+            let ratio =
+                |((score, total), shape): ((f64, &f64), &VarianceLaw)| shape.ratio(score, *total);
             scores
                 .into_iter()
                 .zip(total)
@@ -357,8 +358,8 @@ struct Scatter {
     between: f64,
     /// Residuals in standard deviations, noise and differences together; Σ of their squares is K − 1.
     units: Vec<f64>,
-    /// Those standard deviations over what noise and differences make: 1, or less where the replicates scatter less
-    /// than their noise does.
+    /// Observed standard deviation over the one predicted from noise and differences: 1, or less
+    /// where the replicates scatter less than their noise.
     factor: f64,
 }
 
@@ -488,7 +489,7 @@ const LEAST: f64 = 4.0;
 pub(crate) fn alike_p_value(
     replicates: &[Replicate],
     estimator: Estimator,
-    spread: &Spread,
+    spread: &ReplicateSpread,
     law: &SamplingLaw,
     group: &str,
 ) -> Option<f64> {
@@ -556,9 +557,14 @@ struct Scale {
 }
 
 impl Scale {
-    /// Those that are long enough for the level of index `j`; none where no axis is there twice: each axis alone in its
-    /// recording is compared with nothing.
-    fn new(j: usize, replicates: &[Replicate], spread: &Spread, shape: &Shape) -> Option<Self> {
+    /// Selects the replicates long enough for the level of index `j`; none where each axis occurs
+    /// only once, so that there is nothing to compare.
+    fn new(
+        j: usize,
+        replicates: &[Replicate],
+        spread: &ReplicateSpread,
+        shape: &VarianceLaw,
+    ) -> Option<Self> {
         let is_long_enough = |i: &usize| replicates[*i].levels() > j && spread.edof[*i][j] >= LEAST;
         let members: Vec<(usize, Option<Axis>)> = (0..replicates.len())
             .filter(is_long_enough)
@@ -790,7 +796,7 @@ mod alike_tests {
         let law = SamplingLaw::new(&Composite::new(vec![white, walk]), 10);
         let differs = |seed: u64| {
             let replicates = set(seed, count, spread);
-            let own = Spread::new(&replicates, estimator, &law, &tuning());
+            let own = ReplicateSpread::new(&replicates, estimator, &law, &tuning());
             u32::from(alike_p_value(&replicates, estimator, &own, &law, "accel").unwrap() <= LEVEL)
         };
         (0..sets).into_par_iter().map(differs).sum()
@@ -836,7 +842,7 @@ mod alike_tests {
                     })
             };
             let replicates: Vec<Replicate> = Axis::ALL.into_iter().flat_map(of_axis).collect();
-            let own = Spread::new(&replicates, Estimator::Awv, &law, &tuning());
+            let own = ReplicateSpread::new(&replicates, Estimator::Awv, &law, &tuning());
             u32::from(
                 alike_p_value(&replicates, Estimator::Awv, &own, &law, "accel").unwrap() <= LEVEL,
             )
@@ -849,7 +855,7 @@ mod alike_tests {
     fn one_signal_cannot_differ() {
         let law = SamplingLaw::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 10);
         let one = set(1, 1, 0.0);
-        let own = Spread::new(&one, Estimator::Awv, &law, &tuning());
+        let own = ReplicateSpread::new(&one, Estimator::Awv, &law, &tuning());
         assert_eq!(
             alike_p_value(&one, Estimator::Awv, &own, &law, "accel"),
             None

@@ -95,7 +95,7 @@ fn coverage(between: f64, is_shared: bool) -> f64 {
                 });
             }
         }
-        let spread = Spread::new(&replicates, Estimator::Awv, &law, &tuning);
+        let spread = ReplicateSpread::new(&replicates, Estimator::Awv, &law, &tuning);
         let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / 12.0;
         let estimate = mean(&mut replicates.iter().map(|r| r.classical[0].ln()));
         let squares: f64 = (0..300)
@@ -141,7 +141,7 @@ fn a_level_that_a_short_recording_lacks_scatters_as_the_others_show() {
     };
     let logs: [&[f64]; 4] = [&[0.1, -0.3], &[-0.1, 0.0], &[0.0, 0.3], &[0.0]];
     let replicates: Vec<Replicate> = logs.into_iter().enumerate().map(replicate).collect();
-    let spread = Spread::new(&replicates, Estimator::Awv, &law, &Tuning::default());
+    let spread = ReplicateSpread::new(&replicates, Estimator::Awv, &law, &Tuning::default());
     assert_relative_eq!(spread.between[1], 0.3, max_relative = 1e-4);
     let mut generator = Generator::seed_from_u64(3);
     let drawn: Vec<f64> = (0..4000)

@@ -1,14 +1,17 @@
-//! What the parameters of recordings differ by: the law of each from recording to recording.
+//! Between-recording distribution of each model parameter.
 //!
-//! The model is fitted to every replicate alone. Its parameters, on the scale of [`Parameter::scaled`], are y_i = mean of the
-//! axis + between_i + noise_i. The variance of the noise is that of fits to curves drawn by the large-sample law for the
-//! replicate's length; the variance between is what brings Q = Σ (y_i − mean)²/(between² + noise_i) to its degrees of freedom
-//! ([Paule and Mandel](crate::bibliography::PauleMandel82)). Its interval holds the values at which Q lies between the quantiles
-//! of its chi-square law ([Viechtbauer](crate::bibliography::Viechtbauer07)): exact for normal y. A parameter whose interval
-//! reaches 0 has no law.
+//! The model is fitted to every replicate alone. Its parameters, on the scale of
+//! [`Parameter::scaled`], are y_i = mean of the axis + between_i + noise_i. The noise variance is
+//! that of fits to curves drawn from the large-sample distribution for the replicate's length; the
+//! variance between recordings brings Q = Σ (y_i − mean)²/(between² + noise_i) to its degrees of
+//! freedom ([Paule and Mandel](crate::bibliography::PauleMandel82)). Its interval holds the values
+//! at which Q lies between the quantiles of its chi-square distribution
+//! ([Viechtbauer](crate::bibliography::Viechtbauer07)): exact for normal y. A parameter whose
+//! interval reaches 0 has no distribution.
 //!
-//! Axes of one recording may share what recordings differ by. Q then has fewer degrees of freedom than it has residuals: with A axes
-//! of correlation r their number over 1 + (A − 1) r², by the variance of a sum of A correlated chi-squares.
+//! The axes of one recording may share its differences from other recordings. Q then has fewer
+//! degrees of freedom than residuals: with A axes of correlation r, their number over 1 + (A − 1)
+//! r², by the variance of a sum of A correlated chi-squares.
 
 use super::bootstrap::CurveSampler;
 use super::intervals::{TAIL, matched, quantile};
@@ -18,7 +21,8 @@ use crate::fit::{Fit, refit};
 use crate::model::ModelSpec;
 use crate::noise::{Kind, Parameter, ParameterRef, Process};
 use crate::outcome::{
-    Bootstrap, Indistinct, Outcome, ParameterInterval, ParameterSpread, Settings, Undetermined,
+    Bootstrap, IndistinctProcesses, Outcome, ParameterInterval, ParameterSpread, Settings,
+    Undetermined,
 };
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
@@ -148,19 +152,19 @@ fn variance(drawn: &[Option<f64>]) -> Option<f64> {
 /// A scaled parameter of every replicate.
 struct Differences {
     /// By axis: the recordings, the values, and the variances of their noise.
-    axes: Vec<OfAxis>,
+    axes: Vec<AxisEstimates>,
     is_clipped: bool,
     share_of_freedom: f64,
 }
 
 #[derive(Default)]
-struct OfAxis {
+struct AxisEstimates {
     recordings: Vec<usize>,
     values: Vec<f64>,
     noise: Vec<f64>,
 }
 
-impl OfAxis {
+impl AxisEstimates {
     fn weights(&self, between: f64) -> Vec<f64> {
         let weight = |noise| 1.0 / (noise + between);
         self.noise.iter().map(weight).collect()
@@ -183,7 +187,7 @@ impl Differences {
     ) -> Self {
         let origins = origins(replicates);
         let count = origins.iter().map(|o| o.position + 1).max().unwrap_or(0);
-        let mut axes: Vec<OfAxis> = (0..count).map(|_| OfAxis::default()).collect();
+        let mut axes: Vec<AxisEstimates> = (0..count).map(|_| AxisEstimates::default()).collect();
         for ((origin, value), noise) in origins.iter().zip(values).zip(noise) {
             let axis = &mut axes[origin.position];
             axis.recordings.push(origin.recording);
@@ -200,7 +204,7 @@ impl Differences {
 
     /// Q where recordings differ by this standard deviation.
     fn square(&self, between: f64) -> f64 {
-        let of_axis = |axis: &OfAxis| -> f64 {
+        let of_axis = |axis: &AxisEstimates| -> f64 {
             axis.residuals(between * between, self.is_clipped)
                 .iter()
                 .map(|z| z * z)
@@ -394,7 +398,7 @@ fn probability(group: &Group, outcome: &Outcome, simple: &Outcome, settings: &Se
     p_value(observed, &gains)
 }
 
-impl Indistinct {
+impl IndistinctProcesses {
     /// The intervals of the larger model: none of those that cannot be told apart, the simpler model's of the others.
     pub(crate) fn adopt(&self, outcome: &Outcome, intervals: &mut [ParameterInterval]) {
         let removed = self.processes.last().copied().unwrap_or(usize::MAX);
@@ -491,7 +495,10 @@ mod indistinct_tests {
                 trend: f64::NAN,
                 mean: f64::NAN,
             };
-            (channel, crate::uncertainty::bootstrap::like(&template, nu))
+            (
+                channel,
+                crate::uncertainty::bootstrap::with_variances(&template, nu),
+            )
         };
         let groups = [grouped((0..count).map(recording).collect(), Pool::Axes).remove(0)];
         let mut outcomes = calibrate(&groups, &settings("WN+2*AR1")).unwrap();

@@ -9,14 +9,14 @@ pub use results::StudyAnswer;
 
 use crate::app::inputs::merge;
 use crate::app::{
-    Answer, Asked, Command, Context, Failure, Front, Input, Manifest, Refuse, Result, argument,
-    is_path, is_repeated, refused,
+    Answer, Command, Context, Failure, Input, Invocation, Manifest, Refuse, Reporter, Result,
+    argument, is_path, is_repeated, refused,
 };
 use crate::commands::run::{PreparedRun, Run, Shared, block_of, columns};
 use crate::io::file_kind::{self, FileKind};
-use crate::io::toml_file::Source;
+use crate::io::toml_file::TomlSource;
 use crate::io::{atomic, input, source};
-use crate::report::{in_order, some};
+use crate::report::{first_names, in_order};
 use clap::Args;
 use indexmap::IndexMap;
 use nav_sim_document::{Importance, Note};
@@ -40,11 +40,6 @@ use toml::{Table, Value};
 /// all are compared (results.csv, summary.json, report.html). Computes what is missing: kill and repeat at will, on any
 /// number of processes and machines that share the directory. Stopped by SIGTERM or the time limit the exit code is 75.
 #[derive(clap::Args, Debug, Clone, Default)]
-#[command(before_help = "\
-Examples:
-  nav-sim batch examples/quick_study.toml -o out/quick
-  nav-sim batch examples/quick_study.toml --shard 0/2 --time-limit 50m
-  nav-sim batch examples/quick_study.toml --set runs=8 --dry-run")]
 pub struct BatchRequest {
     /// The study (TOML)
     #[arg(value_name = "STUDY")]
@@ -73,9 +68,9 @@ pub struct BatchRequest {
     pub force: bool,
 }
 
-/// What became of a study.
+/// Result of a `batch` command.
 #[derive(Debug)]
-pub enum Outcome {
+pub enum BatchOutcome {
     /// Merged: what is there is compared.
     Merged(Box<StudyAnswer>),
     /// Own share done; cells are missing.
@@ -108,7 +103,7 @@ impl BatchRequest {
         &self,
         variable: &dyn Fn(&str) -> Option<String>,
         context: &Context<'_>,
-    ) -> Result<Outcome> {
+    ) -> Result<BatchOutcome> {
         self.run_study(&Study::read(&self.study, &self.set)?, variable, context)
             .map_err(|e| match e.code() {
                 2 if e.file().is_none() => e.within(&self.study.display().to_string()),
@@ -121,9 +116,9 @@ impl BatchRequest {
         study: &Study,
         variable: &dyn Fn(&str) -> Option<String>,
         context: &Context<'_>,
-    ) -> Result<Outcome> {
+    ) -> Result<BatchOutcome> {
         let directory = self.directory();
-        let place = Place(&directory);
+        let place = StudyDirectory(&directory);
         let cells = study.cells(self.study.parent().unwrap_or(Path::new("")))?;
         if !study.run.contains_key("seed") {
             context.remark("no seed in the study: 1");
@@ -135,7 +130,7 @@ impl BatchRequest {
             // a worker that was killed where another had just written the same cell
             let done = cells.iter().filter(|cell| place.is_done(cell));
             done.for_each(|cell| atomic::remove_abandoned(&place.cell(&cell.name)));
-            Ok(Outcome::Merged(Box::new(answer)))
+            Ok(BatchOutcome::Merged(Box::new(answer)))
         };
         guard(&place)?;
         if self.merge {
@@ -150,7 +145,8 @@ impl BatchRequest {
         }
         let units = units(&cells, context)?;
         if self.dry_run {
-            return estimate(&cells, &units, &place, changed.len(), context).map(Outcome::Estimate);
+            return estimate(&cells, &units, &place, changed.len(), context)
+                .map(BatchOutcome::Estimate);
         }
         if cells.iter().any(|cell| !place.is_done(cell)) {
             withdraw(&place);
@@ -184,9 +180,9 @@ impl BatchRequest {
                 .or_hint_if(failure.advice()));
         }
         let left = left();
-        if left > 0 && !context.go_on() {
+        if left > 0 && !context.should_continue() {
             let is_resumable = left < todo;
-            return Ok(Outcome::Stopped { is_resumable, left });
+            return Ok(BatchOutcome::Stopped { is_resumable, left });
         }
         let missing = cells.iter().filter(|cell| !place.is_done(cell));
         let missing: Vec<String> = missing.map(|cell| cell.name.clone()).collect();
@@ -198,16 +194,16 @@ impl BatchRequest {
             "{} of {} cells are missing: {}",
             missing.len(),
             cells.len(),
-            some(&missing)
+            first_names(&missing)
         ));
-        Ok(Outcome::Partial(missing))
+        Ok(BatchOutcome::Partial(missing))
     }
 }
 
 /// Renames cells that have another name than they had; names and reasons of those whose request has changed.
 fn adopt(
-    place: &Place<'_>,
-    cells: &[Cell],
+    place: &StudyDirectory<'_>,
+    cells: &[StudyCell],
     is_dry: bool,
     context: &Context<'_>,
 ) -> Vec<(String, String)> {
@@ -241,7 +237,7 @@ fn adopt(
             others[0]
         ));
     }
-    let changed = |cell: &Cell| {
+    let changed = |cell: &StudyCell| {
         let manifest = place.manifest(&cell.name)?;
         (manifest.key != cell.manifest.key)
             .then(|| (cell.name.clone(), difference(&manifest, &cell.manifest)))
@@ -249,7 +245,7 @@ fn adopt(
     cells.iter().filter_map(changed).collect()
 }
 
-/// What a cell is that was asked for otherwise: the first setting or input that differs.
+/// Describes the first setting or input by which a computed cell differs from the requested one.
 fn difference(there: &Manifest, wanted: &Manifest) -> String {
     let keys = there.options.keys().chain(wanted.options.keys());
     let shown =
@@ -278,14 +274,14 @@ fn difference(there: &Manifest, wanted: &Manifest) -> String {
 
 /// Cells, passes, what is done, and the processor time of the runs that are left, from eight of them.
 fn estimate(
-    cells: &[Cell],
-    units: &[Unit<'_>],
-    place: &Place<'_>,
+    cells: &[StudyCell],
+    units: &[RunBlock<'_>],
+    place: &StudyDirectory<'_>,
     changed: usize,
     context: &Context<'_>,
 ) -> Result<String> {
     let done = cells.iter().filter(|cell| place.is_done(cell)).count();
-    let left: Vec<&Unit<'_>> = units.iter().filter(|unit| !place.has_unit(unit)).collect();
+    let left: Vec<&RunBlock<'_>> = units.iter().filter(|unit| !place.has_unit(unit)).collect();
     let passes = units.iter().filter(|unit| unit.first == 0).count();
     let mut text = format!(
         "{} cells in {passes} passes: {done} done, {} to do, {changed} changed",
@@ -293,7 +289,7 @@ fn estimate(
         cells.len() - done
     );
     // analyses are not timed
-    let sampled = |unit: &&&Unit<'_>| {
+    let sampled = |unit: &&&RunBlock<'_>| {
         let scenario = unit.cells[0].asked.request.scenario();
         scenario.is_ok_and(|scenario| scenario.run.method != Method::Lincov)
     };
@@ -317,8 +313,8 @@ fn estimate(
     Ok(text)
 }
 
-impl Outcome {
-    /// What is missed: stated bounds, or cells that are to be computed.
+impl BatchOutcome {
+    /// Failure to report: missed bounds, or cells that are still to be computed.
     pub fn unmet(&self) -> Option<Failure> {
         match self {
             Self::Merged(answer) => answer.incomplete().or_else(|| answer.unmet()),
@@ -362,20 +358,20 @@ pub(crate) struct Study {
     reference: Table,
     /// Its file, where a refusal stands in one of its lines.
     #[serde(skip)]
-    source: Option<Source>,
+    source: Option<TomlSource>,
 }
 
 /// Axis and label, `[vary]` first, then lists, as written.
 type Labels = Vec<(String, String)>;
 
 /// One request.
-pub(crate) struct Cell {
+pub(crate) struct StudyCell {
     /// Name of its run directory.
     name: String,
     /// Its place on each axis.
     labels: Labels,
     /// The command.
-    asked: Asked<Run>,
+    asked: Invocation<Run>,
     /// Seed of all random numbers.
     seed: u64,
     /// The manifest before the run: what its key is made of.
@@ -393,9 +389,9 @@ impl Study {
             let text = source::text(path).map_err(|e| Failure::io(path, e))?;
             serde_json::from_str(&text).refuse_within(path.display())?
         } else {
-            let source = Source::read(path)?;
+            let source = TomlSource::read(path)?;
             let kinds = [FileKind::Study, FileKind::Scenario];
-            let refused = |e| file_kind::unless(&kinds, path, e);
+            let refused = |e| file_kind::or_wrong_kind(&kinds, path, e);
             let study: Self = source.get().map_err(refused)?;
             Self {
                 source: Some(source).filter(|_| set.is_empty()),
@@ -419,7 +415,7 @@ impl Study {
     }
 
     /// All cells, `[vary]` outermost; paths are relative to `beside`.
-    pub(crate) fn cells(&self, beside: &Path) -> Result<Vec<Cell>> {
+    pub(crate) fn cells(&self, beside: &Path) -> Result<Vec<StudyCell>> {
         let mut requests = vec![(Labels::new(), self.run.clone())];
         for (axis, values) in &self.vary {
             let values = named(axis, values).map_err(|e| self.at(&format!("vary.{axis}"), e))?;
@@ -433,7 +429,7 @@ impl Study {
             };
             requests = requests.iter().flat_map(product).collect();
         }
-        let mut door = Door::new(beside);
+        let mut door = RunValidator::new(beside);
         let mut all = Vec::new();
         for (labels, mut run) in requests {
             for value in run.iter_mut().map(|(_, value)| value) {
@@ -478,7 +474,7 @@ impl Study {
     }
 
     /// The labels that references have: those of the study, else the first model.
-    fn fixed(&self, cells: &[Cell]) -> HashMap<String, String> {
+    fn fixed(&self, cells: &[StudyCell]) -> HashMap<String, String> {
         let given = self.reference.iter();
         if self.reference.is_empty() {
             let mut labels = cells.iter().flat_map(|cell| &cell.labels);
@@ -516,18 +512,19 @@ impl Study {
     }
 }
 
-/// What a single run takes: the parser of its options, and the reader of its scenario.
-struct Door {
+/// Validator of values against a single run: the parser of its options and the reader of its
+/// scenario.
+struct RunValidator {
     command: clap::Command,
     beside: PathBuf,
     taken: HashMap<String, bool>,
     inputs: HashMap<PathBuf, Input>,
 }
 
-impl Door {
+impl RunValidator {
     fn new(beside: &Path) -> Self {
         Self {
-            command: Asked::<Run>::augment_args(clap::Command::new(Run::NAME)),
+            command: Invocation::<Run>::augment_args(clap::Command::new(Run::NAME)),
             beside: beside.to_owned(),
             taken: HashMap::new(),
             inputs: HashMap::new(),
@@ -564,7 +561,7 @@ impl Door {
         Ok(())
     }
 
-    /// Whether a single run takes this value of a key.
+    /// Returns true if a single run accepts this value of a key.
     fn takes(&mut self, path: &str, value: &Value) -> bool {
         let memory = format!("{path}={value}");
         if let Some(known) = self.taken.get(&memory) {
@@ -586,7 +583,7 @@ impl Door {
                 }
                 request.insert(path.to_owned(), value.clone());
                 !(is_nested || is_one_path && list.is_some())
-                    && named_request(&request).is_ok_and(|r| Asked::<Run>::named(&r).is_ok())
+                    && named_request(&request).is_ok_and(|r| Invocation::<Run>::named(&r).is_ok())
             }
             None => nested(path, value.clone()).try_into::<Scenario>().is_ok(),
         };
@@ -620,7 +617,7 @@ impl Door {
     }
 
     /// The command of a request.
-    fn cell(&mut self, name: String, labels: Labels, mut run: Table) -> Result<Cell> {
+    fn cell(&mut self, name: String, labels: Labels, mut run: Table) -> Result<StudyCell> {
         for key in ["out", "plot"] {
             if run.contains_key(key) {
                 return refused(
@@ -651,7 +648,7 @@ impl Door {
                 None => {}
             }
         }
-        let asked = Asked::<Run>::named(&named_request(&run)?)?;
+        let asked = Invocation::<Run>::named(&named_request(&run)?)?;
         let scenario = asked.request.scenario()?;
         let mut inputs = Vec::new();
         for (role, path) in asked.inputs()? {
@@ -681,7 +678,7 @@ impl Door {
         let noise = Manifest::new(Run::NAME, options, inputs).key;
         let is_sampled = scenario.run.method != Method::Lincov;
         let runs = if is_sampled { scenario.run.runs } else { 1 };
-        Ok(Cell {
+        Ok(StudyCell {
             name,
             labels,
             asked,
@@ -830,15 +827,15 @@ fn name_of(labels: &Labels) -> String {
 // may be killed, repeated and run beside one another.
 
 /// A block of runs of cells that share a pass.
-struct Unit<'a> {
-    cells: Vec<&'a Cell>,
+struct RunBlock<'a> {
+    cells: Vec<&'a StudyCell>,
     first: u64,
     runs: u64,
     /// Runs of a cell: of one block, or of several.
     whole: bool,
 }
 
-impl Unit<'_> {
+impl RunBlock<'_> {
     /// Its size, for shards and the estimate of time.
     fn cost(&self) -> u64 {
         self.runs * self.cells.len() as u64
@@ -846,9 +843,9 @@ impl Unit<'_> {
 }
 
 /// The directory of a study.
-struct Place<'a>(pub &'a Path);
+struct StudyDirectory<'a>(pub &'a Path);
 
-impl Place<'_> {
+impl StudyDirectory<'_> {
     fn cell(&self, name: &str) -> PathBuf {
         self.0.join("cells").join(name)
     }
@@ -858,30 +855,30 @@ impl Place<'_> {
         serde_json::from_str(&fs::read_to_string(self.cell(name).join("manifest.json")).ok()?).ok()
     }
 
-    fn is_done(&self, cell: &Cell) -> bool {
+    fn is_done(&self, cell: &StudyCell) -> bool {
         self.manifest(&cell.name)
             .is_some_and(|there| there.key == cell.manifest.key)
     }
 
-    fn part(&self, cell: &Cell, first: u64) -> PathBuf {
+    fn part(&self, cell: &StudyCell, first: u64) -> PathBuf {
         self.0
             .join("parts")
             .join(&cell.manifest.key[..32])
             .join(format!("{first}.part"))
     }
 
-    fn has(&self, unit: &Unit<'_>, cell: &Cell) -> bool {
+    fn has(&self, unit: &RunBlock<'_>, cell: &StudyCell) -> bool {
         self.is_done(cell) || (!unit.whole && read_part(&self.part(cell, unit.first)).is_some())
     }
 
-    /// Whether nothing of a unit is missing.
-    fn has_unit(&self, unit: &Unit<'_>) -> bool {
+    /// Returns true if every cell of a unit is computed.
+    fn has_unit(&self, unit: &RunBlock<'_>) -> bool {
         unit.cells.iter().all(|cell| self.has(unit, cell))
     }
 
     /// The lock of a unit, which the kernel frees when its process ends; none where another process works on it. Without
     /// locks (some shared disks) both compute the same bytes.
-    fn lock(&self, unit: &Unit<'_>) -> Result<Option<File>> {
+    fn lock(&self, unit: &RunBlock<'_>) -> Result<Option<File>> {
         let locks = self.0.join("locks");
         let path = locks.join(format!("{}-{}", &unit.cells[0].noise[..32], unit.first));
         let file = fs::create_dir_all(&locks)
@@ -895,8 +892,8 @@ impl Place<'_> {
 }
 
 /// All units, passes in the order of their first cells.
-fn units<'a>(cells: &'a [Cell], context: &Context<'_>) -> Result<Vec<Unit<'a>>> {
-    let mut passes: IndexMap<&str, Vec<&Cell>> = IndexMap::new();
+fn units<'a>(cells: &'a [StudyCell], context: &Context<'_>) -> Result<Vec<RunBlock<'a>>> {
+    let mut passes: IndexMap<&str, Vec<&StudyCell>> = IndexMap::new();
     for cell in cells {
         passes.entry(&cell.noise).or_default().push(cell);
     }
@@ -909,7 +906,7 @@ fn units<'a>(cells: &'a [Cell], context: &Context<'_>) -> Result<Vec<Unit<'a>>> 
             None => block_of(request, context)?,
         };
         blocks.insert(&request.trajectory, block);
-        let unit = |first| Unit {
+        let unit = |first| RunBlock {
             cells: pass.clone(),
             first,
             runs: block.min(runs - first),
@@ -921,8 +918,8 @@ fn units<'a>(cells: &'a [Cell], context: &Context<'_>) -> Result<Vec<Unit<'a>>> 
 }
 
 /// Units of shard `index` of `count`: contiguous, of equal cost.
-fn shard<'a, 'b>(units: &'b [Unit<'a>], (index, count): (u64, u64)) -> Vec<&'b Unit<'a>> {
-    let total: u64 = units.iter().map(Unit::cost).sum();
+fn shard<'a, 'b>(units: &'b [RunBlock<'a>], (index, count): (u64, u64)) -> Vec<&'b RunBlock<'a>> {
+    let total: u64 = units.iter().map(RunBlock::cost).sum();
     let mut before = 0;
     let mut own = Vec::new();
     for unit in units {
@@ -940,14 +937,18 @@ fn shard<'a, 'b>(units: &'b [Unit<'a>], (index, count): (u64, u64)) -> Vec<&'b U
 type Failures = Vec<(String, Failure)>;
 
 /// Computes the units that are not there and not in work elsewhere, small ones at once, until the context says stop.
-fn work(place: &Place<'_>, own: &[&Unit<'_>], context: &Context<'_>) -> Result<Failures> {
-    let (mut failures, front) = (Failures::new(), OfCells(context, Mutex::default()));
+fn work(
+    place: &StudyDirectory<'_>,
+    own: &[&RunBlock<'_>],
+    context: &Context<'_>,
+) -> Result<Failures> {
+    let (mut failures, front) = (Failures::new(), CellReporter(context, Mutex::default()));
     let shared = Shared::default();
-    let todo: Vec<&&Unit<'_>> = own.iter().filter(|unit| !place.has_unit(unit)).collect();
+    let todo: Vec<&&RunBlock<'_>> = own.iter().filter(|unit| !place.has_unit(unit)).collect();
     context.begin("runs", todo.iter().map(|unit| unit.cost()).sum());
-    let at_once = |unit: &Unit<'_>| (128 * context.threads() as u64 / unit.runs.max(8)).max(1);
+    let at_once = |unit: &RunBlock<'_>| (128 * context.threads() as u64 / unit.runs.max(8)).max(1);
     let mut rest = todo.as_slice();
-    while let (Some(first), true) = (rest.first(), context.go_on()) {
+    while let (Some(first), true) = (rest.first(), context.should_continue()) {
         let (now, later) = rest.split_at(rest.len().min(at_once(first) as usize));
         let computed = now
             .par_iter()
@@ -962,19 +963,19 @@ fn work(place: &Place<'_>, own: &[&Unit<'_>], context: &Context<'_>) -> Result<F
 
 /// Computes what is missing of a unit. A cell that cannot be computed is named; others go on.
 fn compute(
-    place: &Place<'_>,
-    unit: &Unit<'_>,
+    place: &StudyDirectory<'_>,
+    unit: &RunBlock<'_>,
     shared: &Shared,
     context: &Context<'_>,
-    front: &OfCells<'_>,
+    front: &CellReporter<'_>,
 ) -> Result<Failures> {
     let mut failures = Failures::new();
     let Some(_lock) = place.lock(unit)? else {
         return Ok(failures);
     };
     let missing = unit.cells.iter().filter(|cell| !place.has(unit, cell));
-    let missing: Vec<&&Cell> = missing.collect();
-    let mut failed = |cell: &Cell, failure| failures.push((cell.name.clone(), failure));
+    let missing: Vec<&&StudyCell> = missing.collect();
+    let mut failed = |cell: &StudyCell, failure| failures.push((cell.name.clone(), failure));
     let contexts: Vec<Context<'_>> = missing.iter().map(|cell| context_of(cell, front)).collect();
     let mut prepared = Vec::new();
     for (cell, context) in missing.iter().zip(&contexts) {
@@ -1018,9 +1019,9 @@ fn compute(
 }
 
 /// Passes each warning of the cells on once; what they remark is for `--verbose`.
-struct OfCells<'a>(pub &'a Context<'a>, pub Mutex<HashSet<String>>);
+struct CellReporter<'a>(pub &'a Context<'a>, pub Mutex<HashSet<String>>);
 
-impl Front for OfCells<'_> {
+impl Reporter for CellReporter<'_> {
     fn note(&self, note: Note) {
         let Note { importance, text } = note;
         if importance != Importance::Warning {
@@ -1035,14 +1036,14 @@ impl Front for OfCells<'_> {
     }
 }
 
-fn context_of<'a>(cell: &Cell, front: &'a OfCells<'_>) -> Context<'a> {
+fn context_of<'a>(cell: &StudyCell, front: &'a CellReporter<'_>) -> Context<'a> {
     Context::new(front, Some(cell.seed)).reading(cell.manifest.inputs.clone())
 }
 
 /// Finishes a cell whose runs are all there and writes its directory.
 fn write_cell(
-    place: &Place<'_>,
-    cell: &Cell,
+    place: &StudyDirectory<'_>,
+    cell: &StudyCell,
     run: PreparedRun<'_>,
     result: Option<RunResult>,
     context: &Context<'_>,
@@ -1059,7 +1060,12 @@ fn write_cell(
 }
 
 /// Puts the parts of a cell together, where all are there.
-fn assemble(place: &Place<'_>, cell: &Cell, firsts: &[u64], context: &Context<'_>) -> Result<()> {
+fn assemble(
+    place: &StudyDirectory<'_>,
+    cell: &StudyCell,
+    firsts: &[u64],
+    context: &Context<'_>,
+) -> Result<()> {
     if place.is_done(cell) {
         return Ok(());
     }
@@ -1073,7 +1079,7 @@ fn assemble(place: &Place<'_>, cell: &Cell, firsts: &[u64], context: &Context<'_
             None => whole = Some(part),
         }
     }
-    let front = OfCells(context, Mutex::default());
+    let front = CellReporter(context, Mutex::default());
     let context = context_of(cell, &front);
     let run = cell.asked.request.prepare(&Shared::default(), &context)?;
     write_cell(place, cell, run, whole, &context)?;

@@ -1,15 +1,17 @@
 //! Results of a study: `results.csv`, `summary.json`, `report.html`, made from the run directories of its cells.
 
-use super::{Cell, Labels, Place, Study};
+use super::{Labels, Study, StudyCell, StudyDirectory};
 use crate::app::{Answer, Context, Failure, Result};
 use crate::commands::compare::{Comparison, between};
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::io::atomic::{AtomicDir, guard_others};
 use crate::report::csv::{csv, flat};
 use crate::report::verdict::{tone, verdict_counts};
-use crate::report::{json, some};
+use crate::report::{first_names, json};
 use indexmap::IndexMap;
-use nav_sim_document::{Axis, Chart, Colour, Document, Importance, Panel, Series, Table, Tone};
+use nav_sim_document::{
+    Chart, ChartAxis, Colour, Document, Importance, Panel, Series, Table, Tone,
+};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -53,14 +55,14 @@ struct CellSummary {
 /// Reads all cells that are there and compares them; a damaged one is set aside.
 pub(super) fn merge(
     study: &Study,
-    cells: &[Cell],
-    place: &Place<'_>,
+    cells: &[StudyCell],
+    place: &StudyDirectory<'_>,
     context: &Context<'_>,
 ) -> Result<StudyAnswer> {
     let fixed = study.fixed(cells);
-    let by_labels: HashMap<&Labels, &Cell> =
+    let by_labels: HashMap<&Labels, &StudyCell> =
         cells.iter().map(|cell| (&cell.labels, cell)).collect();
-    let reference_of = |cell: &Cell| {
+    let reference_of = |cell: &StudyCell| {
         let label = |(axis, label): &(String, String)| {
             (axis.clone(), fixed.get(axis).unwrap_or(label).clone())
         };
@@ -77,7 +79,7 @@ pub(super) fn merge(
         ..StudyAnswer::default()
     };
     // of each reference its cells: one setting of the other axes
-    let mut settings: IndexMap<&str, Vec<&Cell>> = IndexMap::new();
+    let mut settings: IndexMap<&str, Vec<&StudyCell>> = IndexMap::new();
     for cell in cells {
         settings
             .entry(&reference_of(cell).unwrap_or(cell).name)
@@ -113,7 +115,7 @@ pub(super) fn merge(
 
 impl StudyAnswer {
     /// Cells of one setting, against one of them.
-    fn add(&mut self, read: &[(&Cell, RunDirectory)], reference: Option<usize>) -> Result<()> {
+    fn add(&mut self, read: &[(&StudyCell, RunDirectory)], reference: Option<usize>) -> Result<()> {
         // without the reference each is alone
         let Some(i) = reference else {
             let mut alone = read.iter().map(std::slice::from_ref);
@@ -215,14 +217,20 @@ impl StudyAnswer {
     /// Cells that are missing (exit code 75), if there are any.
     pub(crate) fn incomplete(&self) -> Option<Failure> {
         let missing = &self.missing;
-        let message = || format!("{} cells are missing: {}", missing.len(), some(missing));
+        let message = || {
+            format!(
+                "{} cells are missing: {}",
+                missing.len(),
+                first_names(missing)
+            )
+        };
         (!self.complete).then(|| {
             Failure::stopped(message()).hint("the same command without --merge computes them")
         })
     }
 
     /// Writes the results, all or none.
-    pub(super) fn write(&self, place: &Place<'_>) -> Result<()> {
+    pub(super) fn write(&self, place: &StudyDirectory<'_>) -> Result<()> {
         let mut files = AtomicDir::create(place.0)?;
         for (name, text) in
             FILES
@@ -239,13 +247,13 @@ impl StudyAnswer {
 ///
 /// # Errors
 /// The file that would be lost.
-pub(super) fn guard(place: &Place<'_>) -> Result<()> {
+pub(super) fn guard(place: &StudyDirectory<'_>) -> Result<()> {
     let mut files = FILES.iter().chain(&["manifest.json"]);
     files.try_for_each(|name| guard_others(&place.0.join(name), name))
 }
 
 /// Removes results of before, where a cell is missing.
-pub(super) fn withdraw(place: &Place<'_>) {
+pub(super) fn withdraw(place: &StudyDirectory<'_>) {
     FILES
         .iter()
         .for_each(|name| drop(fs::remove_file(place.0.join(name))));
@@ -274,7 +282,10 @@ impl Answer for StudyAnswer {
         if !names.is_empty() {
             document.note(
                 Importance::Warning,
-                format!("runs diverged in {}; they are in no number", some(&names)),
+                format!(
+                    "runs diverged in {}; they are in no number",
+                    first_names(&names)
+                ),
             );
         }
         let columns = [
@@ -340,8 +351,11 @@ impl StudyAnswer {
             }
             Some(Chart::new(
                 &format!("Error against {axis}"),
-                Axis::linear(axis),
-                vec![Panel::new(Axis::log("horizontal error, p95 (m)"), series)],
+                ChartAxis::linear(axis),
+                vec![Panel::new(
+                    ChartAxis::log("horizontal error, p95 (m)"),
+                    series,
+                )],
             ))
         };
         self.axes.iter().filter_map(chart).collect()

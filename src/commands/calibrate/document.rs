@@ -2,19 +2,19 @@
 
 use super::Calibration;
 use crate::app::Input;
-use crate::commands::export::Quantity;
+use crate::commands::export::ExportQuantity;
 use crate::io::model_file::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn, known};
 use crate::report::csv::merged;
 use crate::report::curves::{FittedCurve, band, curve, recording_names, sensor_name};
-use crate::report::{in_order, some};
+use crate::report::{first_names, in_order};
 use nav_sim_calibration::{
-    Beginning, Candidate, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, Miss, Outcome,
-    ParameterInterval, ParameterSpread, Ranking, Settings, TurnOnFinding, TurnOnSpread,
-    Undetermined, Verdict, WIDEST, duration, percent, tau_s,
+    CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, ModelCandidate, ModelRanking, Outcome,
+    ParameterInterval, ParameterSpread, RecordingVerdict, RecordingWarmUp, ScaleMisfit, Settings,
+    TurnOnFinding, TurnOnSpread, Undetermined, WIDEST, duration, percent, tau_s,
 };
 use nav_sim_document::{
-    Axis as ChartAxis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke,
-    Table, Tone, readable,
+    Cell, Chart, ChartAxis, Colour, Document, Importance, Mark, Panel, Series, Stroke, Table, Tone,
+    readable,
 };
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::practical::Horizon;
@@ -182,7 +182,7 @@ fn policy() -> String {
 }
 
 pub(crate) fn is_abnormal(diagnosis: &Diagnosis) -> bool {
-    diagnosis.verdict != Verdict::Normal
+    diagnosis.verdict != RecordingVerdict::Normal
 }
 
 /// A row a parameter.
@@ -381,7 +381,7 @@ pub(crate) fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> 
             });
         return Some(format!("{count} recordings, none abnormal{differ}"));
     }
-    let named = some(&abnormal);
+    let named = first_names(&abnormal);
     Some(format!(
         "{} of {count} recordings are abnormal: {named}",
         abnormal.len()
@@ -389,20 +389,20 @@ pub(crate) fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> 
 }
 
 /// The recordings whose beginnings change a wavelet variance notably, and what to leave out.
-fn beginnings(found: &[Beginning]) -> Option<String> {
+fn beginnings(found: &[RecordingWarmUp]) -> Option<String> {
     const NOTABLE: f64 = 0.05;
-    let matters = |b: &&Beginning| {
+    let matters = |b: &&RecordingWarmUp| {
         let mut changes = b.signals.iter().map(|w| w.change);
         changes.any(|c| c.is_none_or(|ratio| ratio.ln().abs() > NOTABLE))
     };
-    let told: Vec<&Beginning> = found.iter().filter(matters).collect();
+    let told: Vec<&RecordingWarmUp> = found.iter().filter(matters).collect();
     let names = recording_names(told.iter().map(|b| b.recording.as_str()));
-    let line = |(b, name): (&&Beginning, String)| match b.skip_s {
+    let line = |(b, name): (&&RecordingWarmUp, String)| match b.skip_s {
         Some(s) => format!("{name} --skip-s {s}"),
         None => format!("{name} never settles"),
     };
     let lines: Vec<String> = told.iter().zip(names).map(line).collect();
-    (!lines.is_empty()).then(|| some(&lines))
+    (!lines.is_empty()).then(|| first_names(&lines))
 }
 
 /// `accel.x`, with the estimator where there are several.
@@ -551,7 +551,10 @@ fn recording_notes(
     settings: &Settings,
 ) -> Vec<String> {
     let own: Vec<&Diagnosis> = diagnoses.iter().filter(|d| d.sensor == sensor).collect();
-    let abnormal = own.iter().filter(|d| d.verdict == Verdict::Noise).count();
+    let abnormal = own
+        .iter()
+        .filter(|d| d.verdict == RecordingVerdict::Noise)
+        .count();
     let mut notes = Vec::new();
     if abnormal > 0 && 2 * abnormal >= own.len() {
         notes.push(
@@ -634,9 +637,9 @@ fn turn_on_remark(found: &TurnOnSpread) -> String {
 }
 
 /// The reasons of a choice.
-fn reasons(ranking: &Ranking) -> Vec<String> {
+fn reasons(ranking: &ModelRanking) -> Vec<String> {
     let (best, taken) = (&ranking.candidates[0], &ranking.candidates[ranking.chosen]);
-    let wvic = |c: &Candidate| format!("{} {:.4}", c.spec, c.wvic());
+    let wvic = |c: &ModelCandidate| format!("{} {:.4}", c.spec, c.wvic());
     let (name, pair) = (&taken.spec, format!("{}, {}", wvic(taken), wvic(best)));
     let mut lines = vec![match taken.p_value {
         None if taken.spec == best.spec => {
@@ -699,7 +702,7 @@ fn fit_json(outcome: &Outcome, all: &[Outcome], settings: &Settings) -> Value {
     let labelled = |processes: &[usize]| -> Vec<&str> {
         processes.iter().map(|i| labels[*i].as_str()).collect()
     };
-    let miss = |m: &Miss| json!({ "tau_s": tau_s(m.level, rate_hz), "ratio": m.ratio, "deviations": m.deviations });
+    let miss = |m: &ScaleMisfit| json!({ "tau_s": tau_s(m.level, rate_hz), "ratio": m.ratio, "deviations": m.deviations });
     let missed: Vec<Value> = outcome.departure().missed.iter().map(miss).collect();
     let law = |found: &ParameterSpread| {
         let of = json!({
@@ -737,8 +740,8 @@ fn fit_json(outcome: &Outcome, all: &[Outcome], settings: &Settings) -> Value {
     merged([fit_record(outcome, settings), fit_facts])
 }
 
-fn candidates(ranking: &Ranking) -> Vec<Value> {
-    let entry = |(i, c): (usize, &Candidate)| {
+fn candidates(ranking: &ModelRanking) -> Vec<Value> {
+    let entry = |(i, c): (usize, &ModelCandidate)| {
         json!({
             "model": c.spec.to_string(),
             "objective": c.objective,
@@ -774,8 +777,8 @@ fn intervals(outcome: &Outcome) -> &[ParameterInterval] {
 }
 
 /// The noise of a fit, with its intervals.
-fn put_into(file: &mut ModelFile, outcome: &Outcome) {
-    outcome.put_into(&mut file.model);
+fn apply_to(file: &mut ModelFile, outcome: &Outcome) {
+    outcome.apply_to(&mut file.model);
     let labels = outcome.fit.composite.labels();
     for channel in outcome.scope.channels() {
         file.missing.retain(|c| *c != channel);
@@ -834,12 +837,12 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
         let floor = minimum.map_or(none, |m| format!("floor at {}", duration(m.tau_s)));
         let b = minimum.map(|m| m.deviation);
         let k = practical.walk_is_observed().then_some(pair.walk);
-        let unit = |quantity: Quantity| quantity.sheet(sensor);
+        let unit = |quantity: ExportQuantity| quantity.data_sheet_unit(sensor);
         let (n, to) = (Some(pair.density), to.unwrap_or_default());
         put(
             "N".to_owned(),
             white,
-            unit(Quantity::Density),
+            unit(ExportQuantity::Density),
             n,
             ends.density,
             &to,
@@ -847,7 +850,7 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
         put(
             "B".to_owned(),
             "bias instability B",
-            unit(Quantity::Bias),
+            unit(ExportQuantity::Bias),
             b,
             ends.instability,
             &floor,
@@ -855,7 +858,7 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
         put(
             "K".to_owned(),
             walk,
-            unit(Quantity::Walk),
+            unit(ExportQuantity::Walk),
             k,
             ends.walk,
             &from,
@@ -933,7 +936,7 @@ pub(crate) fn figure_of(process: &Process, label: &str, sensor: Sensor) -> Optio
 pub(crate) struct CalibrationNote {
     /// Seed of the bootstrap, if there was one.
     pub seed: Option<u64>,
-    /// How the recordings were read and grouped, key by key: what was left out at their beginning, gaps, axes, scales, pool.
+    /// Reading and grouping of the recordings, by key: skipped start, gaps, axes, scales, pool.
     pub reading: toml::Table,
     /// The recordings or the curve, and the parameters file.
     pub inputs: Vec<Input>,
@@ -974,10 +977,10 @@ impl Calibration {
                     Variation::new(composite, &labels[of.process], of.parameter.name(), law).ok()
                 })
                 .collect();
-            put_into(&mut file, outcome);
+            apply_to(&mut file, outcome);
             if let Some(reading) = &outcome.reading {
                 let empty = || Box::new(ModelFile::empty(rate_hz));
-                put_into(file.reading.get_or_insert_with(empty), reading);
+                apply_to(file.reading.get_or_insert_with(empty), reading);
             }
             for channel in outcome.scope.channels() {
                 spread.axes[channel.index()].clone_from(&laws);

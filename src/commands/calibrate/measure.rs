@@ -7,9 +7,9 @@ use crate::io::recordings::{FileReport, ReadOptions, Report};
 use crate::io::{curve_file, recordings};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
-    self, Advance, Beginning, Bootstrap, CalibrationError, Diagnosis, Estimator, Group, Outcome,
-    Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve, infer_telling,
-    replicates, turn_on, warm_up,
+    self, Advance, Bootstrap, CalibrationError, Diagnosis, Estimator, Group, Outcome,
+    RecordingWarmUp, Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve,
+    infer_with_progress, replicates, turn_on, warm_up,
 };
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::names::UnknownName;
@@ -41,7 +41,7 @@ impl FromStr for EstimatorChoice {
 }
 
 impl EstimatorChoice {
-    /// Whether it takes one recording at a time, however many there are.
+    /// Returns true for an estimator that takes one recording at a time.
     pub fn is_single(self) -> bool {
         matches!(self, Self::One(estimator) if estimator.is_single())
     }
@@ -75,10 +75,10 @@ impl EstimatorChoice {
 }
 
 /// Recordings that were measured, none a copy of another.
-pub(crate) struct Measured {
+pub(crate) struct MeasuredRecordings {
     pub report: Report,
     pub replicates: Vec<(Channel, Replicate)>,
-    pub beginnings: Vec<Beginning>,
+    pub beginnings: Vec<RecordingWarmUp>,
     pub settings: Settings,
 }
 
@@ -90,15 +90,15 @@ pub struct Calibration {
     pub groups: Vec<Group>,
     /// The fitted models: for each group, one per estimator.
     pub outcomes: Vec<Outcome>,
-    /// How they were fitted.
+    /// Settings of the fit.
     pub settings: Settings,
     /// The recordings that do not begin as they go on.
-    pub beginnings: Vec<Beginning>,
+    pub beginnings: Vec<RecordingWarmUp>,
     /// Turn-on bias from the recordings' means, for each estimator and sensor.
     pub turn_on: Vec<TurnOnSpread>,
     /// Each recording against the others.
     pub diagnoses: Vec<Diagnosis>,
-    /// What the model files record beside the fits.
+    /// Provenance that the model files record beside the fits.
     pub(crate) note: CalibrationNote,
 }
 
@@ -110,7 +110,7 @@ pub(crate) fn measure(
     estimators: EstimatorChoice,
     settings: &Settings,
     context: &Context<'_>,
-) -> Result<Measured, Failure> {
+) -> Result<MeasuredRecordings, Failure> {
     // As many scales as parameters, and one that the default leaves out.
     reading.min_samples = scales.map_or(2 << settings.model.parameters(), |j| 1 << j);
     let look = |recording: Recording| MeasuredRecording::new(recording, scales, &settings.tuning);
@@ -132,7 +132,7 @@ pub(crate) fn measure(
     };
     let mut measured: Vec<_> = looks.into_iter().flat_map(|look| look.replicates).collect();
     one_switching_on(&report, &mut measured);
-    Ok(Measured {
+    Ok(MeasuredRecordings {
         report,
         replicates: measured,
         beginnings,
@@ -150,7 +150,7 @@ impl Calibration {
         advance: Advance<'_>,
     ) -> Self {
         if let Some(bootstrap) = bootstrap {
-            infer_telling(&groups, &mut outcomes, &settings, bootstrap, advance);
+            infer_with_progress(&groups, &mut outcomes, &settings, bootstrap, advance);
         }
         let of_estimator = |e: &Estimator| {
             let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == *e).collect();
@@ -245,8 +245,8 @@ fn one_switching_on(report: &Report, measured: &mut [(Channel, Replicate)]) {
 }
 
 /// The recordings that do not begin as they go on after what was skipped.
-fn beginnings(looks: &[MeasuredRecording], skipped_s: f64, rate_hz: f64) -> Vec<Beginning> {
-    let beginning = |look: &MeasuredRecording| Beginning {
+fn beginnings(looks: &[MeasuredRecording], skipped_s: f64, rate_hz: f64) -> Vec<RecordingWarmUp> {
+    let beginning = |look: &MeasuredRecording| RecordingWarmUp {
         recording: look.recording.clone(),
         signals: look.warm_ups.clone(),
         skip_s: longest(&look.warm_ups).map(|n| (skipped_s + n as f64 / rate_hz).ceil()),

@@ -26,7 +26,7 @@ mod measure;
 
 pub(crate) use document::{CalibrationNote, figure_of, is_abnormal, recordings_line};
 pub use measure::{Calibration, EstimatorChoice};
-pub(crate) use measure::{Measured, measure, visit};
+pub(crate) use measure::{MeasuredRecordings, measure, visit};
 
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
 use crate::app::{Answer, Command, Context, Out, OutputFile, Result, refused};
@@ -40,7 +40,7 @@ use crate::report::curves::SignalCurves;
 use measure::{Curves, calibrate_curves, read_curves};
 use nav_sim_calibration::{
     Bootstrap, Estimator, ModelChoice, ModelSpec, Pool, Replicate, Settings, Trim, Weighting,
-    calibrate_telling, grouped,
+    calibrate_with_progress, grouped,
 };
 use nav_sim_document::Document;
 use nav_sim_signal::imu::Channel;
@@ -58,12 +58,6 @@ use std::path::{Path, PathBuf};
 /// <model>.wv.json holds the curves, <model>.draws.json the draws behind the intervals, <model>.html a page and
 /// <model>.svg its figures. With `--estimator all` there is such a set for each estimator, <model>_<estimator>.toml and so on.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim synthesize calib_data/consumer_mems.toml \\
-      --replicates 5 --samples 65536 --spread --seed 1 -o static
-  nav-sim calibrate static -o model.toml
-  nav-sim calibrate static --estimator all --model \"AR1+RW+WN\" --pool axes -o imu.toml")]
 pub struct Calibrate {
     /// Recordings, or directories of recordings
     #[arg(
@@ -99,7 +93,7 @@ pub struct Calibrate {
     /// Draws behind intervals and goodness of fit (0: neither), fewer for tests
     #[arg(long, value_name = "B", hide = true, default_value_t = Bootstrap::DRAWS as u32, value_parser = clap::value_parser!(u32).range(0..=100_000))]
     bootstrap: u32,
-    /// How they are read.
+    /// Options for reading them.
     #[command(flatten)]
     pub recordings: RecordingRequest,
     /// Scales and robustness.
@@ -110,7 +104,7 @@ pub struct Calibrate {
 /// Flags about recordings and their averages, which a curve has behind it.
 const OF_RECORDINGS: [&str; 6] = ["estimator", "trim", "pool", "skip_s", "gaps", "efficiency"];
 
-/// Those of several recordings first, then those of one.
+/// Names of the estimators, those of several recordings first.
 pub(crate) const ESTIMATORS: [&str; 7] =
     ["awv", "sr-awv", "dr-awv", "gmwm", "rgmwm", "avlr", "all"];
 
@@ -170,7 +164,7 @@ impl Command for Calibrate {
             None => {
                 let (reading, scales) = (self.recordings.options(), self.tuning.levels());
                 let estimators = self.estimator;
-                let Measured {
+                let MeasuredRecordings {
                     replicates,
                     beginnings,
                     settings,
@@ -201,7 +195,7 @@ impl Command for Calibrate {
                 let fits = (groups.len() * settings.estimators.len()) as u64;
                 context.begin("steps of the fits", fits * steps);
                 let advance = |steps| context.advance(steps);
-                let outcomes = calibrate_telling(&groups, &settings, &advance)?;
+                let outcomes = calibrate_with_progress(&groups, &settings, &advance)?;
                 let made = Calibration::new(groups, outcomes, settings, bootstrap, &advance);
                 context.end();
                 Calibration { beginnings, ..made }
@@ -249,7 +243,7 @@ impl Answer for Calibration {
 }
 
 impl Calibrate {
-    /// How models are fitted, checked before any file is read.
+    /// Settings of the fit, validated before any file is read.
     fn settings(&self) -> Result<Settings> {
         Ok(Settings {
             model: self.structure()?,
@@ -279,7 +273,7 @@ impl Calibrate {
         })
     }
 
-    /// How the recordings were read and grouped; of a curve nothing is known.
+    /// Reading and grouping of the recordings; empty for a curve.
     fn reading(&self, settings: &Settings) -> toml::Table {
         if self.curve.is_some() {
             return toml::Table::new();
@@ -310,7 +304,8 @@ impl Calibrate {
 
 // The files of a calibration: for each estimator a model, the curves behind it and the draws behind its intervals.
 
-/// What comes between the stem of `--out` and the endings of an estimator: of several `_<estimator>`.
+/// Text between the stem of `--out` and an estimator's file extensions: `_<estimator>` if there are
+/// several.
 fn stem_of(estimator: Estimator, estimators: &[Estimator]) -> String {
     match estimators.len() {
         1 => String::new(),

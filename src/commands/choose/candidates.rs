@@ -1,11 +1,11 @@
-//! What is chosen among.
+//! Candidates of `choose` and their cross-validation.
 
 use super::FEWEST;
 use super::ranking::Score;
 use crate::app::{Failure, Refuse};
 use nav_sim_calibration::{
-    CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, Replicate, Settings,
-    Verdict, calibrate, diagnose, grouped, model_of,
+    CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, RecordingVerdict,
+    Replicate, Settings, calibrate, diagnose, grouped, model_of,
 };
 use nav_sim_navigation::ekf::{Belief, FilterStates};
 use nav_sim_navigation::monte_carlo;
@@ -24,17 +24,17 @@ use std::fmt;
 /// A way from recordings to a filter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// How replicates become one curve.
+    /// Estimator that combines the replicates into one curve.
     pub estimator: Estimator,
-    /// What is fitted to it.
+    /// Model fitted to the curve.
     pub model: ModelChoice,
-    /// How the model becomes states of the filter.
+    /// States by which the filter represents the model.
     pub filter: FilterStates,
-    /// What is done to the model in between.
+    /// Inflation of the model before the filter takes it.
     pub inflation: Inflation,
 }
 
-/// What is done to a model before a filter is made of it.
+/// Inflation of a model before a filter takes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Inflation {
     /// Nothing.
@@ -58,9 +58,9 @@ impl Candidate {
         }
     }
 
-    /// What is compared where nothing else is said: the three averages of N2, and beside AWV what else is done in
-    /// practice, from all states to the rule of thumb, and single recordings.
-    pub(crate) fn usual() -> Vec<Self> {
+    /// Default candidates: the three averages with N2; and with AWV the other common practices,
+    /// from all states to the rule of thumb and single recordings.
+    pub(crate) fn default_set() -> Vec<Self> {
         let n2 = |estimator| Self::new(estimator, ModelSpec::n2());
         let two_slopes = |estimator| Self::new(estimator, white_and_walk());
         vec![
@@ -129,18 +129,19 @@ impl Candidate {
         }
     }
 
-    /// Whether it may be chosen. What is made of a single recording, while there are several, is shown for comparison.
+    /// Returns true if it may be chosen. Calibrations of a single recording are shown for
+    /// comparison only.
     pub const fn is_eligible(&self) -> bool {
         !self.estimator.is_single()
     }
 }
 
-/// What most filters of other programs know.
+/// Noise model of most filters: white noise and a random walk.
 fn white_and_walk() -> ModelSpec {
     "WN+RW".parse().expect("a sum of known processes")
 }
 
-/// Whether every process has a slope of its own in the Allan deviation.
+/// Returns true if every process has a slope of its own in the Allan deviation.
 fn is_of_slopes(model: &ModelChoice) -> bool {
     match model {
         ModelChoice::Given(spec) => spec.kinds().iter().all(|kind| kind.shape().is_none()),
@@ -170,7 +171,10 @@ mod candidate_tests {
 
     #[test]
     fn names_tell_candidates_apart() {
-        let mut names: Vec<String> = Candidate::usual().iter().map(ToString::to_string).collect();
+        let mut names: Vec<String> = Candidate::default_set()
+            .iter()
+            .map(ToString::to_string)
+            .collect();
         assert_eq!(
             (names[0].as_str(), names[7].as_str()),
             ("awv N2, 15", "avlr WN+RW, 15")
@@ -203,7 +207,7 @@ pub type Unit = Vec<(Channel, Replicate)>;
 /// All recordings and how models are made of them. Estimators and model of the settings count nothing: those of the
 /// candidates do.
 #[derive(Debug)]
-pub struct Laboratory {
+pub struct CalibrationSet {
     /// The recordings.
     pub units: Vec<Unit>,
     /// Settings of the fits.
@@ -213,7 +217,7 @@ pub struct Laboratory {
 /// The groups of recordings that were calibrated, their fits, and how these were made.
 type Calibrated = (Vec<Group>, Vec<Outcome>, Settings);
 
-impl Laboratory {
+impl CalibrationSet {
     /// Calibrates a candidate on all recordings but one, before any inflation. An estimator of single recordings takes
     /// that after the one left out (the first, where none is), so that each is taken once.
     ///
@@ -247,7 +251,7 @@ impl Laboratory {
         let all: Vec<&Unit> = self.units.iter().collect();
         let (groups, outcomes, settings) = self.fit(&all, Estimator::DrAwv, &n2)?;
         let mut diagnoses = diagnose(&groups, &outcomes, &settings);
-        diagnoses.retain(|diagnosis| diagnosis.verdict != Verdict::Normal);
+        diagnoses.retain(|diagnosis| diagnosis.verdict != RecordingVerdict::Normal);
         let is_abnormal = |name: &String| diagnoses.iter().any(|d| d.name == *name);
         let is_normal = |k: &usize| !self.units[*k].iter().any(|(_, r)| is_abnormal(&r.name));
         let normal: Vec<usize> = self.others(None).filter(is_normal).collect();
@@ -346,7 +350,7 @@ impl Drive {
     /// trajectory.
     pub fn leave_out(
         &self,
-        laboratory: &Laboratory,
+        laboratory: &CalibrationSet,
         k: usize,
         mut recordings: Vec<Recording>,
         candidates: &[Candidate],
@@ -368,10 +372,10 @@ impl Drive {
         Ok(results.iter().map(score).collect())
     }
 
-    /// What each candidate's filter believes by all recordings but one.
+    /// Noise model in each candidate's filter, calibrated from all recordings but one.
     fn beliefs(
         &self,
-        laboratory: &Laboratory,
+        laboratory: &CalibrationSet,
         without: usize,
         candidates: &[Candidate],
     ) -> Result<Vec<Belief>, Failure> {

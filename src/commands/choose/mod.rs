@@ -11,13 +11,13 @@ use crate::app::inputs::{self, SettingsArgs};
 use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
 use crate::app::{Command, Context, Inputs, Out, PlainAnswer, Result, refused};
 use crate::commands::calibrate::{
-    Calibration, CalibrationNote, ESTIMATORS, EstimatorChoice, Measured, measure,
+    Calibration, CalibrationNote, ESTIMATORS, EstimatorChoice, MeasuredRecordings, measure,
 };
 use crate::io::recordings::{self, FileReport, Gaps};
 use crate::parse;
 use crate::report::csv::merged;
-use crate::report::{self, six_digits, some};
-use candidates::{Candidate, Drive, Fold, Inflation, Laboratory, Unit};
+use crate::report::{self, first_names, six_digits};
+use candidates::{CalibrationSet, Candidate, Drive, Fold, Inflation, Unit};
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, model_of};
 use nav_sim_document::{Document, Importance, Table, Tone, readable, window};
 use nav_sim_navigation::ekf::FilterStates;
@@ -38,13 +38,6 @@ pub mod ranking;
 /// with intervals over recordings. Writes report.html, ranking.json and model.toml, the winner calibrated on all
 /// recordings.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim synthesize calib_data/consumer_mems.toml --replicates 4 --samples 16384 -o recordings
-  nav-sim choose recordings --trajectory trajectories/figure_eight.toml --outage 60:90 \\
-      --estimator awv,dr-awv --inflate none,x10
-  nav-sim choose recordings --trajectory trajectories/figure_eight.toml --outage 60:90 \\
-      --estimator awv --model N1,WN+RW --filter 15,full -o out/models --format json")]
 pub struct Choose {
     /// Static recordings, three or more files, or directories of them
     #[arg(id = "recording", required = true, value_name = "RECORDINGS")]
@@ -66,19 +59,20 @@ pub struct Choose {
     /// [default: 15, and full with awv]
     #[arg(long, value_name = "STATES", value_delimiter = ',')]
     filter: Vec<FilterStates>,
-    /// How models are inflated: none, x10 (ten times the standard deviations) [default: none, and both with awv]
+    /// Inflation of models: none, x10 (ten times the standard deviations) [default: none, and both
+    /// with awv]
     #[arg(long, value_name = "HOW", value_delimiter = ',')]
     inflate: Vec<Inflation>,
     /// Runs on each recording
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     runs: u64,
-    /// What DR-AWV drops at each end of each scale: a number, or a share such as 30%
+    /// Replicates that DR-AWV drops at each end of each scale: a number, or a share such as 30%
     #[arg(long, value_name = "A", default_value_t)]
     trim: Trim,
-    /// What to do where the time jumps or stands still: refuse the file, split it there, or ignore it
+    /// Handling of gaps and repeated times: refuse the file, split it there, or ignore them
     #[arg(long, value_parser = parse::one_of::<Gaps>(WHOLE), default_value_t)]
     gaps: Gaps,
-    /// How recordings are read.
+    /// Options for reading recordings.
     #[command(flatten)]
     pub recordings: ReadingRequest,
 }
@@ -157,7 +151,7 @@ impl Command for Choose {
             );
         }
         let units = units(&measured);
-        let laboratory = Laboratory {
+        let laboratory = CalibrationSet {
             units,
             settings: measured.settings,
         };
@@ -256,7 +250,7 @@ impl Command for Choose {
 }
 
 impl Choose {
-    /// Those that are usual, or all combinations of what is given.
+    /// Candidates to compare: the default ones, or all combinations of the given options.
     fn candidates(&self) -> Result<Vec<Candidate>> {
         let Self {
             estimator,
@@ -266,7 +260,7 @@ impl Choose {
             ..
         } = self;
         if estimator.is_empty() && model.is_empty() && filter.is_empty() && inflate.is_empty() {
-            return Ok(Candidate::usual());
+            return Ok(Candidate::default_set());
         }
         let models = model.iter().map(|m| m.parse().map_err(unknown_model));
         let models: Vec<ModelChoice> = models.collect::<Result<_>>()?;
@@ -311,7 +305,7 @@ fn nominal_hz(found_hz: f64, fix_hz: f64) -> f64 {
 }
 
 /// The recordings, each with its signals' wavelet variances.
-fn units(measured: &Measured) -> Vec<Unit> {
+fn units(measured: &MeasuredRecordings) -> Vec<Unit> {
     let unit = |file: &FileReport| {
         let names: Vec<String> = file.recordings().map(|(name, _)| name).collect();
         let own = measured
@@ -341,7 +335,10 @@ impl Ranking {
             ),
         }];
         if self.tells && !self.tied.is_empty() {
-            lines.push(format!("cannot be told from it: {}", some(&self.tied)));
+            lines.push(format!(
+                "cannot be told from it: {}",
+                first_names(&self.tied)
+            ));
         }
         lines.push(format!(
             "its horizontal error at the ends of outages: {} m, believed {} m, NEES {} (9 if right)",

@@ -14,7 +14,7 @@ const FAILS: f64 = 2.0 * 9.0;
 
 /// A mean over recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Mean {
+pub struct RecordingMean {
     /// Its value.
     pub value: f64,
     /// 95 % interval (Student's t, the recording as unit, widened for what folds share); not finite (null) of one
@@ -26,7 +26,7 @@ pub struct Mean {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Difference {
     /// Its log score less the winner's (nats an outage end); negative is worse.
-    pub log_score: Mean,
+    pub log_score: RecordingMean,
     /// The same interval, true of all candidates together at 95 % (Bonferroni).
     pub joint95: (f64, f64),
 }
@@ -38,32 +38,32 @@ pub struct FoldScore {
     pub recording: String,
     /// Windows of it.
     pub windows: u64,
-    /// How it did.
+    /// Its score.
     #[serde(flatten)]
     pub score: Score,
 }
 
 /// A candidate with its place.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Placed {
+pub struct RankedCandidate {
     /// In words.
     pub candidate: String,
     /// `best`, `tied` with it, or `single`: of one recording, for comparison.
     pub place: &'static str,
     /// Its index among those that were given.
     pub index: usize,
-    /// Whether it may be chosen; others are shown for comparison.
+    /// True if it may be chosen; others are shown for comparison.
     pub eligible: bool,
-    /// Whether it is the winner, or cannot be told from it.
+    /// True for the winner and for candidates indistinguishable from it.
     pub tied: bool,
     /// Mean log score (nats an outage end).
-    pub log_score: Mean,
+    pub log_score: RecordingMean,
     /// Horizontal RMSE at the ends of outages (m), root mean square over recordings.
     pub rmse_m: f64,
-    /// What its filter believes of it (m).
+    /// Standard deviation that its filter states for it (m).
     pub believed_m: f64,
     /// Mean NEES at the ends of outages; 9 is right.
-    pub nees: Mean,
+    pub nees: RecordingMean,
     /// Share of the ends within the filter's 95 % ellipsoid.
     pub coverage: f64,
     /// Beside the winner.
@@ -80,18 +80,18 @@ pub struct Ranking {
     /// Candidates that the data cannot tell from the winner.
     pub tied: Vec<String>,
     /// The candidates.
-    pub candidates: Vec<Placed>,
+    pub candidates: Vec<RankedCandidate>,
     /// Recordings that no candidate describes: the least NEES of all is above 18 where 9 is right.
     pub undescribed: Vec<String>,
-    /// Whether the data tell the winner from any other that may be chosen.
+    /// True if the data distinguish the winner from at least one other eligible candidate.
     pub tells: bool,
 }
 
 impl Ranking {
-    /// Of what every recording, left out, says of every candidate.
+    /// Ranks the candidates by their scores on each left-out recording.
     ///
     /// # Panics
-    /// Without a candidate that may be chosen, or without a recording.
+    /// Without an eligible candidate, or without a recording.
     pub fn new(candidates: &[Candidate], folds: &[Fold]) -> Self {
         let eligible: Vec<usize> = (0..candidates.len())
             .filter(|c| candidates[*c].is_eligible())
@@ -102,7 +102,7 @@ impl Ranking {
         let winner = eligible.iter().copied().reduce(higher);
         let winner = winner.expect("one may be chosen");
         let rivals = eligible.len().saturating_sub(1).max(1);
-        let mut placed: Vec<Placed> = (0..candidates.len())
+        let mut placed: Vec<RankedCandidate> = (0..candidates.len())
             .map(|c| place(c, &candidates[c], winner, rivals, folds))
             .collect();
         placed.sort_by(|a, b| {
@@ -124,7 +124,13 @@ impl Ranking {
     }
 }
 
-fn place(c: usize, candidate: &Candidate, winner: usize, rivals: usize, folds: &[Fold]) -> Placed {
+fn place(
+    c: usize,
+    candidate: &Candidate,
+    winner: usize,
+    rivals: usize,
+    folds: &[Fold],
+) -> RankedCandidate {
     let scores = || folds.iter().map(|fold| &fold.scores[c]);
     let per_recording = |value: &dyn Fn(&Score) -> f64| scores().map(value).collect::<Vec<f64>>();
     let log_scores = folds
@@ -146,7 +152,7 @@ fn place(c: usize, candidate: &Candidate, winner: usize, rivals: usize, folds: &
     // where nothing is known of the difference, nothing tells them apart
     let is_worse = joint95.1 < 0.0 || log_score.value == f64::NEG_INFINITY;
     let (eligible, tied) = (candidate.is_eligible(), c == winner || !is_worse);
-    Placed {
+    RankedCandidate {
         candidate: candidate.to_string(),
         place: match (c == winner, eligible, tied) {
             (true, ..) => "best",
@@ -168,9 +174,9 @@ fn place(c: usize, candidate: &Candidate, winner: usize, rivals: usize, folds: &
 }
 
 /// The interval of what cannot be negative: that of its logarithm.
-fn positive(Mean { value, ci95 }: Mean) -> Mean {
+fn positive(RecordingMean { value, ci95 }: RecordingMean) -> RecordingMean {
     let factor = ((ci95.1 - value) / value).exp();
-    Mean {
+    RecordingMean {
         value,
         ci95: (value / factor, value * factor),
     }
@@ -180,14 +186,14 @@ fn positive(Mean { value, ci95 }: Mean) -> Mean {
 /// recordings, so that their scores hang together: the variance of the mean is (1/K + 1/(K − 1)) of that of a score
 /// ([Nadeau and Bengio 2003](https://doi.org/10.1023/A:1024068626366), one recording tested for K − 1 calibrated on). In
 /// simulated laboratories an interval without the second part held the truth in 87 % where 95 % was said.
-fn interval(values: &[f64], alpha: f64) -> Mean {
+fn interval(values: &[f64], alpha: f64) -> RecordingMean {
     let n = values.len() as f64;
     let value = values.iter().sum::<f64>() / n;
     let variance = values.iter().map(|x| (x - value).powi(2)).sum::<f64>() / (n - 1.0);
     let t = StudentsT::new(0.0, 1.0, n - 1.0)
         .map_or(f64::NAN, |law| law.inverse_cdf(1.0 - 0.5 * alpha));
     let half = t * (variance * (1.0 / n + 1.0 / (n - 1.0))).sqrt();
-    Mean {
+    RecordingMean {
         value,
         ci95: (value - half, value + half),
     }
@@ -219,7 +225,7 @@ mod ranking_tests {
 
     #[test]
     fn the_interval_of_what_is_positive_is_positive() {
-        let nees = positive(Mean {
+        let nees = positive(RecordingMean {
             value: 30.0,
             ci95: (-20.0, 80.0),
         });
@@ -334,7 +340,7 @@ pub struct Score {
 pub struct EndScore {
     /// Horizontal RMSE (m).
     pub rmse_m: f64,
-    /// What the filter believes of it (m).
+    /// Standard deviation that the filter states for it (m).
     pub believed_m: f64,
     /// Mean NEES of position, velocity and attitude; 9 is right.
     pub nees: f64,
@@ -343,7 +349,7 @@ pub struct EndScore {
 }
 
 impl Score {
-    /// Of runs with so many outages.
+    /// Scores the runs of one candidate with this number of outages.
     pub(crate) fn of(runs: &[RunRecord], outages: usize) -> Self {
         let kept: Vec<&[OutageRecord]> = runs
             .iter()

@@ -2,10 +2,10 @@
 
 use crate::app::{Context, PlainAnswer, Result};
 use crate::commands::calibrate::figure_of;
-use crate::commands::export::Quantity;
+use crate::commands::export::ExportQuantity;
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::{self, ModelFile};
-use crate::report::some;
+use crate::report::first_names;
 use nav_sim_calibration::figures_with_intervals;
 use nav_sim_document::{Document, Table, Tone, readable};
 use nav_sim_signal::imu::{Axis, Channel};
@@ -23,10 +23,14 @@ fn estimates((file, draws): &(ModelFile, Option<Draws>), channel: Channel) -> Ve
     let drawn: Vec<_> = drawn.map(|model| model.axis(channel)).collect();
     let stretch = draws.as_ref().map_or(1.0, |draws| draws.stretch);
     let figures = figures_with_intervals(model, &drawn, stretch, rate_hz, range_s);
-    let quantities = [Quantity::Density, Quantity::Walk, Quantity::Bias];
+    let quantities = [
+        ExportQuantity::Density,
+        ExportQuantity::Walk,
+        ExportQuantity::Bias,
+    ];
     let mut all: Vec<Estimate> = Vec::new();
     for (k, (quantity, (value, ends))) in quantities.into_iter().zip(figures).enumerate() {
-        let (unit, factor) = quantity.sheet(channel.sensor);
+        let (unit, factor) = quantity.data_sheet_unit(channel.sensor);
         let ends = ends.map(|ends| ends.map(|end| end * factor));
         all.extend(value.map(|x| (["N", "K", "B"][k].to_owned(), unit, x * factor, ends)));
     }
@@ -125,7 +129,7 @@ pub(super) fn compare(paths: [&Path; 2], context: &Context<'_>) -> Result<PlainA
             Tone::Doubtful,
             format!(
                 "changed: {}; {rest} others within their intervals",
-                some(&changed)
+                first_names(&changed)
             ),
         ),
     };

@@ -11,7 +11,7 @@ use nav_sim_calibration::percent;
 use nav_sim_document::{Document, Importance, Tone, readable};
 use nav_sim_signal::imu::{Axis, Sensor};
 use nav_sim_signal::noise::practical::{
-    AxisParameters, Bias, Closure, Curve, Horizon, Pair, Policy, Ratio,
+    AllanCurve, AxisParameters, Bias, Horizon, Pair, PairClosure, Policy, Ratio,
 };
 use nav_sim_signal::noise::{Composite, Kind};
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
@@ -31,11 +31,6 @@ const LONGEST_S: f64 = 10_000.0;
 /// Other filters know white noise (N) and one bias process, a random walk (K) or a Gauss-Markov process. --policy says
 /// which such pair stands for the model's noisiest axis over --horizon.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim export calib_data/consumer_mems.toml --target kalibr -o imu.yaml
-  nav-sim export calib_data/consumer_mems.toml --target px4 --policy envelope --horizon 1s:30s
-  nav-sim export calib_data/tactical.toml --target kf-gins --format json")]
 pub struct ExportArgs {
     /// Noise model (TOML)
     #[arg(value_name = "MODEL")]
@@ -100,7 +95,7 @@ impl Command for ExportArgs {
 
 /// One value of the exported file.
 #[derive(Serialize)]
-struct Entry {
+struct ExportEntry {
     /// Key, as the target writes it.
     pub key: String,
     /// The value, in the target's unit.
@@ -127,7 +122,7 @@ struct SensorExport {
     /// The pair that the target is given.
     exported: Pair,
     /// Ratio of that pair to the model over the horizon.
-    closure: Closure,
+    closure: PairClosure,
     /// Standard deviation of the bias at the start (units): of the turn-on bias where the model states one, else of the
     /// bias that the pair has.
     bias_sd: f64,
@@ -192,7 +187,7 @@ impl Export {
         for sensor in Sensor::ALL {
             let noise: Vec<&Composite> = axes(sensor).iter().map(|(_, noise)| *noise).collect();
             check(target, policy, sensor, &noise)?;
-            curves.push(Curve::largest(&noise, rate_hz, horizon).refuse_within(sensor)?);
+            curves.push(AllanCurve::largest(&noise, rate_hz, horizon).refuse_within(sensor)?);
         }
         let bias = if target.has_one_time && policy != Policy::Strict {
             Bias::MarkovOf(curves[0].shared_correlation_time_s(&curves[1], policy))
@@ -297,7 +292,7 @@ const TOLERANCE: f64 = 1.5;
 const NOTABLE: f64 = 0.1;
 
 /// A quantity of a sensor.
-pub(crate) enum Quantity {
+pub(crate) enum ExportQuantity {
     /// White noise density N: velocity or angle random walk.
     Density,
     /// Random-walk density K: acceleration or rate random walk.
@@ -306,9 +301,9 @@ pub(crate) enum Quantity {
     Bias,
 }
 
-impl Quantity {
+impl ExportQuantity {
     /// Unit of data sheets, and the factor from SI to it.
-    pub(crate) const fn sheet(self, sensor: Sensor) -> (&'static str, f64) {
+    pub(crate) const fn data_sheet_unit(self, sensor: Sensor) -> (&'static str, f64) {
         const ROOT_HOUR: f64 = 60.0;
         match (self, sensor) {
             (Self::Density, Sensor::Accel) => ("m/s/sqrt(h)", ROOT_HOUR),
@@ -321,7 +316,7 @@ impl Quantity {
     }
 
     fn text(self, x: f64, sensor: Sensor) -> String {
-        let (unit, factor) = self.sheet(sensor);
+        let (unit, factor) = self.data_sheet_unit(sensor);
         format!("{} {unit}", readable(x * factor))
     }
 }
@@ -364,7 +359,7 @@ impl Export {
             );
         }
         doubts.extend(self.filled(&[]).0.iter().filter_map(|e| {
-            let (Entry { key, value, .. }, wanted) = (e, e.wanted?);
+            let (ExportEntry { key, value, .. }, wanted) = (e, e.wanted?);
             Some(format!(
                 "{key} is {value:.3e}, the end of its range; the model says {wanted:.3e}"
             ))
@@ -431,25 +426,25 @@ impl SensorExport {
 
     /// `N 0.42 deg/sqrt(h), K 12 deg/h/sqrt(h), B 8.3 deg/h at 160 s`.
     fn parameters(&self) -> String {
-        let figure = |what: Quantity, x: f64| what.text(x, self.sensor);
+        let figure = |what: ExportQuantity, x: f64| what.text(x, self.sensor);
         let pair = self.exported;
         let bias = match pair.markov {
-            None => format!("K {}", figure(Quantity::Walk, pair.walk)),
+            None => format!("K {}", figure(ExportQuantity::Walk, pair.walk)),
             Some(m) => {
-                let sigma = figure(Quantity::Bias, m.sigma);
+                let sigma = figure(ExportQuantity::Bias, m.sigma);
                 format!("bias {sigma} with T = {}", seconds(m.t_corr_s))
             }
         };
         let floor = match self.largest.minimum {
             None => "B not reached".to_owned(),
             Some(m) => {
-                let floor = figure(Quantity::Bias, m.deviation);
+                let floor = figure(ExportQuantity::Bias, m.deviation);
                 format!("B {floor} at {}", seconds(m.tau_s))
             }
         };
         format!(
             "N {}, {bias}, {floor}",
-            figure(Quantity::Density, pair.density)
+            figure(ExportQuantity::Density, pair.density)
         )
     }
 }

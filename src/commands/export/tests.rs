@@ -319,12 +319,12 @@ fn kf_gins_has_one_correlation_time() {
     );
     let export = export("kf-gins", accel.clone(), gyro.clone(), Policy::Matched);
     let curves = [accel, gyro]
-        .map(|p| Curve::largest(&[&Composite::new(p)], RATE, Horizon::default()).unwrap());
+        .map(|p| AllanCurve::largest(&[&Composite::new(p)], RATE, Horizon::default()).unwrap());
     let misfit = |t_corr_s: f64| -> f64 {
         let samples: Vec<u32> = (0..=106)
             .map(|k| (RATE * 2.0_f64.powf(f64::from(k) / 16.0)).round() as u32)
             .collect();
-        let of_sensor = |curve: &Curve, processes: &[Process]| -> f64 {
+        let of_sensor = |curve: &AllanCurve, processes: &[Process]| -> f64 {
             let pair = curve.pair(Policy::Matched, Bias::MarkovOf(t_corr_s));
             let model = Composite::new(processes.to_vec());
             let log =

@@ -1,12 +1,12 @@
 //! A fusion as a document: verdict, figures, track, errors, innovations.
 
-use super::{Cause, FuseAnswer};
+use super::{FuseAnswer, InnovationCause};
 use crate::report::trajectory::track_map;
 use crate::report::verdict::{deciding, drive_line};
 use crate::report::{error_charts, reduction_doubt, reduction_line, tone};
 use glam::DVec3;
 use nav_sim_document::{
-    Axis, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, readable, seconds,
+    Chart, ChartAxis, Colour, Document, Importance, Mark, Panel, Series, Table, readable, seconds,
     window,
 };
 use nav_sim_navigation::earth::ned_difference;
@@ -122,7 +122,7 @@ impl FuseAnswer {
         }
     }
 
-    /// What helps where the solution is overconfident.
+    /// Advice for an overconfident solution.
     pub(crate) fn advice(&self) -> &'static str {
         let outcome = &self.summary.outcome;
         if outcome.reference.is_some() && outcome.nis_per_component < 1.0 {
@@ -384,11 +384,11 @@ fn apart(clocks: &ClocksApart) -> String {
 }
 
 /// A cause and the options that take it away.
-fn cause(cause: &Cause) -> String {
+fn cause(cause: &InnovationCause) -> String {
     let three = |v: DVec3| format!("{:.2},{:.2},{:.2}", v.x, v.y, v.z);
     match cause {
-        Cause::Clocks(clocks) => apart(clocks),
-        Cause::Displaced(found) => {
+        InnovationCause::Clocks(clocks) => apart(clocks),
+        InnovationCause::Displaced(found) => {
             let options: Vec<_> = found
                 .lever_arm_b
                 .map(|[arm, sigma]| format!("--lever-arm={} (± {})", three(arm), three(sigma)))
@@ -464,7 +464,7 @@ fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     }
     Chart::over_time(
         "Horizontal position",
-        vec![Panel::new(Axis::log("horizontal (m)"), series)],
+        vec![Panel::new(ChartAxis::log("horizontal (m)"), series)],
         outages,
     )
 }
@@ -508,7 +508,7 @@ fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
             series.extend((!points.is_empty()).then(|| Series::points(name, colour, points)));
         }
         Panel::new(
-            Axis::linear(&format!("{name} (σ)")).including(-3.0, 3.0),
+            ChartAxis::linear(&format!("{name} (σ)")).including(-3.0, 3.0),
             series,
         )
         .of_height(0.55)

@@ -19,11 +19,11 @@ use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
 use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
 use nav_sim_navigation::fusion::mounting::{self, Mounting};
 use nav_sim_navigation::fusion::{
-    Assessment, ClocksApart, Correlation, Displaced, Finding, FixRecord, Found, FusionError,
-    Heading, Levelling, Outcome, OwnNoise, Recorded, Row, Settings, Solution, Start, Weighed,
-    WheelSpeed, Withheld, aid_innovations, assess, check_clocks, clocks_apart, displaced, earlier,
-    fuse, fuse_correlated, interval_s, outcome, own_noise, predicts_as_well, rest_of_origin,
-    rough_origin, vehicle_velocities, wheel_ratio, withheld,
+    AlignmentSummary, ClocksApart, Correlation, Displaced, Finding, FixRecord, FusionAssessment,
+    FusionError, FusionFigures, Heading, Levelling, OwnNoise, Recorded, Row, Settings, Solution,
+    Start, WeightedSolution, WheelSpeed, Withheld, aid_innovations, assess, check_clocks,
+    clocks_apart, displaced, earlier, fuse, fuse_correlated, interval_s, outcome, own_noise,
+    predicts_as_well, rest_of_origin, rough_origin, vehicle_velocities, wheel_ratio, withheld,
 };
 use nav_sim_navigation::gnss::{FixSigma, GnssFix};
 use nav_sim_navigation::linalg::median;
@@ -64,7 +64,7 @@ impl Command for Fuse {
     }
 
     fn run(&self, context: &Context<'_>) -> Result<FuseAnswer> {
-        Drive::read(self, context)?.fuse(context)
+        RecordedDrive::read(self, context)?.fuse(context)
     }
 }
 
@@ -105,13 +105,6 @@ const ROWS_HZ: f64 = 10.0;
 /// innovations.csv, errors.csv (with a reference), solution.kml, summary.json, report.html, manifest.json; with
 /// --smooth also smoothed.csv, errors_smoothed.csv, smoothed.kml. Exit code 3: the solution is overconfident.
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim trajectory record trajectories/land_vehicle.toml calib_data/tactical.toml -o drive
-  nav-sim fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml \\
-      --reference drive/reference.csv --outage 300:360 --smooth -o out/fused
-  nav-sim fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml \\
-      --initial drive/initial.toml -o out/given")]
 pub struct Fuse {
     /// IMU recording (.csv, .tsv, .txt, .npy, also .gz)
     #[arg(value_name = "IMU")]
@@ -165,7 +158,8 @@ pub struct Fuse {
     /// Time by which receiver or logger stamp the fixes late (s)
     #[arg(long = "gnss-delay", value_name = "S", value_parser = number, default_value = "0", allow_hyphen_values = true)]
     gnss_delay_s: f64,
-    /// How long errors of fixes last: as the innovations show, no longer than a fix, or so many seconds (of positions)
+    /// Correlation time of the fixes' errors: auto (from the innovations), none, or seconds (of
+    /// positions)
     #[arg(long, value_name = "auto|none|SECONDS", value_parser = correlation, default_value = "auto")]
     gnss_correlation: Correlation,
     /// Fixes are left out as outliers whose normalised innovation a right filter exceeds less often than 1 - LEVEL
@@ -423,7 +417,7 @@ pub struct FuseAnswer {
 }
 
 /// A drive that was read.
-struct Drive<'a> {
+struct RecordedDrive<'a> {
     request: &'a Fuse,
     imu: Vec<ImuIncrement>,
     imu_rate_hz: f64,
@@ -435,7 +429,7 @@ struct Drive<'a> {
     reference: Option<Reference>,
 }
 
-impl<'a> Drive<'a> {
+impl<'a> RecordedDrive<'a> {
     /// Reads the files of a request.
     ///
     /// # Errors
@@ -521,7 +515,7 @@ impl<'a> Drive<'a> {
         let stated = &self.model.model;
         let mut noise = own_noise(&self.imu, self.imu_rate_hz, stated);
         let mut own = stated.clone();
-        noise.iter().for_each(|noise| noise.put_into(&mut own));
+        noise.iter().for_each(|noise| noise.apply_to(&mut own));
         let lengths: Vec<f64> = settings
             .outages
             .iter()
@@ -613,11 +607,11 @@ impl<'a> Drive<'a> {
             true => withheld(&recorded, &belief, &start, &settings, &weighed)?,
             false => None,
         };
-        let Assessment { verdict, findings } = assess(&weighed, &outcome, &doubts, withheld);
+        let FusionAssessment { verdict, findings } = assess(&weighed, &outcome, &doubts, withheld);
         let is_correlated = weighed.correlation().is_some();
         let is_unexplained =
             verdict >= VerdictKind::Doubtful || verdict == VerdictKind::Undecided && is_correlated;
-        let scene = Scene {
+        let scene = CauseSearch {
             belief: &belief,
             start: &start,
             settings: &settings,
@@ -679,7 +673,7 @@ impl<'a> Drive<'a> {
 /// Help where the mounting is not found.
 const NOT_MOUNTED: &str = "give --mounting ROLL,PITCH,YAW, or minutes of driving with braking and turns, velocities in the fixes and one clock (--gnss-delay)";
 
-impl Drive<'_> {
+impl RecordedDrive<'_> {
     /// Brings fixes to the clock of the IMU where the two have nothing in common and no delay is given; by how much (s).
     fn common_origin(&mut self) -> Result<Option<f64>> {
         let recorded = Recorded {
@@ -729,21 +723,25 @@ impl Drive<'_> {
     }
 }
 
-/// What a cause is looked for with.
-struct Scene<'a> {
+/// Input of the search for the cause of large innovations.
+struct CauseSearch<'a> {
     belief: &'a Belief,
     start: &'a Start,
     settings: &'a Settings,
-    /// Whether the start was given.
+    /// True if the start was given.
     is_given: bool,
 }
 
-impl Scene<'_> {
+impl CauseSearch<'_> {
     /// Cause of innovations that are large or last: the clocks, else the antenna or a small delay.
-    fn cause(&self, recorded: &Recorded<'_>) -> Option<Cause> {
-        let small =
-            || displaced(recorded, self.belief, self.start, self.settings).map(Cause::Displaced);
-        self.clocks(recorded).map(Cause::Clocks).or_else(small)
+    fn cause(&self, recorded: &Recorded<'_>) -> Option<InnovationCause> {
+        let small = || {
+            displaced(recorded, self.belief, self.start, self.settings)
+                .map(InnovationCause::Displaced)
+        };
+        self.clocks(recorded)
+            .map(InnovationCause::Clocks)
+            .or_else(small)
     }
 
     /// Clocks that are apart, where the innovations are smaller when they are not: the course of what walks or slips has
@@ -793,7 +791,7 @@ impl Scene<'_> {
     }
 }
 
-impl Cause {
+impl InnovationCause {
     /// The same where the fixes were delayed already (s).
     fn after(mut self, given_s: f64) -> Self {
         match &mut self {
@@ -875,7 +873,8 @@ fn belief(
     Ok((belief, quality))
 }
 
-/// What a filter expects beside the model, with what its states say of scale factors.
+/// Uncertainties that the filter expects beside the model, including the scale factors of its
+/// states.
 fn beside(states: FilterStates, initial: &InitialSettings) -> InitialSettings {
     let mut all = initial.clone();
     let ppm = states.scale_sigma() * 1e6;
@@ -965,13 +964,13 @@ pub struct FuseSummary {
     mounting: Option<MountingRow>,
     /// Root mean square of the horizontal standard deviation of the filter (m).
     pub horizontal_sigma_rms_m: f64,
-    /// How many times the stated standard deviations of position and velocity are believed.
+    /// Factors on the stated standard deviations of position and velocity.
     #[serde(skip)]
     pub sigma_factors: [f64; 2],
     /// Correlation of the innovations, and what the filter makes of it; none where fixes are few.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gnss_correlation: Option<Value>,
-    /// What the vehicle knows, where that was asked for.
+    /// Vehicle motion model, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vehicle: Option<Value>,
     /// White noise of the recording that is believed instead of the model's.
@@ -982,7 +981,7 @@ pub struct FuseSummary {
     pub withheld: Option<Withheld>,
     /// Fixes, NIS, errors at the ends of outages and against the reference.
     #[serde(flatten)]
-    pub outcome: Outcome,
+    pub outcome: FusionFigures,
 }
 
 /// Verdict on a solution.
@@ -994,13 +993,13 @@ pub struct FuseVerdict {
     pub evidence: Vec<Finding>,
     /// Cause of large innovations, where one was found.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub cause: Option<Cause>,
+    pub cause: Option<InnovationCause>,
 }
 
 /// Cause of large innovations.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Cause {
+pub enum InnovationCause {
     /// The clocks of IMU and GNSS differ.
     Clocks(ClocksApart),
     /// The antenna is elsewhere, or the fixes are a little late.
@@ -1042,7 +1041,7 @@ impl Initial {
 }
 
 /// Sources of a start that was found.
-fn how(start: &Start, found: &Found) -> Vec<String> {
+fn how(start: &Start, found: &AlignmentSummary) -> Vec<String> {
     let [.., roll, pitch, yaw] = values(&start.state);
     let [tilt_sigma, _, yaw_sigma] = start.sigma.att_sigma_deg;
     let level = match found.level {
@@ -1108,7 +1107,7 @@ const MOUNTING_SIGMA_DEG: f64 = 1.0;
 const SCALE_SIGMA: f64 = 0.03;
 
 impl Fuse {
-    /// What is believed of the vehicle: nothing that was not asked for.
+    /// Aiding of the filter: only what was requested.
     fn aiding(&self) -> AidingSettings {
         let lever_arm_m = self.rear_axle_m;
         AidingSettings {
@@ -1154,7 +1153,7 @@ fn vehicle(solution: &Solution, settings: &AidingSettings) -> Option<Value> {
 }
 
 /// Errors of fixes that last: the correlation of their innovations, standard deviations as stated, and the filter's answer.
-fn fix_correlation(weighed: &Weighed) -> Option<Value> {
+fn fix_correlation(weighed: &WeightedSolution) -> Option<Value> {
     let [white, of_velocity] = weighed.whiteness;
     let (white, [pos_sigma_factor, vel_sigma_factor]) = (white?, weighed.sigma_factors);
     Some(json!({
@@ -1164,7 +1163,7 @@ fn fix_correlation(weighed: &Weighed) -> Option<Value> {
         "is_correlated": weighed.correlation().is_some(),
         "pos_sigma_factor": pos_sigma_factor,
         "vel_sigma_factor": vel_sigma_factor,
-        "nis_as_stated": outcome(weighed.judged(), &[]).nis_per_component,
+        "nis_as_stated": outcome(weighed.with_stated_sigmas(), &[]).nis_per_component,
     }))
 }
 
@@ -1349,7 +1348,7 @@ mod request_tests {
             let found = [DVec3::X, DVec3::Y, DVec3::Z].map(|v| (q * v).round());
             assert_eq!(found, [x, y, DVec3::NEG_Z], "{name}");
         }
-        let asked = crate::app::Asked::<Fuse>::of(["imu.csv", "gnss.csv", "m.toml"]).unwrap();
+        let asked = crate::app::Invocation::<Fuse>::of(["imu.csv", "gnss.csv", "m.toml"]).unwrap();
         let settings = asked.request.settings();
         assert_eq!(settings.q_s_b, DQuat::IDENTITY);
     }

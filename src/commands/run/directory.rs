@@ -5,7 +5,7 @@ use crate::commands::run::RunOrigin;
 use crate::failure::{Failure, Place, Result};
 use crate::io::run_tables::{REPEAT, parse_epochs, parse_runs};
 use crate::io::{input, source};
-use nav_sim_navigation::metrics::{Measured, PerState};
+use nav_sim_navigation::metrics::{ExperimentResult, PerState};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::{OutageRecord, RunRecord};
 use serde::Deserialize;
@@ -15,12 +15,12 @@ use std::path::Path;
 
 /// A run directory.
 pub(crate) struct RunDirectory {
-    /// Where it came from.
+    /// Its provenance.
     pub manifest: Manifest,
     /// Its configuration.
     pub origin: RunOrigin,
-    /// What was found.
-    pub experiment: Measured,
+    /// Its results.
+    pub experiment: ExperimentResult,
     /// Its summary, with the verdict as its own command found it, covariance analysis included.
     pub summary: Value,
     /// 95 % interval of the mean ASEE over each outage by what the calibration leaves open, where it is known.
@@ -46,7 +46,7 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory> {
     let manifest: Manifest = from_json(&path, &json)?;
     let origin: RunOrigin = from_json(&path, &json)?;
     let epochs = part(directory, &manifest, "epochs.csv", parse_epochs)?;
-    let (found, summary): (Found, Value) =
+    let (found, summary): (SummaryFields, Value) =
         part(directory, &manifest, "summary.json", |path, text| {
             Ok((from_json(path, text)?, from_json(path, text)?))
         })?;
@@ -67,7 +67,7 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory> {
     };
     let outages = origin.configuration.outage.iter().flatten();
     Ok(RunDirectory {
-        experiment: Measured {
+        experiment: ExperimentResult {
             epochs,
             runs,
             outages: outages.map(|o| (o.start_s, o.end_s)).collect(),
@@ -83,7 +83,7 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory> {
 
 /// `summary.json`, as far as it must be right.
 #[derive(Deserialize)]
-struct Found {
+struct SummaryFields {
     outages: Vec<FoundOutage>,
 }
 

@@ -7,7 +7,8 @@ use crate::report::{
     ErrorRow, error_charts, integration_line, reduction_doubt, reduction_line, tone,
 };
 use nav_sim_document::{
-    Axis, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone, window,
+    Chart, ChartAxis, Colour, Document, Importance, Mark, Panel, PointInterval, Series, Table,
+    Tone, window,
 };
 use nav_sim_navigation::ekf::FixUpdate;
 use nav_sim_navigation::metrics::{EpochMetrics, OutageSummary, Summary, VerdictKind};
@@ -269,7 +270,7 @@ fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
         .collect();
     let end = |o: &OutageSummary| {
         let h = &o.horizontal_error_end_m;
-        Interval {
+        PointInterval {
             x: o.end_s,
             y: h.p50,
             low: f64::NAN,
@@ -288,7 +289,7 @@ fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
     ];
     Chart::over_time(
         "Horizontal position error",
-        vec![Panel::new(Axis::log("horizontal error (m)"), series).of_height(1.2)],
+        vec![Panel::new(ChartAxis::log("horizontal error (m)"), series).of_height(1.2)],
         &windows(summary),
     )
 }
@@ -308,13 +309,13 @@ fn states(epochs: &[EpochMetrics], outages: &[(f64, f64)]) -> Vec<Chart> {
                 over_time(epochs, |e| e.asee.0[i].value),
             ),
         ];
-        Chart::over_time(state, vec![Panel::new(Axis::log(""), series)], outages).small()
+        Chart::over_time(state, vec![Panel::new(ChartAxis::log(""), series)], outages).small()
     };
     REPORTED_NAMES.iter().enumerate().map(chart).collect()
 }
 
 fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
-    let panel = |axis: Axis, band: [f64; 2], value: fn(&EpochMetrics) -> f64| {
+    let panel = |axis: ChartAxis, band: [f64; 2], value: fn(&EpochMetrics) -> f64| {
         let mut series = vec![Series::line("", Colour::Ink, over_time(epochs, value))];
         // of expected values there is no scatter, and no band for it
         if summary.runs > 0 {
@@ -333,12 +334,12 @@ fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
     let title = format!("coverage at level {}", coverage.level);
     let panels = vec![
         panel(
-            Axis::log(&format!("NEES ({} if right)", nees.dof)),
+            ChartAxis::log(&format!("NEES ({} if right)", nees.dof)),
             [nees.lower95, nees.upper95],
             |e| e.nees.value,
         ),
         panel(
-            Axis::linear(&title).including(0.8, 1.0),
+            ChartAxis::linear(&title).including(0.8, 1.0),
             [coverage.lower95, coverage.upper95],
             |e| e.coverage,
         ),

@@ -44,13 +44,6 @@ mod document;
 /// Writes a run directory: epochs.csv (ASEE, RMSE, bias, NEES, coverage at 1 Hz), runs.csv, summary.json, report.html, manifest.json. The same seed gives every model the same
 /// noise, so that runs can be compared pair by pair (see `nav-sim compare`).
 #[derive(clap::Args, Debug, Clone)]
-#[command(before_help = "\
-Examples:
-  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml --seed 1 --runs 20
-  nav-sim run trajectories/figure_eight.toml calib_data/tactical.toml \\
-      --outage 60:90 --filter full --runs 8 -o out/full
-  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
-      --truth calib_data/tactical.toml --runs 8 -o out/mismatch")]
 pub struct Run {
     /// Trajectory: motion profile (.toml) or table (.csv)
     pub trajectory: PathBuf,
@@ -77,7 +70,7 @@ pub struct Run {
     /// States of the filter, and what it expects beside the model.
     #[command(flatten)]
     filter: FilterArgs,
-    /// How statistics are computed: monte-carlo (sampled runs), lincov (linear covariance analysis, no sampling) or
+    /// Source of the statistics: monte-carlo (sampled runs), lincov (linear covariance analysis) or
     /// both (runs, compared with their expected values)
     #[arg(long, value_name = "METHOD", value_parser = parse::one_of::<Method>(&Method::NAMES))]
     method: Option<Method>,
@@ -115,7 +108,7 @@ pub struct RunAnswer {
 pub struct RunOrigin {
     /// The resolved configuration: every key, outages one by one.
     pub configuration: Scenario,
-    /// Whether the truth of each run was drawn from the spread of its model.
+    /// True if the truth of each run was drawn from the spread of its model.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub spread: bool,
     /// Estimator of the model in the filter, if it was calibrated ("awv", "sr-awv", "dr-awv", …).
@@ -152,11 +145,11 @@ pub(crate) struct PreparedRun<'a> {
     seed: u64,
     /// Without its outages.
     track: SharedTrack,
-    filter: OnceLock<Filter>,
+    filter: OnceLock<FilterTracks>,
 }
 
 /// A filter along its track, and the same with one step from mark to mark.
-struct Filter {
+struct FilterTracks {
     track: Track,
     merged: Track,
     belief: Belief,
@@ -401,7 +394,13 @@ pub(crate) fn columns(
     );
     let plan = Plan::new(&experiment)?;
     let progress = |done| context.advance(done * runs.len() as u64);
-    let results = monte_carlo::run_range(&plan, first, count, &|| context.go_on(), &progress);
+    let results = monte_carlo::run_range(
+        &plan,
+        first,
+        count,
+        &|| context.should_continue(),
+        &progress,
+    );
     Ok(results.map(|results| results.into_iter().map(Some).collect()))
 }
 
@@ -410,7 +409,7 @@ impl PreparedRun<'_> {
         self.origin.configuration.outage.clone().unwrap_or_default()
     }
 
-    /// Whether two runs differ in the filter alone.
+    /// Returns true if two runs differ in the filter alone.
     pub(crate) fn shares_noise_with(&self, other: &Self) -> bool {
         let noise = |run: &Self| {
             let mut scenario = run.origin.configuration.clone();
@@ -421,7 +420,7 @@ impl PreparedRun<'_> {
     }
 
     /// The filter along its track, made once.
-    fn filter(&self) -> Result<&Filter> {
+    fn filter(&self) -> Result<&FilterTracks> {
         if self.filter.get().is_none() {
             // Another thread makes the same.
             drop(self.filter.set(self.make_filter()?));
@@ -429,7 +428,7 @@ impl PreparedRun<'_> {
         Ok(self.filter.get().expect("it has just been made"))
     }
 
-    fn make_filter(&self) -> Result<Filter> {
+    fn make_filter(&self) -> Result<FilterTracks> {
         let (scenario, outages) = (&self.origin.configuration, self.outages());
         let (model, request) = (&self.inputs.model, self.request);
         let file = &request.settings.file;
@@ -448,7 +447,7 @@ impl PreparedRun<'_> {
                 "raise it, or take the full filter (--filter full), which reduces nothing",
             )
         })?;
-        Ok(Filter {
+        Ok(FilterTracks {
             track,
             merged: merged.with_outages(&outages),
             belief,
@@ -562,7 +561,7 @@ pub struct NavigateInputs {
     pub trajectory: Trajectory,
     /// The noise model that the filter believes, at the rate of the IMU.
     pub model: Model,
-    /// What makes the errors of the true IMU.
+    /// Source of the true IMU's errors.
     pub truth: TrueImu,
     /// Bootstrap draws of the calibration of the model, at the rate of the IMU.
     pub model_draws: Option<Draws>,
@@ -610,7 +609,7 @@ pub fn navigate(
     context: &Context<'_>,
 ) -> Result<Navigation> {
     let track = scenario.track(&inputs.trajectory, &inputs.model, outages)?;
-    let filter = Filter {
+    let filter = FilterTracks {
         belief: scenario.belief(&inputs.model, outages, &track).refuse()?,
         merged: track.merged(),
         track,
@@ -623,11 +622,11 @@ fn with_runs(
     inputs: &NavigateInputs,
     scenario: &Scenario,
     outages: &[Outage],
-    Filter {
+    FilterTracks {
         track,
         merged,
         belief,
-    }: &Filter,
+    }: &FilterTracks,
     seed: u64,
     runs: Option<RunResult>,
     context: &Context<'_>,
@@ -745,7 +744,7 @@ fn doubt(inputs: &NavigateInputs, scenario: &Scenario, context: &Context<'_>) {
 /// Means over a second that differ so much are motion, not noise: m/s², rad/s.
 const MOTION: (f64, f64) = (0.5, 0.05);
 
-/// Where a recording is not static.
+/// Describes motion in a recording that should be static.
 fn motion(recording: &Recording) -> Option<String> {
     let second = (recording.rate_hz.round() as usize).max(1);
     recording.signals.iter().find_map(|signal| {
@@ -795,7 +794,7 @@ fn sampled(
     Ok(result)
 }
 
-/// What a covariance analysis is made of.
+/// Input of a covariance analysis.
 struct Analysis<'a> {
     experiment: &'a Experiment<'a>,
     track: &'a Track,
@@ -810,7 +809,7 @@ impl Analysis<'_> {
         Expected::along(self.track, self.experiment, self.belief, self.model?)
     }
 
-    /// What the calibrations leave open in the figures at the ends of outages.
+    /// Adds the uncertainty due to the calibrations to the figures at the ends of outages.
     fn add_intervals(
         &self,
         outages: &mut [OutageSummary],
@@ -829,7 +828,7 @@ impl Analysis<'_> {
         }
     }
 
-    /// What the errors at the ends of outages are made of.
+    /// Adds the error budget at the ends of outages.
     fn add_budgets(&self, filter: &FilterPass<'_>, outages: &mut [OutageSummary]) {
         let Some(model) = self.model else { return };
         let sources = TruthSide::sources(self.experiment, model);

@@ -22,7 +22,7 @@
 use super::Failure;
 use super::file_kind::{self, FileKind};
 use super::suggest::nearest;
-use super::toml_file::Source;
+use super::toml_file::TomlSource;
 use crate::io::toml_file::OneOrEach;
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Process;
@@ -68,22 +68,22 @@ pub fn names() -> [&'static str; 6] {
 /// When the file cannot be read or is refused.
 pub fn find(name_or_path: &str, rate_hz: f64) -> Result<Contamination, Failure> {
     match PRESETS.iter().find(|(name, _)| *name == name_or_path) {
-        Some((name, text)) => parse(&Source::new(name, text), rate_hz),
+        Some((name, text)) => parse(&TomlSource::new(name, text), rate_hz),
         None => {
             let path = Path::new(name_or_path);
-            let refused = |e| file_kind::unless(&[FileKind::Contamination], path, e);
-            parse(&Source::read(path)?, rate_hz).map_err(refused)
+            let refused = |e| file_kind::or_wrong_kind(&[FileKind::Contamination], path, e);
+            parse(&TomlSource::read(path)?, rate_hz).map_err(refused)
         }
     }
 }
 
 /// The name of a preset that was meant by what is neither a preset nor a file.
-pub(crate) fn meant(name: &str) -> Option<&'static str> {
+pub(crate) fn nearest_preset(name: &str) -> Option<&'static str> {
     nearest(name, names())
 }
 
-fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, Failure> {
-    let Description { accel, gyro, .. } = source.get()?;
+fn parse(source: &TomlSource, rate_hz: f64) -> Result<Contamination, Failure> {
+    let ContaminationTable { accel, gyro, .. } = source.get()?;
     // the same by the names of keys
     let named = source.table()?;
     let mut rules = Vec::new();
@@ -138,7 +138,7 @@ fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, Failure> {
 
 /// The share of the i-th replicate in a rule.
 fn operation(
-    source: &Source,
+    source: &TomlSource,
     key: &str,
     described: &Described,
     i: usize,
@@ -236,7 +236,7 @@ mod tests {
     }
 
     fn refusal(text: &str) -> String {
-        let e = parse(&Source::new("c.toml", text), 100.0).unwrap_err();
+        let e = parse(&TomlSource::new("c.toml", text), 100.0).unwrap_err();
         format!("{e} | {}", e.advice().unwrap_or_default())
     }
 
@@ -338,7 +338,7 @@ mod tests {
     #[test]
     fn a_file_says_the_same_in_other_units() {
         let text = "[[gyro]]\noperation = \"step\"\nat_s = 2\namplitude = 1\n[[gyro]]\noperation = \"replace\"\nshare = 0.25\nsigma = 1\nmean = 3.0\n";
-        let rules = parse(&Source::new("c.toml", text), 50.0).unwrap().rules;
+        let rules = parse(&TomlSource::new("c.toml", text), 50.0).unwrap().rules;
         assert_eq!(
             rules[0].operation,
             Operation::Step {
@@ -434,13 +434,13 @@ mod tests {
         ] {
             assert!(
                 parse(
-                    &Source::new("c.toml", &format!("[[gyro]]\n{text}\n")),
+                    &TomlSource::new("c.toml", &format!("[[gyro]]\n{text}\n")),
                     100.0
                 )
                 .is_ok()
             );
         }
-        assert_eq!(meant("section5-2"), Some("section5-I"));
+        assert_eq!(nearest_preset("section5-2"), Some("section5-I"));
     }
 }
 
@@ -450,20 +450,20 @@ mod tests {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Contamination")]
-struct Description {
+struct ContaminationTable {
     /// Version of the layout
     #[serde(rename = "schema")]
     #[schemars(range(min = 1, max = 1))]
     _schema: Option<u64>,
-    /// Of all axes of the accelerometers
+    /// Rules for all axes of the accelerometers
     #[serde(default)]
     accel: Vec<RuleTable>,
-    /// Of all axes of the gyroscopes
+    /// Rules for all axes of the gyroscopes
     #[serde(default)]
     gyro: Vec<RuleTable>,
 }
 
-/// What is done to the signals of a sensor
+/// Contamination of the signals of a sensor
 #[derive(Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 struct RuleTable {
@@ -482,9 +482,9 @@ enum Described {
     Step {
         /// Height of the step (units of the signal)
         amplitude: OneOrEach<f64>,
-        /// Where in the record, as a share of it (default: 0.5)
+        /// Position in the record, as a share of it (default: 0.5)
         at_share: Option<OneOrEach<Share>>,
-        /// Where in the record (s)
+        /// Position in the record (s)
         at_s: Option<OneOrEach<NonNegative>>,
     },
     /// A drift over the whole record
@@ -538,7 +538,7 @@ enum Described {
         process: String,
         /// Its parameter, such as gamma2
         parameter: String,
-        /// What it is multiplied by
+        /// Factor on the signal
         factor: OneOrEach<NonNegative>,
     },
 }
@@ -549,5 +549,5 @@ type AtLeastOne = Between<1, { i64::MAX }, false>;
 
 /// The JSON schema of such a file.
 pub(crate) fn schema() -> serde_json::Value {
-    schemars::schema_for!(Description).to_value()
+    schemars::schema_for!(ContaminationTable).to_value()
 }

@@ -20,7 +20,7 @@
 
 use super::file_kind;
 use super::model_file::{ModelFile, NOT_STATED, PROGRAM, SCHEMA, TurnOn, known};
-use super::toml_file::Source;
+use super::toml_file::TomlSource;
 use super::{Failure, Place, source};
 use crate::parse;
 use crate::report::readable;
@@ -39,20 +39,20 @@ const ASSUMED_CORRELATION_TIME_S: f64 = 300.0;
 
 /// One figure of one sensor, and where it was read.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
+pub struct DatasheetEntry {
     /// Whose.
     pub sensor: Sensor,
     /// Which.
     pub figure: Figure,
-    /// How much.
-    pub quantity: Quantity,
+    /// Its value.
+    pub quantity: StatedQuantity,
     /// Document and place.
     pub source: Option<String>,
     /// The line that was read.
     pub quote: Option<String>,
 }
 
-/// What is known of an IMU from its datasheet.
+/// Figures of an IMU from its data sheet.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Datasheet {
     /// Manufacturer and name, if known.
@@ -60,17 +60,17 @@ pub struct Datasheet {
     /// Consumer, industrial, tactical or navigation.
     pub class: Option<String>,
     /// At most one entry for each figure of each sensor.
-    pub entries: Vec<Entry>,
-    /// What was assumed beside the figures.
+    pub entries: Vec<DatasheetEntry>,
+    /// Assumptions beside the figures.
     pub assumptions: Vec<String>,
 }
 
 /// A model made of a datasheet, and what to say of it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Made {
+pub struct DatasheetModel {
     /// The model.
     pub file: ModelFile,
-    /// What had to be assumed, or does not fit together.
+    /// Assumptions and contradictions to report.
     pub doubts: Vec<String>,
 }
 
@@ -84,7 +84,10 @@ impl Datasheet {
     }
 
     /// The figures of a sensor that decide an outage and are not stated: the model has no such error, or that of the grade.
-    pub(crate) fn lacking(&self, sensor: Sensor) -> impl Iterator<Item = (Figure, Option<&Entry>)> {
+    pub(crate) fn lacking(
+        &self,
+        sensor: Sensor,
+    ) -> impl Iterator<Item = (Figure, Option<&DatasheetEntry>)> {
         // A tolerance of the zero offset stands for no turn-on bias: once removed, it says nothing of the next switching-on.
         let figures = [Figure::Noise, Figure::Bias, Figure::TurnOn].into_iter();
         let of = move |figure| {
@@ -98,7 +101,9 @@ impl Datasheet {
         let has_floor =
             move |figure| figure == Figure::Bias && self.value(sensor, Figure::Walk).is_some();
         let found = figures.map(of);
-        found.filter(move |(f, entry)| !has_floor(*f) && entry.is_none_or(Entry::is_of_grade))
+        found.filter(move |(f, entry)| {
+            !has_floor(*f) && entry.is_none_or(DatasheetEntry::is_of_grade)
+        })
     }
 
     /// The same of both sensors, in words.
@@ -116,7 +121,7 @@ impl Datasheet {
     }
 
     /// Puts a figure in the place of what was known of it.
-    pub(crate) fn set(&mut self, entry: Entry) {
+    pub(crate) fn set(&mut self, entry: DatasheetEntry) {
         self.entries
             .retain(|e| (e.sensor, e.figure) != (entry.sensor, entry.figure));
         self.entries.push(entry);
@@ -126,7 +131,7 @@ impl Datasheet {
     ///
     /// # Errors
     /// When a figure is beyond what a process can have.
-    pub fn model_file(&self, rate_hz: f64) -> Result<Made, ParameterError> {
+    pub fn model_file(&self, rate_hz: f64) -> Result<DatasheetModel, ParameterError> {
         let mut doubts = Vec::new();
         let mut noise = |sensor| self.noise(sensor, rate_hz, &mut doubts);
         let (accel, gyro) = (noise(Sensor::Accel)?, noise(Sensor::Gyro)?);
@@ -140,7 +145,7 @@ impl Datasheet {
         };
         file.turn_on = (turn_on != TurnOn::default()).then_some(turn_on);
         file.provenance = Some(self.provenance(&doubts));
-        Ok(Made { file, doubts })
+        Ok(DatasheetModel { file, doubts })
     }
 
     fn noise(
@@ -175,7 +180,11 @@ impl Datasheet {
     }
 
     fn provenance(&self, doubts: &[String]) -> Table {
-        let figures: Vec<Table> = self.entries.iter().map(Entry::provenance).collect();
+        let figures: Vec<Table> = self
+            .entries
+            .iter()
+            .map(DatasheetEntry::provenance)
+            .collect();
         let not_stated = self.not_stated();
         known(json!({
             "estimator": "datasheet",
@@ -190,7 +199,7 @@ impl Datasheet {
     }
 }
 
-impl Entry {
+impl DatasheetEntry {
     /// True of a figure that no document states.
     pub(crate) fn is_of_grade(&self) -> bool {
         self.source.as_deref() == Some(GRADE)
@@ -206,7 +215,8 @@ impl Entry {
     }
 }
 
-/// How far the lowest point of the whole Allan deviation may be above the bias instability, as a ratio.
+/// Largest ratio of the minimum of the whole Allan deviation to the bias instability that needs no
+/// remark.
 const NOTABLE: f64 = 1.2;
 
 fn doubt_floor(sensor: Sensor, flicker: Flicker, density: f64, is_time_given: bool) -> Vec<String> {
@@ -337,14 +347,14 @@ const MOST: f64 = 1e12;
 
 /// A figure as given, and what it is in SI (ppm for scale factors).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Quantity {
-    /// As given: "0.34 deg/sqrt(h)".
+pub struct StatedQuantity {
+    /// Text of the figure: "0.34 deg/sqrt(h)".
     pub given: String,
     /// In SI.
     pub value: f64,
 }
 
-impl Quantity {
+impl StatedQuantity {
     /// A number and one of the units; °, µ, √, ², dps and hr are read too.
     ///
     /// # Errors
@@ -422,7 +432,7 @@ mod unit_tests {
     use super::*;
 
     fn parse(sensor: Sensor, figure: Figure, text: &str) -> Result<f64, String> {
-        Quantity::parse(text, figure.units(sensor))
+        StatedQuantity::parse(text, figure.units(sensor))
             .map(|q| q.value)
             .map_err(|e| e.to_string())
     }
@@ -584,7 +594,7 @@ const GRADES: [(&str, &str, &str); 4] = [
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct File {
-    unit: Unit,
+    unit: FigureUnit,
     #[serde(default)]
     accel: BTreeMap<String, Given>,
     #[serde(default)]
@@ -593,7 +603,7 @@ struct File {
 
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Unit {
+struct FigureUnit {
     manufacturer: String,
     name: String,
     class: String,
@@ -614,7 +624,7 @@ struct Given {
 /// # Errors
 /// File, line, key and value of what is refused.
 pub fn read(path: &Path) -> Result<Datasheet, Failure> {
-    parse(&Source::read(path)?)
+    parse(&TomlSource::read(path)?)
 }
 
 /// The entry of that name, if the catalogue has it; capitals do not matter.
@@ -623,10 +633,10 @@ pub fn catalogued(name: &str) -> Option<Result<Datasheet, Failure>> {
     let (name, text) = CATALOGUE
         .iter()
         .find(|(known, _)| known.eq_ignore_ascii_case(name))?;
-    Some(parse(&Source::new(name, text)))
+    Some(parse(&TomlSource::new(name, text)))
 }
 
-pub(super) fn parse(source: &Source) -> Result<Datasheet, Failure> {
+pub(super) fn parse(source: &TomlSource) -> Result<Datasheet, Failure> {
     let file: File = source.get()?;
     let mut entries = Vec::new();
     for (sensor, table) in [(Sensor::Accel, file.accel), (Sensor::Gyro, file.gyro)] {
@@ -643,12 +653,13 @@ pub(super) fn parse(source: &Source) -> Result<Datasheet, Failure> {
         let figure = Figure::TurnOn;
         if !entries
             .iter()
-            .any(|e: &Entry| (e.sensor, e.figure) == (sensor, figure))
+            .any(|e: &DatasheetEntry| (e.sensor, e.figure) == (sensor, figure))
         {
-            entries.push(Entry {
+            entries.push(DatasheetEntry {
                 sensor,
                 figure,
-                quantity: Quantity::parse(given, figure.units(sensor)).expect("a turn-on bias"),
+                quantity: StatedQuantity::parse(given, figure.units(sensor))
+                    .expect("a turn-on bias"),
                 source: Some(GRADE.to_owned()),
                 quote: None,
             });
@@ -662,14 +673,19 @@ pub(super) fn parse(source: &Source) -> Result<Datasheet, Failure> {
     })
 }
 
-fn entry(source: &Source, sensor: Sensor, key: &str, given: Given) -> Result<Entry, Failure> {
+fn entry(
+    source: &TomlSource,
+    sensor: Sensor,
+    key: &str,
+    given: Given,
+) -> Result<DatasheetEntry, Failure> {
     let path = format!("{}.{key}", sensor.name());
     let Ok(figure) = key.parse::<Figure>() else {
         return Err(source.unknown(&path, Figure::NAMES.into_iter()));
     };
-    let quantity = Quantity::parse(&given.value, figure.units(sensor))
+    let quantity = StatedQuantity::parse(&given.value, figure.units(sensor))
         .map_err(|e| source.refused(&format!("{path}.value"), e.to_string()))?;
-    Ok(Entry {
+    Ok(DatasheetEntry {
         sensor,
         figure,
         quantity,
@@ -763,7 +779,7 @@ pub fn measured(path: &Path, rate_hz: Option<f64>) -> Result<(Datasheet, Option<
         if value.parse() == Ok(0.0) {
             continue;
         }
-        let mut quantity = Quantity::parse(&format!("{value} {unit}"), figure.units(sensor))
+        let mut quantity = StatedQuantity::parse(&format!("{value} {unit}"), figure.units(sensor))
             .map_err(|e| refused(&e))?;
         if is_of_sample {
             let Some(rate_hz) = rate_hz else {
@@ -784,7 +800,7 @@ pub fn measured(path: &Path, rate_hz: Option<f64>) -> Result<(Datasheet, Option<
             .map(str::to_owned)
             .into();
         }
-        sheet.set(Entry {
+        sheet.set(DatasheetEntry {
             sensor,
             figure,
             quantity,
@@ -797,7 +813,7 @@ pub fn measured(path: &Path, rate_hz: Option<f64>) -> Result<(Datasheet, Option<
             "no figure of Kalibr (gyroscope_noise_density, …) or imu_utils (gyr_n, … of avg-axis)";
         let refused = Failure::contents(&name, Place::Within, message)
             .hint("give the figures with their units: --arw, --gyro-bias, --gyro-rrw, --vrw, --accel-bias, --accel-rrw");
-        return Err(file_kind::unless(&[], path, refused));
+        return Err(file_kind::or_wrong_kind(&[], path, refused));
     }
     Ok((sheet, rate_hz))
 }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::io::model_file;
-use crate::io::toml_file::Source;
-use nav_sim_signal::noise::practical::Minimum;
+use crate::io::toml_file::TomlSource;
+use nav_sim_signal::noise::practical::AllanMinimum;
 use std::path::Path;
 
 const CLASSES: [&str; 4] = ["consumer", "industrial", "tactical", "navigation"];
@@ -9,8 +9,8 @@ const CLASSES: [&str; 4] = ["consumer", "industrial", "tactical", "navigation"];
 fn sheet(entries: &[(Sensor, Figure, &str)]) -> Datasheet {
     let mut sheet = Datasheet::default();
     for (sensor, figure, text) in entries {
-        let quantity = Quantity::parse(text, figure.units(*sensor)).unwrap();
-        sheet.set(Entry {
+        let quantity = StatedQuantity::parse(text, figure.units(*sensor)).unwrap();
+        sheet.set(DatasheetEntry {
             sensor: *sensor,
             figure: *figure,
             quantity,
@@ -177,7 +177,7 @@ fn the_catalogue_is_sound() {
             // one rule for all: what is removed before use is no turn-on bias, and the entry says so
             if sheet.value(sensor, Figure::Offset).is_some() {
                 let mut turn_on = sheet.entries.iter().filter(|e| e.figure == Figure::TurnOn);
-                assert!(turn_on.all(Entry::is_of_grade), "{name}");
+                assert!(turn_on.all(DatasheetEntry::is_of_grade), "{name}");
                 assert!(
                     sheet
                         .assumptions
@@ -201,7 +201,7 @@ fn the_catalogue_is_sound() {
 fn entries_are_refused_with_line_key_and_value() {
     let refused = |text: &str| {
         let head = "[unit]\nmanufacturer = \"A\"\nname = \"B\"\nclass = \"consumer\"\n";
-        parse(&Source::new("u.toml", &format!("{head}{text}")))
+        parse(&TomlSource::new("u.toml", &format!("{head}{text}")))
             .unwrap_err()
             .to_string()
     };
@@ -277,7 +277,7 @@ fn figures_of_imu_utils_are_those_of_a_sample_and_the_lowest() {
         2e-3 * 2e-3
     );
     for (axis, floor, density) in [(0, 4e-4, 1e-3), (3, 3e-5, 1e-4)] {
-        let minimum = Minimum::of(&[&model.axes[axis]], 400.0, 1e4).unwrap();
+        let minimum = AllanMinimum::of(&[&model.axes[axis]], 400.0, 1e4).unwrap();
         let most = 1.08 * (density / floor / 567.8_f64.sqrt()).hypot(1.0);
         let lowest = minimum.deviation / floor;
         assert!((0.999..most).contains(&lowest), "{lowest}");
@@ -334,7 +334,7 @@ fn a_turn_on_bias_is_by_grade_where_a_sheet_has_none() {
     let sheet_of = |class: &str, more: &str| {
         let text =
             format!("[unit]\nmanufacturer = \"A\"\nname = \"B\"\nclass = \"{class}\"\n{more}");
-        parse(&Source::new("u.toml", &text)).unwrap()
+        parse(&TomlSource::new("u.toml", &text)).unwrap()
     };
     let stated = "[accel]\nturn_on = { value = \"2 mg\", source = \"s\" }\n";
     let sheet = sheet_of("tactical", stated);

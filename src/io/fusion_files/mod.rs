@@ -1,17 +1,19 @@
-//! What `fuse` reads: recorded IMU data, GNSS fixes, an initial state. Our own tables, the headers that
-//! recordings may have, the text files of KF-GINS, the solutions of RTKLIB, the sentences of NMEA 0183.
+//! Input files of `fuse`: recorded IMU data, GNSS fixes, an initial state. Own tables, known
+//! headers of recordings, text files of KF-GINS, solutions of RTKLIB, sentences of NMEA 0183.
 
 use super::file_kind::{self, FileKind};
 use super::logs::LogOptions;
 use super::recordings::timing::{UNITS, median_step, unit_of_step};
 use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
-use super::table::{Bare, Column, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table};
-use super::toml_file::Source;
+use super::table::{
+    Column, DefaultUnit, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table,
+};
+use super::toml_file::TomlSource;
 use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
 use chrono::{DateTime, NaiveDateTime};
 use glam::{DMat3, DVec3};
 use nav_sim_document::{Importance, Note};
-use nav_sim_logs::{Clock, Content, Fix, Stamp, in_seconds};
+use nav_sim_logs::{Clock, Content, LogFix, Stamp, in_seconds};
 use nav_sim_navigation::earth::{MAX_LATITUDE_DEG, ecef_to_geodetic, geodetic_to_ecef};
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, q_e_n};
@@ -34,12 +36,12 @@ fn note(importance: Importance, text: impl Into<String>) -> Note {
     Note { importance, text }
 }
 
-/// How a file was read.
+/// Note on the reading of a file.
 fn remark(text: impl Into<String>) -> Note {
     note(Importance::Remark, text)
 }
 
-/// What is doubtful about a file.
+/// Warning about a file.
 fn doubt(text: impl Into<String>) -> Note {
     note(Importance::Warning, text)
 }
@@ -250,8 +252,9 @@ fn of_rows(
     Ok(((0..table.rows()).map(fix).collect(), remarks))
 }
 
-/// What a fix states in axes fixed to the Earth, as latitude, longitude, height and in the axes north, east, down.
-/// `covariances` are the signed roots of those between x and y, y and z, z and x, 0 where they are not stated.
+/// Converts an ECEF fix to latitude, longitude, height, and to the axes north, east, down.
+/// `covariances` are the signed roots of those between x and y, y and z, z and x; 0 where not
+/// stated.
 fn in_geodetic(
     [place, sigma, velocity, velocity_sigma]: [Option<DVec3>; 4],
     covariances: [Option<DVec3>; 2],
@@ -355,7 +358,7 @@ pub(crate) fn read_gnss(
 ) -> Result<(Vec<GnssFix>, Vec<Note>), Error> {
     use FileKind as K;
     read_fixes(path, unsaid, clock_s, topic)
-        .map_err(|e| file_kind::unless(&[K::Gnss, K::Trajectory, K::Log], path, e))
+        .map_err(|e| file_kind::or_wrong_kind(&[K::Gnss, K::Trajectory, K::Log], path, e))
 }
 
 fn read_fixes(
@@ -462,7 +465,7 @@ fn of_log(path: &Path, topic: Option<&str>, imu_s: Option<(f64, f64)>) -> Result
     let (origin_s, name) = clock.map_or((0.0, String::new()), |c| {
         (c.origin_s, format!(", in {}", c.name))
     });
-    let fix = |(line, fix): (u64, Fix)| {
+    let fix = |(line, fix): (u64, LogFix)| {
         let place = DVec3::new(fix.lat_deg * DEG, fix.lon_deg * DEG, fix.h_m);
         let [sigma, v, v_sigma] =
             [fix.sd_ned_m, fix.v_ned_m_s, fix.sd_v_ned_m_s].map(|own| own.map(DVec3::from));
@@ -891,7 +894,7 @@ pub(crate) struct ImuFile {
     pub samples: Vec<ImuIncrement>,
     /// Samples a second, by the median step.
     pub rate_hz: f64,
-    /// What is doubtful, and how the file was read.
+    /// Warnings, and notes on the reading.
     pub remarks: Vec<Note>,
 }
 
@@ -1086,10 +1089,10 @@ fn doubt_units(
 /// Largest velocity (m/s): beyond that of the Earth's surface and of orbits.
 const MAX_SPEED_M_S: f64 = 1e4;
 
-/// Where and how a drive begins: nav-sim fuse --initial
+/// Initial state of a drive: nav-sim fuse --initial
 #[derive(Deserialize, JsonSchema)]
 #[schemars(title = "Initial state", deny_unknown_fields)]
-struct Description {
+struct InitialTable {
     /// Time (s)
     t_s: f64,
     /// Latitude of the IMU (degrees)
@@ -1125,7 +1128,7 @@ struct Description {
 /// The JSON schema of such a file.
 #[must_use]
 pub(crate) fn initial_schema() -> serde_json::Value {
-    schemars::schema_for!(Description).to_value()
+    schemars::schema_for!(InitialTable).to_value()
 }
 
 /// Reads an initial state: time, position of the IMU, velocity (0 where it is not said), attitude of the
@@ -1134,12 +1137,12 @@ pub(crate) fn initial_schema() -> serde_json::Value {
 /// # Errors
 /// File, line, key and value of what is refused.
 pub(crate) fn read_initial(path: &Path) -> Result<Start, Failure> {
-    let refused = |e| file_kind::unless(&[FileKind::Initial], path, e);
-    parse(&Source::read(path)?).map_err(refused)
+    let refused = |e| file_kind::or_wrong_kind(&[FileKind::Initial], path, e);
+    parse(&TomlSource::read(path)?).map_err(refused)
 }
 
-fn parse(source: &Source) -> Result<Start, Failure> {
-    let d: Description = source.get()?;
+fn parse(source: &TomlSource) -> Result<Start, Failure> {
+    let d: InitialTable = source.get()?;
     let (roll, pitch, yaw) = (d.roll_deg.0 * DEG, d.pitch_deg.0 * DEG, d.yaw_deg.0 * DEG);
     let state = NavState {
         lat: d.lat_deg * DEG,
@@ -1168,11 +1171,11 @@ mod initial_tests {
     fn refusals_name_line_key_and_value() {
         let sound = "t_s = 0\nlat_deg = 46\nlon_deg = 6\nh_m = 400\nroll_deg = 0\npitch_deg = 0\nyaw_deg = 40\n";
         let refused = |text: &str| {
-            let e = parse(&Source::new("i.toml", text)).unwrap_err();
+            let e = parse(&TomlSource::new("i.toml", text)).unwrap_err();
             format!("{e} | {}", e.advice().unwrap_or_default())
         };
         assert_eq!(
-            parse(&Source::new("i.toml", sound)).unwrap().sigma,
+            parse(&TomlSource::new("i.toml", sound)).unwrap().sigma,
             InitialSettings::default()
         );
         for (old, new, expected) in [
@@ -1224,12 +1227,12 @@ static SPEED_QUANTITIES: [Quantity; 5] = [
     Quantity::time(OF_CLOCK),
     Quantity::time(STAMP),
     Quantity::time(OF_RECEIVER),
-    Quantity::new("t_s", "timeus", NONE, Bare::Is(1e-6)),
+    Quantity::new("t_s", "timeus", NONE, DefaultUnit::Is(1e-6)),
     Quantity::new(
         "speed",
         "speed velocity vel v wheel wheel_speed odometer odo forward forward_speed",
         SPEED,
-        Bare::Unknown,
+        DefaultUnit::Unknown,
     ),
 ];
 
@@ -1245,7 +1248,7 @@ const SPEEDS: Dictionary<'_> = Dictionary::new(
 pub(crate) fn read_wheel(path: &Path) -> Result<Vec<WheelSpeed>, Error> {
     let table = table::read(path, &SPEEDS)?;
     let columns = table.columns(["t_s", "speed"]);
-    let [time, speed] = columns.map_err(|e| file_kind::unless(&[], path, e))?;
+    let [time, speed] = columns.map_err(|e| file_kind::or_wrong_kind(&[], path, e))?;
     if speed.factor.is_none() {
         return Err(table.no_unit(speed));
     }

@@ -16,7 +16,7 @@ const DAY_S: f64 = 86_400.0;
 /// A knot (m/s).
 const KNOT: f64 = 1852.0 / 3600.0;
 
-/// What the sentences of one time say.
+/// Contents of the sentences of one time.
 #[derive(Default)]
 struct Epoch {
     /// Line of its position.
@@ -33,14 +33,14 @@ struct Epoch {
 
 /// All of a log.
 #[derive(Default)]
-struct Log {
+struct NmeaLog {
     epochs: Vec<Epoch>,
     /// The midnight before the first sentence (Unix s) by the last date: before it has found the time, a receiver states any.
     midnight_s: Option<f64>,
     has_separation: bool,
 }
 
-/// Whether a text is such a log: one of its first lines has a sentence of a receiver in it.
+/// Returns true if one of the first lines of a text has a sentence of a receiver in it.
 pub(crate) fn is_nmea(text: &str) -> bool {
     // those of VectorNav are of an IMU
     let is_address = |word: &str| {
@@ -51,7 +51,7 @@ pub(crate) fn is_nmea(text: &str) -> bool {
     lines.any(|line| body(line).is_ok_and(|body| body.split(',').next().is_some_and(is_address)))
 }
 
-impl Log {
+impl NmeaLog {
     /// A sentence, whatever a logger wrote before it in its line.
     fn sentence(&mut self, line: u64, text: &str, is_summed: bool) -> Result<(), &'static str> {
         let fields = fields(text, is_summed)?;
@@ -109,8 +109,8 @@ impl Log {
         Ok(())
     }
 
-    /// What is added to seconds since the first midnight, and what times are then: Unix time where the IMU runs in it from
-    /// one time to the other, else seconds of the first day, else GPS time.
+    /// Offset added to the seconds since the first midnight, and the name of the resulting clock:
+    /// Unix time where the span of the IMU shows it, else seconds of the first day, else GPS time.
     fn clock(&self, imu_s: Option<(f64, f64)>) -> Option<(f64, String)> {
         let midnight_s = self.midnight_s?;
         let (first, last) = (self.epochs.first()?.since_s, self.epochs.last()?.since_s);
@@ -132,7 +132,7 @@ pub(super) fn fixes(
     unsaid: Option<&FixSigma>,
     imu_s: Option<(f64, f64)>,
 ) -> Result<Fixes, Error> {
-    let mut log = Log::default();
+    let mut log = NmeaLog::default();
     let lines = (1..).zip(text.lines().map(str::trim));
     let lines: Vec<(u64, &str)> = lines.filter(|(_, line)| !line.is_empty()).collect();
     let is_summed = lines.iter().any(|(_, line)| line.contains('*'));
@@ -187,7 +187,8 @@ pub(super) fn fixes(
     Ok((fixes, remarks))
 }
 
-/// What stands between `$` and the end of a line; before it, a logger may have written when it came.
+/// Text between `$` and the end of a line; before it, a logger may have written the time of
+/// arrival.
 fn body(line: &str) -> Result<&str, &'static str> {
     let start = line.find(['$', '!']);
     start

@@ -19,7 +19,7 @@
 
 use super::file_kind::FileKind;
 use super::recordings::facts;
-use super::toml_file::{OneOrEach, Source};
+use super::toml_file::{OneOrEach, TomlSource};
 use super::{Failure, atomic, file_kind};
 use crate::report::readable;
 use nav_sim_calibration::duration;
@@ -36,9 +36,9 @@ use std::fmt::Write;
 use std::path::Path;
 use toml::Value;
 
-/// Where the provenance of a model made from a data sheet names the figures that it lacks.
+/// Key of the provenance that lists figures missing from the data sheet.
 pub(crate) const NOT_STATED: &str = "not_stated";
-/// What wrote a file, in its provenance.
+/// Program and version in the provenance.
 pub(crate) const PROGRAM: &str = concat!("nav-sim ", env!("CARGO_PKG_VERSION"));
 
 /// The version of the layout that is written; the only one that is read.
@@ -53,18 +53,18 @@ pub struct ModelFile {
     pub missing: Vec<Channel>,
     /// The constant bias of a switching-on.
     pub turn_on: Option<TurnOn>,
-    /// How parameters vary between replicates.
+    /// Distribution of parameters between replicates.
     pub spread: Option<Spread>,
     /// Confidence intervals of parameters.
     pub intervals: Vec<Interval>,
-    /// How the model was made.
+    /// Provenance: estimator, inputs, fit.
     pub provenance: Option<toml::Table>,
     /// Processes read off the curves of the recordings, of the axes whose model does not describe these.
     pub reading: Option<Box<Self>>,
 }
 
 impl ModelFile {
-    /// What stands for the noise in navigation: the processes, or the reading of axes that have one.
+    /// Model for navigation: axes with a reading of the curve use it in place of their processes.
     #[must_use]
     pub fn for_navigation(mut self) -> Self {
         let Some(reading) = self.reading.take() else {
@@ -90,7 +90,7 @@ impl ModelFile {
         Channel::ALL.into_iter().filter(is_present)
     }
 
-    /// What is doubtful about the file at this path, in words.
+    /// Doubts about the file at this path, in words.
     pub(crate) fn doubts(&self, path: &std::path::Path) -> Vec<String> {
         let shown = path.display();
         let unsaid = |channel: &Channel| {
@@ -105,7 +105,7 @@ impl ModelFile {
             .collect()
     }
 
-    /// What counts as none in it because its data sheet does not state it: figures, or axes without noise.
+    /// Figures or axes that count as zero since the data sheet does not state them.
     pub(crate) fn not_stated(&self) -> Vec<String> {
         let figures = self
             .provenance
@@ -144,14 +144,14 @@ impl ModelFile {
 /// Standard deviations of the constant bias that each switching-on draws anew, axis by axis.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TurnOn {
-    /// Of the accelerometers (m/s²).
+    /// Standard deviations of the accelerometers (m/s²).
     pub accel_m_s2: Option<[f64; 3]>,
-    /// Of the gyroscopes (rad/s).
+    /// Standard deviations of the gyroscopes (rad/s).
     pub gyro_rad_s: Option<[f64; 3]>,
 }
 
 impl TurnOn {
-    /// Those of a sensor's axes (m/s² or rad/s).
+    /// Standard deviations of a sensor's axes (m/s² or rad/s).
     #[must_use]
     pub const fn axes(&self, sensor: Sensor) -> Option<[f64; 3]> {
         match sensor {
@@ -207,11 +207,11 @@ mod tests;
 
 // What model files hold, for the reader and for editors.
 
-/// What nav-sim calibrate writes and run, fuse, synthesize, export read
+/// Noise model: written by nav-sim calibrate, read by run, fuse, synthesize, export
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Noise model")]
-struct Description {
+struct ModelTable {
     /// Version of the layout
     #[serde(rename = "schema")]
     #[schemars(range(min = SCHEMA, max = SCHEMA))]
@@ -223,7 +223,7 @@ struct Description {
     gyro: Option<SensorTable>,
     turn_on: Option<TurnOnTable>,
     spread: Option<SpreadTable>,
-    /// How the model was made
+    /// Provenance of the model
     #[schemars(with = "Option<Map<String, serde_json::Value>>")]
     provenance: Option<toml::Table>,
 }
@@ -234,7 +234,7 @@ struct Description {
 #[schemars(inline)]
 struct SensorTable {
     processes: Option<Vec<ProcessTable>>,
-    /// What navigates where the processes do not describe the recordings: read off their curve
+    /// Noise for navigation, read off the curve, where the processes do not describe the recordings
     reading: Option<Vec<ProcessTable>>,
     x: Option<AxisTable>,
     y: Option<AxisTable>,
@@ -247,7 +247,7 @@ struct SensorTable {
 #[schemars(inline)]
 struct AxisTable {
     processes: Vec<ProcessTable>,
-    /// What navigates where the processes do not describe the recordings: read off their curve
+    /// Noise for navigation, read off the curve, where the processes do not describe the recordings
     reading: Option<Vec<ProcessTable>>,
 }
 
@@ -327,7 +327,7 @@ struct TurnOnTable {
 /// One standard deviation for the three axes, or one for each.
 type Sigmas<const MOST: i64> = OneOrEach<Between<0, MOST, false>, [Between<0, MOST, false>; 3]>;
 
-/// How parameters vary between recordings: of all three axes of a sensor, or of each
+/// Distribution of parameters between recordings: of all three axes of a sensor, or of each
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SpreadTable {
@@ -358,12 +358,12 @@ struct LawTable {
 /// The JSON schema of a model file, for editors and checkers.
 #[must_use]
 pub(crate) fn schema() -> serde_json::Value {
-    schemars::schema_for!(Description).to_value()
+    schemars::schema_for!(ModelTable).to_value()
 }
 
 // Remarks of a calibration in the provenance of its model.
 
-/// What is known of a JSON object, as a table: TOML has no null.
+/// Converts a JSON object to a TOML table without its nulls, which TOML lacks.
 pub(crate) fn known(json: serde_json::Value) -> toml::Table {
     let mut fields = json.as_object().cloned().unwrap_or_default();
     fields.retain(|_, value| !value.is_null());
@@ -377,7 +377,7 @@ pub struct Misfit {
     pub p_value: Option<f64>,
     /// Wavelet variance of the data over that of the model where it is furthest from 1, and that scale (s).
     pub worst: Option<(f64, f64)>,
-    /// Whether a reading of the curve stands for it.
+    /// True if a reading of the curve replaces the model.
     pub is_read: bool,
 }
 
@@ -446,8 +446,8 @@ impl ModelFile {
 /// When the file cannot be read, is not TOML, has unknown keys, lacks some, or has values outside their
 /// domains.
 pub fn read(path: &Path) -> Result<ModelFile, Failure> {
-    let refused = |e| file_kind::unless(&[FileKind::Model], path, e);
-    parse(&Source::read(path)?).map_err(refused)
+    let refused = |e| file_kind::or_wrong_kind(&[FileKind::Model], path, e);
+    parse(&TomlSource::read(path)?).map_err(refused)
 }
 
 /// A model file's text, at the path that messages show.
@@ -455,11 +455,11 @@ pub fn read(path: &Path) -> Result<ModelFile, Failure> {
 /// # Errors
 /// As [`read`].
 pub fn from_text(path: &Path, text: &str) -> Result<ModelFile, Failure> {
-    parse(&Source::new(&path.display().to_string(), text))
+    parse(&TomlSource::new(&path.display().to_string(), text))
 }
 
-pub(super) fn parse(source: &Source) -> Result<ModelFile, Failure> {
-    let Description {
+pub(super) fn parse(source: &TomlSource) -> Result<ModelFile, Failure> {
+    let ModelTable {
         rate_hz,
         accel,
         gyro,
@@ -504,7 +504,7 @@ pub(super) fn parse(source: &Source) -> Result<ModelFile, Failure> {
 }
 
 fn read_sensor(
-    source: &Source,
+    source: &TomlSource,
     sensor: Sensor,
     table: &SensorTable,
     file: &mut ModelFile,
@@ -541,7 +541,7 @@ fn read_sensor(
 }
 
 fn read_axis(
-    source: &Source,
+    source: &TomlSource,
     key: &str,
     processes: &[ProcessTable],
     reading: Option<&Vec<ProcessTable>>,
@@ -565,7 +565,7 @@ fn read_axis(
 }
 
 fn read_processes(
-    source: &Source,
+    source: &TomlSource,
     key: &str,
     tables: &[ProcessTable],
     channel: Channel,
@@ -603,7 +603,7 @@ fn read_processes(
     Ok(())
 }
 
-/// What is made of larger parameters, such as the sum of a random walk's variances, may be no number any more.
+/// Largest parameter: sums of larger ones, such as a random walk's variances, could overflow.
 const LARGEST: f64 = 1e30;
 
 /// A number, written with a point or not.
@@ -613,7 +613,7 @@ fn number(value: &Value) -> f64 {
 }
 
 fn read_process(
-    source: &Source,
+    source: &TomlSource,
     key: &str,
     values: &toml::Table,
     rate_hz: f64,
@@ -633,7 +633,7 @@ fn read_process(
 }
 
 fn read_laws(
-    source: &Source,
+    source: &TomlSource,
     sensor: Sensor,
     laws: &OneOrEach<LawAxes, Vec<LawTable>>,
     file: &ModelFile,

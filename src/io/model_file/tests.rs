@@ -1,6 +1,6 @@
 use super::*;
 use crate::io::Failure;
-use crate::io::toml_file::Source;
+use crate::io::toml_file::TomlSource;
 use nav_sim_signal::imu::{Axis, Sensor};
 use nav_sim_signal::noise::{Composite, Law, Process, Variation};
 
@@ -10,7 +10,7 @@ const ACCEL_X: Channel = Channel {
 };
 
 fn read_text(text: &str) -> Result<ModelFile, Failure> {
-    parse(&Source::new("m.toml", text))
+    parse(&TomlSource::new("m.toml", text))
 }
 
 /// One process of a file otherwise sound, on line 4.

@@ -6,7 +6,7 @@ use crate::io::table::{Column, Table, find, normalised};
 use crate::io::{Failure, Place, help};
 use crate::report::{readable, six_digits};
 use nav_sim_calibration::percent;
-use nav_sim_signal::facts::{self, Marks, Repeats};
+use nav_sim_signal::facts::{self, Marks, RepeatedRows};
 use nav_sim_signal::imu::{Recording, Sensor, Signal};
 use nav_sim_signal::noise::{Composite, Kind, Model, Process};
 use nav_sim_signal::units::{DEG, STANDARD_GRAVITY};
@@ -123,7 +123,7 @@ fn signals(table: &Table) -> impl Iterator<Item = (Channel, &[f64])> {
     columns.filter_map(|column| Some((channel_of(column)?, &column.values[..])))
 }
 
-fn repeats_of(table: &Table) -> Vec<(Sensor, Option<Repeats>)> {
+fn repeats_of(table: &Table) -> Vec<(Sensor, Option<RepeatedRows>)> {
     let of = |sensor| {
         let own = axes(table, |channel| channel.sensor == sensor);
         (!own.is_empty()).then(|| (sensor, facts::repeats(&own)))
@@ -132,7 +132,7 @@ fn repeats_of(table: &Table) -> Vec<(Sensor, Option<Repeats>)> {
 }
 
 /// A warning of repeated rows; `rate_hz` is that of the rows, if it is known.
-fn repeated(name: impl Display, repeats: &Repeats, rate_hz: f64) -> String {
+fn repeated(name: impl Display, repeats: &RepeatedRows, rate_hz: f64) -> String {
     let share = percent(repeats.share);
     let repeated = format!("{name}: {share} of its rows repeat the row before");
     match &repeats.held {
@@ -194,7 +194,7 @@ pub(super) fn repair(
 fn missing(table: &Table, row: usize, text: &str) -> Failure {
     Failure::contents(&table.path, table.line(row), text)
         .or_option(help::GAPS)
-        .or_without(help::GAPS_ELSEWHERE)
+        .or_hint_without(help::GAPS_ELSEWHERE)
 }
 
 impl Repair {
@@ -270,7 +270,7 @@ impl Repair {
             let text = first.map_or_else(String::new, |(s, r)| repeated(s, r, rate_hz));
             return Err(Failure::contents(&table.path, Place::Within, text)
                 .or_option(("axes", "take one sensor at a time, each at its own rate: --axes accel, then --axes gyro"))
-                .or_without(("axes", "wv and calibrate take one sensor at a time: --axes accel, then --axes gyro")));
+                .or_hint_without(("axes", "wv and calibrate take one sensor at a time: --axes accel, then --axes gyro")));
         }
         table.keep(firsts);
         self.rows_per_sample = *rows_per_sample;

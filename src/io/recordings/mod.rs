@@ -8,8 +8,8 @@ use super::file_kind::{self, FileKind};
 use super::input::listed;
 use super::logs::LogOptions;
 use super::table::{
-    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, Column, Dictionary, INSTANCE, NO_COLUMN, Quantity,
-    SENSOR_LOGGER, TICKS, TIME, Table, Units, is_oxts, unreadable,
+    ACCELERATION, ANGLE, ANGULAR_RATE, Column, DefaultUnit, Dictionary, INSTANCE, NO_COLUMN,
+    Quantity, SENSOR_LOGGER, TICKS, TIME, Table, Units, is_oxts, unreadable,
 };
 use super::{Failure, Place, help, table};
 use crate::report::six_digits;
@@ -27,7 +27,7 @@ use timing::Timing;
 pub mod facts;
 pub(crate) mod timing;
 
-/// How recordings are read.
+/// Options for reading recordings.
 #[derive(Debug, Clone, Default)]
 pub struct ReadOptions {
     /// Sample rate (Hz) for files without a time column; where there is one, it must agree within 1 %, and wins where
@@ -35,19 +35,19 @@ pub struct ReadOptions {
     pub rate_hz: Option<f64>,
     /// Seconds to leave out at the beginning (warm-up).
     pub skip_s: f64,
-    /// What to do where the time jumps or stands still.
+    /// Handling of gaps and repeated times.
     pub gaps: Gaps,
     /// The channels wanted; none: all. Others are neither parsed nor checked nor held in memory.
     pub channels: Option<Vec<Channel>>,
     /// Names of the columns, for files without a header and instead of the header of those with one.
     pub columns: Option<Vec<String>>,
-    /// What is read of a log.
+    /// Selection of a log's channels.
     pub log: LogOptions,
     /// Fewest samples a recording must have (at least 2).
     pub min_samples: usize,
 }
 
-/// What to do where a time step is over 1.5 or under 0.5 of the median step.
+/// Handling of time steps over 1.5 or under 0.5 of the median step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Gaps {
     /// Refuse the file.
@@ -76,7 +76,7 @@ pub(crate) const OF_CLOCK: &str =
 /// Time of a receiver, of the week or not: the last to be taken, because it may be that of its last fix.
 pub(crate) const OF_RECEIVER: &str = "tow gps_tow gpstow time_of_week gps_time_of_week sow gps_sow seconds_of_week second_of_week gps_seconds_of_week gps_seconds gps_time gpstime gps_timestamp";
 
-const fn time(stems: &'static str, bare: Bare, rank: u8) -> Quantity {
+const fn time(stems: &'static str, bare: DefaultUnit, rank: u8) -> Quantity {
     Quantity {
         rank: Some(rank),
         ..Quantity::new("t_s", stems, TIME, bare)
@@ -91,17 +91,17 @@ const fn signal(
 ) -> [Quantity; 3] {
     let any = Quantity {
         axis: name.split_at(name.len() - 1).1,
-        ..Quantity::new(name, free, rate, Bare::Unknown)
+        ..Quantity::new(name, free, rate, DefaultUnit::Unknown)
     };
     let is_si = Quantity {
         stems: si,
-        bare: Bare::Is(1.0),
+        bare: DefaultUnit::Is(1.0),
         ..any
     };
     let is_increment = Quantity {
         stems: increment,
         units: per_sample,
-        bare: Bare::Not,
+        bare: DefaultUnit::Not,
         per_sample: true,
         ..any
     };
@@ -119,18 +119,18 @@ const fn gyro(name: &'static str) -> [Quantity; 3] {
 /// Quantities of a recording. A packet counter starts again at 0 after 65535.
 static QUANTITIES: [[Quantity; 3]; 10] = [
     [
-        time(STAMP, Bare::Unknown, 0),
-        time(OF_CLOCK, Bare::Unknown, 1),
-        time(OF_RECEIVER, Bare::Unknown, 2),
+        time(STAMP, DefaultUnit::Unknown, 0),
+        time(OF_CLOCK, DefaultUnit::Unknown, 1),
+        time(OF_RECEIVER, DefaultUnit::Unknown, 2),
     ],
     [
-        time("timeus", Bare::Is(1e-6), 1),
-        time("timems itow", Bare::Is(1e-3), 1),
-        time(SENSOR_LOGGER, Bare::Is(1.0), 1),
+        time("timeus", DefaultUnit::Is(1e-6), 1),
+        time("timems itow", DefaultUnit::Is(1e-3), 1),
+        time(SENSOR_LOGGER, DefaultUnit::Is(1.0), 1),
     ],
     [
-        time("timestamp*", Bare::Not, 1),
-        time(TICKS, Bare::Unknown, 3),
+        time("timestamp*", DefaultUnit::Not, 1),
+        time(TICKS, DefaultUnit::Unknown, 3),
         Quantity::number("counter", "packetcounter packet_counter"),
     ],
     [Quantity::number(INSTANCE, "i"); 3],
@@ -173,7 +173,7 @@ pub(crate) fn load(
 ) -> Result<Table, Failure> {
     use FileKind as K;
     load_signals(path, options, dictionary)
-        .map_err(|e| file_kind::unless(&[K::Recording, K::Imu, K::Log], path, e))
+        .map_err(|e| file_kind::or_wrong_kind(&[K::Recording, K::Imu, K::Log], path, e))
 }
 
 fn load_signals(
@@ -210,7 +210,7 @@ fn load_signals(
                 .filter(|(_, own)| **own != first)
                 .for_each(|(value, _)| *value = f64::NAN);
         }
-        if table.keep_whole().is_some() {
+        if table.drop_incomplete_rows().is_some() {
             let text = format!("of several IMUs that with {} = {first}", instance.name);
             table.assumptions.push(text);
         }
@@ -226,7 +226,7 @@ fn load_signals(
         if path.with_file_name("TotalAcceleration.csv").exists() {
             return Err(Failure::contents(&table.path, Place::Itself, text)
                 .or_hint("name TotalAcceleration.csv")
-                .passing_over("it is without gravity"));
+                .skipped_as("it is without gravity"));
         }
         table.warnings.push(text.to_owned());
     }
@@ -243,7 +243,7 @@ fn load_signals(
         );
         return Err(table
             .refused(message)
-            .passing_over(NO_COLUMN)
+            .skipped_as(NO_COLUMN)
             .or_hint(dictionary.advice)
             .or_option(help::COLUMN_NAMES));
     }
@@ -291,8 +291,8 @@ pub(crate) fn visit<T: Send>(
         for ((path, is_found), outcome) in some.iter().zip(outcomes) {
             match outcome {
                 // the output of this very command, say, when it goes to a file in the directory
-                Err(e) if *is_found && e.passed_over().is_some() => {
-                    let (path, why) = (path.display(), e.passed_over().unwrap_or_default());
+                Err(e) if *is_found && e.skip_reason().is_some() => {
+                    let (path, why) = (path.display(), e.skip_reason().unwrap_or_default());
                     let text = format!("{path}: passed over, {why}");
                     report.warnings.push(text);
                     passed_over = passed_over.or(Some(e));
@@ -395,7 +395,7 @@ fn natural(name: &str) -> (String, String) {
     (padded.collect(), name.to_owned())
 }
 
-/// Whether a name ends like a recording's.
+/// Returns true for a name with a recording's extension.
 fn is_recording(name: &str) -> bool {
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
@@ -438,7 +438,7 @@ mod listing_tests {
 
 // What was found in the files, for the user to check.
 
-/// What was found and assumed while reading.
+/// Findings and assumptions of the reading.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
@@ -466,7 +466,7 @@ impl Report {
     }
 }
 
-/// What was found and assumed in one file. Displays as one line.
+/// Findings and assumptions for one file. Displays as one line.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct FileReport {
@@ -478,17 +478,17 @@ pub struct FileReport {
     pub ignored: Vec<String>,
     /// Sample rate (Hz).
     pub rate_hz: f64,
-    /// Where the rate is from, in words.
+    /// Source of the rate, in words.
     pub rate_from: String,
     /// Samples of each recording made of the file (several if it was split at gaps).
     pub samples: Vec<usize>,
     /// The mean removed from each signal of the first of them (m/s² or rad/s).
     pub means: Vec<(Channel, f64)>,
-    /// What was assumed, in words.
+    /// Assumptions, in words.
     pub assumptions: Vec<String>,
     /// Doubts, in words.
     pub warnings: Vec<String>,
-    /// What tells its samples from those of others.
+    /// Fingerprints that detect samples shared with other files.
     marks: Vec<Marks>,
 }
 
@@ -644,7 +644,7 @@ fn with_holes(samples: &[f64], piece: &Range<usize>, holes: &[(usize, usize)]) -
     whole
 }
 
-/// Of the stretches between gaps those shorter than the longest by more than this are left out.
+/// Largest ratio of the longest stretch between gaps to one that is kept.
 const LONGEST_OVER_SHORTEST: usize = 16;
 
 /// The stretches of samples that become recordings: at least one.
@@ -688,7 +688,7 @@ const NO_GRAVITY: f64 = 0.3;
 /// A column without a larger value has squares that are no variances.
 const SMALLEST: f64 = 1e-45;
 
-/// What brings each column to SI units; refuses dead axes.
+/// Factors that bring each column to SI units; refuses dead axes.
 fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
     let from_gravity = gravity_factor(raw)?;
     let factor = |column: &Column| {

@@ -33,7 +33,7 @@ pub(super) fn timing(
     let time = time.filter(|t| !(is_rate_known && t.quantity.stems == TICKS));
     let clock = match (time, known.or(raw.rate_hz)) {
         (Some(time), _) => {
-            let mut clock = Clock::new(time, options.gaps, "time column".to_owned());
+            let mut clock = SampleClock::new(time, options.gaps, "time column".to_owned());
             if clock.unit_s.is_nan() {
                 let (unit_s, unit) = unit_of_step(clock.step);
                 let text = format!("column \"{}\" taken as {unit}", clock.name);
@@ -64,11 +64,12 @@ pub(super) fn timing(
                 last = *value;
                 *value += turned;
             }
-            let clock = Clock::new(counter, options.gaps, format!("{source}, packet counter"));
+            let clock =
+                SampleClock::new(counter, options.gaps, format!("{source}, packet counter"));
             // The counter tells what was lost, not the rate: with a skip factor it counts by more than one.
             let unit_s = 1.0 / (rate_hz * clock.median.max(1.0));
             let start_s = 0.0;
-            Clock {
+            SampleClock {
                 unit_s,
                 start_s,
                 ..clock
@@ -99,7 +100,7 @@ const MOST_STRAYED: f64 = 0.4;
 const STRETCH: usize = 64;
 
 /// Time of each sample.
-struct Clock {
+struct SampleClock {
     name: String,
     source: String,
     /// Time of the first sample (s).
@@ -118,7 +119,7 @@ struct Clock {
     most_lost: f64,
 }
 
-impl Clock {
+impl SampleClock {
     fn new(column: Column, gaps: Gaps, source: String) -> Self {
         let mut since = column.values;
         let first = since.first().copied().unwrap_or(0.0);
@@ -223,13 +224,13 @@ impl Clock {
             return Err(match longest.is_some_and(|n| n >= STRETCH) {
                 _ if !is_lost => refusal
                     .or_option(help::GAPS)
-                    .or_without(help::GAPS_ELSEWHERE),
+                    .or_hint_without(help::GAPS_ELSEWHERE),
                 true => refusal
                     .or_option(help::GAPS_LOST)
-                    .or_without(help::GAPS_LOST_ELSEWHERE),
+                    .or_hint_without(help::GAPS_LOST_ELSEWHERE),
                 false if self.is_lossy => refusal
                     .or_option(help::GAPS_KEEP)
-                    .or_without(help::GAPS_LOST_ELSEWHERE),
+                    .or_hint_without(help::GAPS_LOST_ELSEWHERE),
                 false => refusal.or_hint("record again: too many samples are lost"),
             });
         }

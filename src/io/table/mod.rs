@@ -9,11 +9,11 @@ use crate::failure::is_damage;
 use chrono::NaiveDateTime;
 use nav_sim_document::one_line;
 use nav_sim_logs::npy::Array;
-use nav_sim_logs::{Channel, Clock, Content, Kind as LogKind, in_seconds, npy};
+use nav_sim_logs::{Clock, Content, LogChannel, LogFormat, in_seconds, npy};
 pub(crate) use quantity::find;
 pub(crate) use quantity::{
-    ACCELERATION, ANGLE, ANGULAR_RATE, Bare, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, TIME,
-    Units, normalised,
+    ACCELERATION, ANGLE, ANGULAR_RATE, DefaultUnit, LATITUDE, LONGITUDE, NONE, Quantity, SPEED,
+    TIME, Units, normalised,
 };
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -28,7 +28,7 @@ pub(crate) struct Dictionary<'a> {
     pub(crate) quantities: &'static [Quantity],
     /// Headers of texts without one, by the number of their columns.
     pub(crate) bare: &'static [&'static str],
-    /// Those of arrays.
+    /// Column names of arrays.
     pub(crate) array: &'static [&'static str],
     /// True if cells that hold no number of their range are NaN: who reads them leaves those rows out.
     pub(crate) is_partial: bool,
@@ -121,7 +121,7 @@ pub(crate) fn read(path: &Path, dictionary: &Dictionary<'_>) -> Result<Table, Fa
     source::open(path).map_err(|e| unreadable(path, e))?;
     let table = match logs::kind_of(path) {
         #[cfg(feature = "npz")]
-        Some(LogKind::Npz) => {
+        Some(LogFormat::Npz) => {
             let (columns, rate_hz) = npz(path)?;
             Ok(Table {
                 rate_hz: rate_hz.map(|hz| (hz, RATE)),
@@ -165,7 +165,7 @@ pub(crate) fn parse(name: &str, text: &str, dictionary: &Dictionary<'_>) -> Resu
 /// Quantities of a dictionary that the header of a text names.
 pub(crate) fn quantities(text: &str, dictionary: &Dictionary<'_>) -> Vec<&'static Quantity> {
     let reader = Box::new(Cursor::new(text.to_owned()));
-    let head = Head::read(&mut Lines::new("", reader), dictionary);
+    let head = HeaderLines::read(&mut Lines::new("", reader), dictionary);
     let names = head.map(|head| head.names).unwrap_or_default();
     let known = names.iter().map(|name| find(dictionary.quantities, name));
     known.flatten().map(|(quantity, _)| quantity).collect()
@@ -201,7 +201,7 @@ const IS_EMPTY: &str = "it is empty";
 
 /// A table without rows.
 fn empty(path: &str) -> Failure {
-    Failure::contents(path, Place::Within, "no rows in it").passing_over(IS_EMPTY)
+    Failure::contents(path, Place::Within, "no rows in it").skipped_as(IS_EMPTY)
 }
 
 /// Columns beside which rates and accelerations are in SI: of ArduPilot and of Sensor Logger.
@@ -520,7 +520,7 @@ impl Table {
     }
 
     /// Keeps the rows of finite numbers; what was left out, in words.
-    pub(crate) fn keep_whole(&mut self) -> Option<String> {
+    pub(crate) fn drop_incomplete_rows(&mut self) -> Option<String> {
         let all = self.rows();
         let is_whole = |row: &usize| self.columns.iter().all(|c| c.values[*row].is_finite());
         let kept: Vec<usize> = (0..all).filter(is_whole).collect();
@@ -549,7 +549,7 @@ impl Table {
             [one] => format!("column {one} is missing"),
             many => format!("columns {} are missing", many.join(", ")),
         };
-        let refusal = self.refused(columns).passing_over(NO_COLUMN);
+        let refusal = self.refused(columns).skipped_as(NO_COLUMN);
         Err(refusal.or_hint(self.advice))
     }
 
@@ -642,7 +642,7 @@ fn read_text(
     dictionary: &Dictionary<'_>,
 ) -> Result<Table, Failure> {
     let mut lines = Lines::new(path, reader);
-    let head = Head::read(&mut lines, dictionary)?;
+    let head = HeaderLines::read(&mut lines, dictionary)?;
     let mut table = Table::new(path, head.line, &head.names, dictionary, head.is_xsens)?;
     table.rate_hz = head.rate_hz.map(|rate_hz| (rate_hz, "head of the file"));
     table.is_bare = head.is_bare;
@@ -661,7 +661,7 @@ fn read_text(
 
 /// Lines before the rows.
 #[derive(Default)]
-struct Head {
+struct HeaderLines {
     names: Vec<String>,
     delimiter: u8,
     /// Line of the header, from 1.
@@ -690,7 +690,7 @@ const SENTENCES: [(&str, &str); 3] = [
 ];
 const OF_SENTENCE: &str = "accel_x_m_s2 accel_y_m_s2 accel_z_m_s2 gyro_x_rad_s gyro_y_rad_s gyro_z_rad_s temperature pressure";
 
-impl Head {
+impl HeaderLines {
     fn read(lines: &mut Lines<'_>, dictionary: &Dictionary<'_>) -> Result<Self, Failure> {
         let mut head = Self {
             delimiter: b',',
@@ -785,8 +785,8 @@ impl Head {
                 head.names = cells;
                 while lines.next()? && lines.line.trim_ascii().is_empty() {}
                 let below = split(&lines.line, delimiter);
-                head.has_row =
-                    !(lines.line.is_empty() || below.len() >= head.names.len() && is_words(&below));
+                head.has_row = !(lines.line.is_empty()
+                    || below.len() >= head.names.len() && is_text_row(&below));
                 if !head.has_row && !lines.line.is_empty() {
                     let text = String::from_utf8_lossy(&lines.line);
                     let units = words_of(text.trim(), delimiter);
@@ -1037,7 +1037,7 @@ const fn is_quote(byte: u8, is_open: bool, before: u8, delimiter: u8) -> bool {
     byte == b'"' && (is_open || before == delimiter || before == b'"')
 }
 
-/// What a cell says, without the quotes around it.
+/// Contents of a cell without the quotes around it.
 fn unquoted(cell: &[u8]) -> Cow<'_, [u8]> {
     let inside = cell
         .trim_ascii()
@@ -1053,7 +1053,7 @@ fn unquoted(cell: &[u8]) -> Cow<'_, [u8]> {
 }
 
 /// True if a row has units, say, below the names: no cell begins as a number does.
-fn is_words(cells: &[Cow<'_, [u8]>]) -> bool {
+fn is_text_row(cells: &[Cow<'_, [u8]>]) -> bool {
     let is_word = |cell: &Cow<'_, [u8]>| {
         let first = cell.trim_ascii().first();
         number(cell, b',').is_none() && first.is_none_or(|b| !b"+-.0123456789".contains(b))
@@ -1160,14 +1160,14 @@ const RATE: &str = "rate_hz";
 /// it is stated.
 #[cfg(feature = "npz")]
 fn npz(path: &Path) -> Result<(Columns, Option<f64>), Failure> {
-    use nav_sim_logs::{Fault, npz::Archive};
+    use nav_sim_logs::{LogFault, npz::Archive};
     let refused = |e| logs::refused(path, e);
     let mut archive = Archive::open(path).map_err(refused)?;
     let (mut columns, mut rate_hz) = (Vec::new(), None);
     for name in archive.names() {
         let Array { shape, values } = match archive.read(&name) {
             // texts and the like are passed over
-            Err(e) if matches!(e.fault, Fault::Encoding) => {
+            Err(e) if matches!(e.fault, LogFault::Encoding) => {
                 columns.push((name, Vec::new()));
                 continue;
             }
@@ -1360,7 +1360,7 @@ fn log(
     let mut table = of(columns)?;
     table.assumptions.push(format!("topic {}", channel.topic));
     table.warnings.extend(log.damage().map(logs::cut_off));
-    let is_other = |c: &&Channel| c.topic != channel.topic && c.clock == Clock::Unix;
+    let is_other = |c: &&LogChannel| c.topic != channel.topic && c.clock == Clock::Unix;
     let others = log.channels().iter().filter(is_other);
     table.ignored = others.map(|c| c.topic.clone()).collect();
     Ok(table)

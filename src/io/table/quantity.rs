@@ -50,7 +50,7 @@ pub(crate) const SPEED: Units = &[
 
 /// Meaning of a name without a unit.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Bare {
+pub(crate) enum DefaultUnit {
     /// The quantity in such a unit.
     Is(f64),
     /// The quantity in a unit that is to be found out.
@@ -77,7 +77,7 @@ pub(crate) struct Quantity {
     /// Last part of the name before the unit, with or without an underscore: x, y, z.
     pub(crate) axis: &'static str,
     pub(crate) units: Units,
-    pub(crate) bare: Bare,
+    pub(crate) bare: DefaultUnit,
     /// Sign of what the file has.
     pub(crate) sign: f64,
     /// Preference among columns of the quantity; without it there may be but one.
@@ -93,7 +93,7 @@ impl Quantity {
         name: &'static str,
         stems: &'static str,
         units: Units,
-        bare: Bare,
+        bare: DefaultUnit,
     ) -> Self {
         Self {
             name,
@@ -110,29 +110,29 @@ impl Quantity {
 
     /// An angle: degrees where the name does not say it.
     pub(crate) const fn angle(name: &'static str, stems: &'static str) -> Self {
-        Self::new(name, stems, ANGLE, Bare::Is(DEG))
+        Self::new(name, stems, ANGLE, DefaultUnit::Is(DEG))
     }
 
     /// A length (m).
     pub(crate) const fn length(name: &'static str, stems: &'static str) -> Self {
-        Self::new(name, stems, LENGTH, Bare::Is(1.0))
+        Self::new(name, stems, LENGTH, DefaultUnit::Is(1.0))
     }
 
     /// A speed (m/s).
     pub(crate) const fn speed(name: &'static str, stems: &'static str) -> Self {
-        Self::new(name, stems, SPEED, Bare::Is(1.0))
+        Self::new(name, stems, SPEED, DefaultUnit::Is(1.0))
     }
 
     /// A number.
     pub(crate) const fn number(name: &'static str, stems: &'static str) -> Self {
-        Self::new(name, stems, NONE, Bare::Is(1.0))
+        Self::new(name, stems, NONE, DefaultUnit::Is(1.0))
     }
 
     /// The time (s).
     pub(crate) const fn time(stems: &'static str) -> Self {
         Self {
             rank: Some(0),
-            ..Self::new("t_s", stems, TIME, Bare::Is(1.0))
+            ..Self::new("t_s", stems, TIME, DefaultUnit::Is(1.0))
         }
     }
 
@@ -156,7 +156,7 @@ impl Quantity {
     /// The same where no unit may be left out.
     pub(crate) const fn with_unit(self) -> Self {
         Self {
-            bare: Bare::Not,
+            bare: DefaultUnit::Not,
             ..self
         }
     }
@@ -194,8 +194,10 @@ impl Quantity {
             endings.filter(|(ending, _)| stem(ending).is_some_and(|s| self.has_stem(s)));
         match (with_unit.next(), self.bare) {
             (Some((_, factor)), _) => Some(Some(self.sign * factor)),
-            (None, Bare::Is(factor)) if self.has_stem(plain) => Some(Some(self.sign * factor)),
-            (None, Bare::Unknown) if self.has_stem(plain) => Some(None),
+            (None, DefaultUnit::Is(factor)) if self.has_stem(plain) => {
+                Some(Some(self.sign * factor))
+            }
+            (None, DefaultUnit::Unknown) if self.has_stem(plain) => Some(None),
             _ => None,
         }
     }

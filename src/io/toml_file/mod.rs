@@ -30,7 +30,8 @@ fn dotted(path: &str, key: &str) -> String {
     }
 }
 
-/// Where the value of a path is written, and whether it is: if not, the span of the innermost table around it.
+/// Span of the value at a path, and true if it exists; else the span of the innermost table around
+/// it.
 fn span_of(table: &DeTable<'_>, path: &str) -> (Range<usize>, bool) {
     let (mut table, mut span) = (Some(table), 0..0);
     for part in path.split('.').filter(|part| !part.is_empty()) {
@@ -48,12 +49,12 @@ fn span_of(table: &DeTable<'_>, path: &str) -> (Range<usize>, bool) {
 
 /// A TOML text and the name it goes by in messages.
 #[derive(Debug)]
-pub(crate) struct Source {
+pub(crate) struct TomlSource {
     path: String,
     text: String,
 }
 
-impl Source {
+impl TomlSource {
     /// The text of a file.
     ///
     /// # Errors
@@ -134,7 +135,7 @@ impl Source {
             .count()
     }
 
-    /// Where the value of a key is written, and whether it is: if not, the innermost table around it.
+    /// Span of the value of a key, and true if it exists; else the innermost table around it.
     fn place(&self, key: &str) -> (Range<usize>, bool) {
         let table = DeTable::parse(&self.text);
         table.map_or((0..0, false), |table| span_of(table.get_ref(), key))
@@ -244,7 +245,7 @@ mod tests;
 // A file against the schema of its type.
 
 struct Checker<'a> {
-    source: &'a Source,
+    source: &'a TomlSource,
     root: &'a Schema,
 }
 

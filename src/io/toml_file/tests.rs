@@ -127,7 +127,7 @@ fn refusals_name_file_line_key_and_value() {
             "line 2: unknown key \"conut\" | did you mean \"count\"?",
         ),
     ] {
-        let source = Source::new("f.toml", text);
+        let source = TomlSource::new("f.toml", text);
         let e = source.get::<File>().unwrap_err();
         assert_eq!(
             format!("{e} | {}", e.advice().unwrap_or_default()),
@@ -255,14 +255,14 @@ fn keys_of_tagged_tables_are_found() {
             "line 1: \"other\" = nan is refused: it must be a finite number | ",
         ),
     ] {
-        let e = Source::new("f.toml", &text).get::<Rules>().unwrap_err();
+        let e = TomlSource::new("f.toml", &text).get::<Rules>().unwrap_err();
         assert_eq!(format!("{e} | {}", e.advice().unwrap_or_default()), format!("f.toml, {expected}"));
     }
 }
 
 #[test]
 fn syntax_errors_have_their_line() {
-    let e = Source::new("f.toml", "a = 1\nb = = 2\n")
+    let e = TomlSource::new("f.toml", "a = 1\nb = = 2\n")
         .table()
         .unwrap_err();
     assert!(e.to_string().starts_with("f.toml, line 2: "), "{e}");
@@ -270,7 +270,7 @@ fn syntax_errors_have_their_line() {
 
 #[test]
 fn a_missing_file_is_named() {
-    let e = Source::read(Path::new("/no/such.toml")).unwrap_err();
+    let e = TomlSource::read(Path::new("/no/such.toml")).unwrap_err();
     assert_eq!(e.to_string(), "/no/such.toml: No such file or directory");
     assert!(e.code() == 2);
 }

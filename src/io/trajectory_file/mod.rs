@@ -73,7 +73,7 @@ pub(crate) fn load_reference(
 
 /// The refusal of a file that may be no trajectory.
 fn unless_other(path: &Path) -> impl Fn(Failure) -> Failure {
-    move |e| file_kind::unless(&[FileKind::Trajectory, FileKind::Gnss], path, e)
+    move |e| file_kind::or_wrong_kind(&[FileKind::Trajectory, FileKind::Gnss], path, e)
 }
 
 /// The rows of a file; none of a motion profile.
@@ -216,7 +216,7 @@ fn add_covariances(path: &Path, rows: &mut [StatedRow]) -> Result<Option<String>
             ..DICTIONARY
         };
         let table = table::parse(&name, &text, &dictionary)?;
-        let refused = |e| file_kind::unless(&[], path, e);
+        let refused = |e| file_kind::or_wrong_kind(&[], path, e);
         let [time] = table.columns(["t_s"]).map_err(refused)?;
         let sigmas_of_position = SIGMAS.into_iter().take(3);
         table.require(sigmas_of_position).map_err(refused)?;
@@ -397,10 +397,10 @@ struct Rows {
     velocities: Vec<DVec3>,
     /// Standard deviations in the order of the reported states (m, m/s, rad; NaN: not stated), one for each sample.
     sigmas: Vec<[f64; 9]>,
-    /// Whether positions are latitude and longitude, which may have been given in the wrong unit.
+    /// True if positions are latitude and longitude, whose unit may be wrong.
     geodetic: bool,
     doubts: Vec<String>,
-    /// Those that only a trajectory gives: columns that it does not use, and an attitude that follows the path.
+    /// Doubts for trajectories only: unused columns, and an attitude that follows the path.
     of_trajectory: Vec<String>,
 }
 
@@ -526,7 +526,7 @@ fn rows(
         .chain(optional.flatten());
     table.require(needed)?;
     check_units(&table)?;
-    let left_out = table.keep_whole();
+    let left_out = table.drop_incomplete_rows();
     let origin = is_local.then(|| local_origin(&table, origin)).transpose()?;
     let [time] = table.columns(["t_s"])?;
     let place = table.columns(position)?;
@@ -648,7 +648,7 @@ fn local_origin(table: &Table, given: Option<[f64; 3]>) -> Result<[f64; 3], Erro
             let message = "a trajectory in local coordinates needs an origin on the Earth";
             Error::contents(&table.path, Place::Within, message)
                 .or_option(("origin", "give --origin LAT_DEG,LON_DEG,H_M"))
-                .or_without(("origin", "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M"))
+                .or_hint_without(("origin", "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M"))
                 .or_hint("a first line \"# origin: LAT_DEG, LON_DEG, H_M\"")
         })
 }
@@ -886,7 +886,7 @@ impl Rows {
 
     /// The trajectory through some rows.
     fn stretch(&self, range: Range<usize>) -> Result<Trajectory, Error> {
-        use trajectory::Error as E;
+        use trajectory::TrajectoryError as E;
         let through = |samples: &[TrajectorySample]| {
             Trajectory::from_samples(samples).map_err(|source| {
                 let advice = match source {

@@ -1,9 +1,9 @@
 //! Motion profiles in TOML.
 
 use crate::io::Failure;
-use crate::io::toml_file::Source;
+use crate::io::toml_file::TomlSource;
 use nav_sim_navigation::trajectory::Trajectory;
-use nav_sim_navigation::trajectory::profile::{Bank, Kind, Profile, Segment, Start};
+use nav_sim_navigation::trajectory::profile::{Bank, Profile, ProfileStart, Segment, SegmentKind};
 use nav_sim_signal::units::{Between, Positive};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -13,16 +13,16 @@ use std::path::Path;
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Motion profile")]
-struct Description {
-    start: Start,
+struct ProfileTable {
+    start: ProfileStart,
     #[serde(default)]
     vehicle: Vehicle,
-    /// What the vehicle does, in order
+    /// Segments of the motion, in order
     #[schemars(length(min = 1))]
     segment: Vec<Segment>,
 }
 
-/// How the vehicle moves
+/// Motion of the vehicle
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 struct Vehicle {
@@ -43,15 +43,15 @@ impl Default for Vehicle {
 
 /// The JSON schema of such a file.
 pub(crate) fn schema() -> serde_json::Value {
-    schemars::schema_for!(Description).to_value()
+    schemars::schema_for!(ProfileTable).to_value()
 }
 
 pub(super) fn load(path: &Path) -> Result<Trajectory, Failure> {
-    build(&Source::read(path)?)
+    build(&TomlSource::read(path)?)
 }
 
-pub(super) fn build(source: &Source) -> Result<Trajectory, Failure> {
-    let file: Description = source.get()?;
+pub(super) fn build(source: &TomlSource) -> Result<Trajectory, Failure> {
+    let file: ProfileTable = source.get()?;
     let profile = Profile {
         start: file.start,
         bank: file.vehicle.bank,
@@ -62,7 +62,7 @@ pub(super) fn build(source: &Source) -> Result<Trajectory, Failure> {
         let key = e.problem.key;
         let path = match e.segment {
             Some(i) => {
-                let is_climb = matches!(profile.segments[i].kind, Kind::Climb { .. });
+                let is_climb = matches!(profile.segments[i].kind, SegmentKind::Climb { .. });
                 let key = if is_climb && key == "climb_m" {
                     "height_m"
                 } else {

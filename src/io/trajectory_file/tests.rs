@@ -1,7 +1,7 @@
 mod profiles;
 
 use super::*;
-use crate::io::toml_file::Source;
+use crate::io::toml_file::TomlSource;
 use glam::DVec3;
 use nav_sim_navigation::frames::RollPitchYaw;
 use nav_sim_signal::units::DEG;

@@ -9,7 +9,7 @@
     feature = "npz"
 ))]
 
-use nav_sim_logs::{Content, Error, Fault, Log, Stamp, npz};
+use nav_sim_logs::{Content, Log, LogError, LogFault, Stamp, npz};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -23,7 +23,10 @@ fn bytes(name: &str) -> Vec<u8> {
 }
 
 /// Opens a file of these bytes.
-fn from_bytes<T>(bytes: &[u8], open: fn(&Path) -> Result<T, Error>) -> (TempDir, Result<T, Error>) {
+fn from_bytes<T>(
+    bytes: &[u8],
+    open: fn(&Path) -> Result<T, LogError>,
+) -> (TempDir, Result<T, LogError>) {
     let in_memory = || tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir());
     let place = in_memory().unwrap();
     let path = place.path().join("log");
@@ -31,7 +34,7 @@ fn from_bytes<T>(bytes: &[u8], open: fn(&Path) -> Result<T, Error>) -> (TempDir,
     (place, open(&path))
 }
 
-fn refused(bytes: &[u8]) -> Error {
+fn refused(bytes: &[u8]) -> LogError {
     match from_bytes(bytes, Log::open) {
         (_, Err(error)) => error,
         (_place, Ok(log)) => {
@@ -159,7 +162,7 @@ fn a_file_without_its_end_is_still_being_written() {
         let log = from_bytes(&all[..*end], Log::open).1.unwrap();
         let error = &log.damage().unwrap().error;
         assert!(
-            matches!(error.fault, Fault::Cut) && error.offset == Some(*end as u64),
+            matches!(error.fault, LogFault::Cut) && error.offset == Some(*end as u64),
             "{error}"
         );
     }
@@ -230,7 +233,10 @@ fn lengths_and_encodings_are_checked_before_anything_is_unpacked() {
             .to_string()
             .ends_with(": unknown encoding \"zstx\"")
     );
-    assert!(matches!(refused(b"#ROSBAG V1.2\n").fault, Fault::Encoding));
+    assert!(matches!(
+        refused(b"#ROSBAG V1.2\n").fault,
+        LogFault::Encoding
+    ));
     // a message of 2 GB in a file that is that long is refused, in a shorter one it is cut off
     let mut bag = bytes("ros1_none.bag");
     let at = bag

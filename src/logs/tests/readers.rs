@@ -9,7 +9,9 @@
     feature = "npz"
 ))]
 
-use nav_sim_logs::{Clock, Content, Fault, Fix, ImuSample, Kind, Log, Stamp, npz, recognise};
+use nav_sim_logs::{
+    Clock, Content, ImuReading, Log, LogFault, LogFix, LogFormat, Stamp, npz, recognise,
+};
 use std::path::PathBuf;
 
 fn path(name: &str) -> PathBuf {
@@ -28,8 +30,8 @@ fn open(name: &str) -> Log {
 
 /// Stamps and values of a topic.
 fn rows(log: &Log, topic: &str, stamp: Stamp) -> Vec<(i64, Vec<f64>)> {
-    let of_sample = |s: ImuSample| (s.stamp_ns, [s.accel_m_s2, s.gyro_rad_s].concat());
-    let of_fix = |f: Fix| {
+    let of_sample = |s: ImuReading| (s.stamp_ns, [s.accel_m_s2, s.gyro_rad_s].concat());
+    let of_fix = |f: LogFix| {
         let triads = [f.sd_ned_m, f.v_ned_m_s, f.sd_v_ned_m_s]
             .into_iter()
             .flatten()
@@ -186,20 +188,20 @@ fn arrays_are_those_that_were_written() {
         );
         assert_eq!(archive.read("flag").unwrap().values, [1.0, 0.0]);
         let fault = |name: &str, archive: &mut npz::Archive| archive.read(name).unwrap_err().fault;
-        assert!(matches!(fault("name", &mut archive), Fault::Encoding));
-        assert!(matches!(fault("mag", &mut archive), Fault::Topic));
+        assert!(matches!(fault("name", &mut archive), LogFault::Encoding));
+        assert!(matches!(fault("mag", &mut archive), LogFault::Topic));
     }
 }
 
 #[test]
 fn formats_are_told_by_their_first_bytes() {
     let kind = |name: &str| recognise(&bytes(name));
-    assert_eq!(kind("rosbags.mcap"), Some(Kind::Mcap));
-    assert_eq!(kind("ros1_bz2.bag"), Some(Kind::Bag));
-    assert_eq!(kind("px4.ulg"), Some(Kind::Ulog));
+    assert_eq!(kind("rosbags.mcap"), Some(LogFormat::Mcap));
+    assert_eq!(kind("ros1_bz2.bag"), Some(LogFormat::Bag));
+    assert_eq!(kind("px4.ulg"), Some(LogFormat::Ulog));
     // sentences come first
-    assert_eq!(kind("ublox.ubx"), Some(Kind::Ubx));
-    assert_eq!(kind("arrays.npz"), Some(Kind::Npz));
+    assert_eq!(kind("ublox.ubx"), Some(LogFormat::Ubx));
+    assert_eq!(kind("arrays.npz"), Some(LogFormat::Npz));
     let rinex = format!(
         "{:<60}RINEX VERSION / TYPE\n",
         "     3.04           OBSERVATION DATA    M"
@@ -225,7 +227,7 @@ fn formats_are_told_by_their_first_bytes() {
         let place = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(place.path(), head).unwrap();
         let error = Log::open(place.path()).unwrap_err();
-        assert!(matches!(error.fault, Fault::NotRead(k) if k == kind));
+        assert!(matches!(error.fault, LogFault::NotRead(k) if k == kind));
         assert_eq!(error.hint(), kind.conversion());
         assert!(error.hint().is_some());
     }

@@ -10,7 +10,7 @@
 use super::outcome::{Finding, nis_bound, total_nis, used};
 use super::run::rates;
 use super::vehicle::{force, rate};
-use super::{Found, Heading, Levelling, Recorded, Settings, Solution, Start, fuse};
+use super::{AlignmentSummary, Heading, Levelling, Recorded, Settings, Solution, Start, fuse};
 use crate::earth::{gravity_down, moved, ned_difference};
 use crate::ekf::{Belief, InitialSettings};
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
@@ -22,7 +22,8 @@ use crate::units::{DEG, Refused};
 use glam::{DQuat, DVec3};
 use std::f64::consts::{PI, SQRT_2};
 
-/// How much later other starts are tried (s), where none at the first moving fix agrees with what follows.
+/// Delays of further start times to try (s), where none at the first moving fix agrees with the
+/// fixes after it.
 const LATER_S: [f64; 5] = [15.0, 30.0, 60.0, 120.0, 240.0];
 /// Tilt beyond which the axes of an IMU are hardly those of a vehicle (rad).
 const UPRIGHT: f64 = 45.0 * DEG;
@@ -30,9 +31,9 @@ const UPRIGHT: f64 = 45.0 * DEG;
 /// A start found in the recording.
 #[derive(Debug, Clone)]
 pub struct Alignment {
-    /// Where the filter starts.
+    /// Initial state and its uncertainty.
     pub start: Start,
-    /// What speaks against it.
+    /// Doubts about it.
     pub doubts: Vec<(VerdictKind, Finding)>,
 }
 
@@ -56,7 +57,7 @@ pub fn coarse(
             SLOW.0
         )));
     };
-    let scene = Scene::new(&recorded.with_gnss(&gnss), settings, belief);
+    let scene = StartSearch::new(&recorded.with_gnss(&gnss), settings, belief);
     let first_s = courses[first].fix.t_s;
     let later = LATER_S
         .iter()
@@ -68,7 +69,7 @@ pub fn coarse(
         times.filter(|t_s| (from_s..to_s).contains(t_s)).count()
     };
     let leaves_most = |t_s: f64| fixes(first_s, t_s) <= fixes(t_s, imu_end_s);
-    let mut best: Option<Candidate> = None;
+    let mut best: Option<StartCandidate> = None;
     let mut tried_s = f64::NEG_INFINITY;
     for at in std::iter::once(first).chain(later) {
         if courses[at].fix.t_s <= tried_s || !leaves_most(courses[at].fix.t_s) {
@@ -102,7 +103,7 @@ pub fn towards(
 ) -> Result<Alignment, Refused> {
     let gnss = settings.kept(recorded.gnss);
     let courses = courses(&gnss, recorded.imu);
-    let scene = Scene::new(&recorded.with_gnss(&gnss), settings, belief);
+    let scene = StartSearch::new(&recorded.with_gnss(&gnss), settings, belief);
     let sigma = heading.sigma.hypot(settings.mounting_sigma_b.z);
     let start_at = |at: usize| {
         let scene = scene.at(&courses[at].fix);
@@ -114,7 +115,7 @@ pub fn towards(
         .find_map(start_at)
         .ok_or_else(|| Refused("no fix with IMU samples around it to level with".to_owned()))?;
     let agreement = scene.agreement(&start, TRIAL_S);
-    Ok(scene.finished(Candidate {
+    Ok(scene.finished(StartCandidate {
         start,
         decided: true,
         agreements: [agreement; 2],
@@ -122,7 +123,7 @@ pub fn towards(
 }
 
 /// A start that was tried on the fixes after it.
-struct Candidate {
+struct StartCandidate {
     start: Start,
     /// True if the opposite heading is refuted.
     decided: bool,
@@ -130,7 +131,7 @@ struct Candidate {
     agreements: [Agreement; 2],
 }
 
-impl Candidate {
+impl StartCandidate {
     fn agrees(&self) -> bool {
         self.agreements.iter().all(Agreement::holds)
     }
@@ -138,7 +139,7 @@ impl Candidate {
 
 /// A recording, and the filter that is tried on it.
 #[derive(Clone, Copy)]
-struct Scene<'a> {
+struct StartSearch<'a> {
     recorded: Recorded<'a>,
     settings: &'a Settings,
     belief: &'a Belief,
@@ -148,7 +149,7 @@ struct Scene<'a> {
     g: f64,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> StartSearch<'a> {
     fn new(recorded: &Recorded<'a>, settings: &'a Settings, belief: &'a Belief) -> Self {
         Self {
             recorded: *recorded,
@@ -167,7 +168,7 @@ impl<'a> Scene<'a> {
 
     /// The starts at a moving fix, the one whose levelling is known best first, in the direction that the fixes
     /// speak for.
-    fn candidates(&self, courses: &[Moving], at: usize) -> Vec<Candidate> {
+    fn candidates(&self, courses: &[MovingFix], at: usize) -> Vec<StartCandidate> {
         let moving = &courses[at];
         // the course is the heading of the vehicle; how the IMU sits in it is not better known than the mounting
         let heading_sigma = moving
@@ -179,9 +180,9 @@ impl<'a> Scene<'a> {
         let [forwards, backwards] =
             headings.map(|yaw| self.in_motion(&courses[at..], yaw, heading_sigma));
         let motion = forwards.zip(backwards).map(|(f, b)| [f, b]);
-        let mut levels: Vec<[Level; 2]> = [rest, motion].into_iter().flatten().collect();
+        let mut levels: Vec<[LevelAngles; 2]> = [rest, motion].into_iter().flatten().collect();
         levels.sort_by(|a, b| a[0].sigma.total_cmp(&b[0].sigma));
-        let tried = |levels: [Level; 2]| {
+        let tried = |levels: [LevelAngles; 2]| {
             self.opposite([0, 1].map(|i| {
                 let heading = (headings[i], heading_sigma);
                 self.start(moving, &levels[i], heading, [false, i == 1])
@@ -193,8 +194,8 @@ impl<'a> Scene<'a> {
     /// The start at a fix; whether its heading is given, and whether it is opposite to the course.
     fn start(
         &self,
-        moving: &Moving,
-        level: &Level,
+        moving: &MovingFix,
+        level: &LevelAngles,
         (yaw, heading_sigma): (f64, f64),
         [is_given, is_reversing]: [bool; 2],
     ) -> Start {
@@ -222,7 +223,7 @@ impl<'a> Scene<'a> {
                 att_sigma_deg: [tilt, tilt, heading],
                 ..InitialSettings::default()
             },
-            found: Some(Found {
+            found: Some(AlignmentSummary {
                 level: level.from,
                 course_sigma_deg: heading,
                 is_given,
@@ -234,7 +235,7 @@ impl<'a> Scene<'a> {
 
     /// The alignment by a candidate. Its heading is widened where it is not the course: wind sets an aircraft off, currents a
     /// boat. The smoother, from all fixes of the first minute, says how far.
-    fn finished(&self, mut candidate: Candidate) -> Alignment {
+    fn finished(&self, mut candidate: StartCandidate) -> Alignment {
         let doubts = candidate.doubts();
         let start = &mut candidate.start;
         let settings = Settings {
@@ -288,7 +289,7 @@ impl<'a> Scene<'a> {
 
     /// Runs the filter from two opposite starts over the first minute, and longer while that does not tell them apart; the
     /// better one.
-    fn opposite(&self, starts: [Start; 2]) -> Candidate {
+    fn opposite(&self, starts: [Start; 2]) -> StartCandidate {
         let begin_s = starts[0].t_s;
         let end_s = self.recorded.gnss.last().map_or(begin_s, |f| f.t_s);
         let mut window_s = TRIAL_S;
@@ -306,7 +307,7 @@ impl<'a> Scene<'a> {
                 // forwards unless that is refuted
                 let better = usize::from(decided && gain > 0.0);
                 let [forwards, backwards] = starts;
-                return Candidate {
+                return StartCandidate {
                     start: if better == 0 { forwards } else { backwards },
                     decided,
                     agreements: [first[better], both[better]],
@@ -317,7 +318,7 @@ impl<'a> Scene<'a> {
     }
 }
 
-impl Candidate {
+impl StartCandidate {
     fn doubts(&self) -> Vec<(VerdictKind, Finding)> {
         let nis_per_component = self.agreements[0].nis;
         let contradicted = Finding::Start { nis_per_component };
@@ -346,8 +347,8 @@ pub(super) fn between(imu: &[ImuIncrement], from: f64, to: f64) -> &[ImuIncremen
     &imu[first..end.max(first)]
 }
 
-/// How far the IMU turns through the samples, from its axes then to those at the start, and the velocity that the
-/// specific force makes, in the axes at the start (m/s).
+/// Attitude of the IMU at the end of the samples with respect to its axes at the start, and the
+/// velocity change by specific force, in the axes at the start (m/s).
 pub(super) fn carried(samples: &[ImuIncrement]) -> (DQuat, DVec3) {
     let (mut q, mut dv) = (DQuat::IDENTITY, DVec3::ZERO);
     for s in samples {
@@ -360,7 +361,8 @@ pub(super) fn carried(samples: &[ImuIncrement]) -> (DQuat, DVec3) {
 
 // The course of the vehicle from GNSS: velocities as measured, or from positions a second or more apart.
 
-/// How far the axis of a vehicle may be from its course on a straight road (rad): slip, mounting.
+/// Largest angle between the axis of a vehicle and its course on a straight road (rad): slip,
+/// mounting.
 const SLIP: f64 = 2.0 * DEG;
 /// Distance from the axle that does not steer to the IMU (m): in a turn the course there leaves the axis.
 const AXLE_M: f64 = 2.0;
@@ -368,28 +370,28 @@ const AXLE_M: f64 = 2.0;
 /// vehicles do, and of what never does, as people, carts and small robots.
 const FAST: (f64, f64) = (3.0, 5.0);
 const SLOW: (f64, f64) = (0.5, 10.0);
-/// What sways to the side at a walk (m/s).
+/// Lateral sway at a walk (m/s).
 const SWAY: f64 = 0.15;
 /// Shortest time from one position to another that gives a velocity, and the longest (s).
 const BASELINE_S: (f64, f64) = (1.0, 3.0);
-/// What a vehicle may accelerate between two positions, of which their mean velocity says nothing (m/s²).
+/// Largest acceleration allowed between two fixes (m/s²).
 const ACCELERATION: f64 = 2.0;
 
-/// How a drive goes.
+/// Carrier of the IMU, by its motion.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Pace {
+pub(super) enum CarrierSpeed {
     Fast,
     Slow,
 }
 
-impl Pace {
+impl CarrierSpeed {
     /// The speed from which a course is a heading, where velocities are known as well as `sigma` (m/s).
-    pub(super) fn needed(self, sigma: f64) -> f64 {
+    pub(super) fn min_heading_speed(self, sigma: f64) -> f64 {
         let (least, sigmas) = if self == Self::Fast { FAST } else { SLOW };
         least.max(sigmas * sigma)
     }
 
-    /// How far the axis is from the course at such a speed (rad).
+    /// Standard deviation of the angle between axis and course at a speed (rad).
     pub(super) fn slip(self, speed: f64) -> f64 {
         if self == Self::Fast {
             SLIP
@@ -400,16 +402,16 @@ impl Pace {
 }
 
 /// A fix with its velocity and the standard deviations of it (m/s).
-pub(super) struct Moving {
+pub(super) struct MovingFix {
     pub fix: GnssFix,
     pub v_n: DVec3,
     pub sigma_n: DVec3,
     /// Half the time between the two positions it comes from: it is as old as that (s); 0 as measured.
     lag_s: f64,
-    pub pace: Pace,
+    pub pace: CarrierSpeed,
 }
 
-impl Moving {
+impl MovingFix {
     pub(super) fn speed(&self) -> f64 {
         self.v_n.truncate().length()
     }
@@ -419,8 +421,8 @@ impl Moving {
     }
 
     /// The speed from which the course of this fix is a heading (m/s).
-    pub(super) fn needed(&self) -> f64 {
-        self.pace.needed(self.sigma())
+    pub(super) fn min_heading_speed(&self) -> f64 {
+        self.pace.min_heading_speed(self.sigma())
     }
 
     /// The direction in which it moves (rad from north).
@@ -446,38 +448,39 @@ impl Moving {
 }
 
 /// The velocities within the IMU recording.
-pub(super) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<Moving> {
+pub(super) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<MovingFix> {
     let first = imu.first().map_or(f64::INFINITY, |s| s.t_s - s.dt_s);
     let last = imu.last().map_or(f64::NEG_INFINITY, |s| s.t_s);
-    let inside = |m: &Moving| m.fix.t_s >= first && m.fix.t_s < last;
+    let inside = |m: &MovingFix| m.fix.t_s >= first && m.fix.t_s < last;
     let velocity = |(i, fix): (usize, &GnssFix)| match fix.velocity {
-        Some(velocity) => Some(Moving {
+        Some(velocity) => Some(MovingFix {
             fix: *fix,
             v_n: velocity.v_n(),
             sigma_n: velocity.sigma_n(),
             lag_s: 0.0,
-            pace: Pace::Fast,
+            pace: CarrierSpeed::Fast,
         }),
         None => {
             let earlier = gnss[..i].partition_point(|f| f.t_s <= fix.t_s - BASELINE_S.0 + 1e-6);
             derived(&gnss[earlier.checked_sub(1)?], fix)
         }
     };
-    let mut all: Vec<Moving> = gnss
+    let mut all: Vec<MovingFix> = gnss
         .iter()
         .enumerate()
         .filter_map(velocity)
         .filter(inside)
         .collect();
     if first_fast(&all, f64::NEG_INFINITY).is_none() {
-        all.iter_mut().for_each(|moving| moving.pace = Pace::Slow);
+        all.iter_mut()
+            .for_each(|moving| moving.pace = CarrierSpeed::Slow);
     }
     all
 }
 
 /// Fixes one after the other that are at least `apart_s` apart, with when their velocities were (s).
-pub(super) fn steps(courses: &[Moving], apart_s: f64) -> Vec<[(&Moving, f64); 2]> {
-    let when = |m: &Moving| m.fix.t_s - m.lag_s;
+pub(super) fn steps(courses: &[MovingFix], apart_s: f64) -> Vec<[(&MovingFix, f64); 2]> {
+    let when = |m: &MovingFix| m.fix.t_s - m.lag_s;
     let mut all = Vec::new();
     let mut first = 0;
     while let Some(from) = courses.get(first) {
@@ -493,19 +496,21 @@ pub(super) fn steps(courses: &[Moving], apart_s: f64) -> Vec<[(&Moving, f64); 2]
 
 /// The first fix from `from_s` on whose course is a heading. One fix alone may be an outlier, and among
 /// thousands at rest one is five standard deviations off: the next must move as well.
-fn first_fast(courses: &[Moving], from_s: f64) -> Option<usize> {
+fn first_fast(courses: &[MovingFix], from_s: f64) -> Option<usize> {
     let fast = |i: usize| {
         let supported = courses
             .get(i + 1)
-            .is_none_or(|next| next.speed() >= 0.6 * next.needed());
-        courses[i].fix.t_s >= from_s && courses[i].speed() >= courses[i].needed() && supported
+            .is_none_or(|next| next.speed() >= 0.6 * next.min_heading_speed());
+        courses[i].fix.t_s >= from_s
+            && courses[i].speed() >= courses[i].min_heading_speed()
+            && supported
     };
     (0..courses.len()).find(|i| fast(*i))
 }
 
 /// The fix that comes nearest to moving fast enough: when (s), its speed and standard deviation (m/s).
-fn nearest_to_fast(courses: &[Moving]) -> Option<(f64, f64, f64)> {
-    let share = |m: &Moving| m.speed() / m.needed();
+fn nearest_to_fast(courses: &[MovingFix]) -> Option<(f64, f64, f64)> {
+    let share = |m: &MovingFix| m.speed() / m.min_heading_speed();
     let nearest = courses
         .iter()
         .max_by(|a, b| share(a).total_cmp(&share(b)))?;
@@ -513,7 +518,7 @@ fn nearest_to_fast(courses: &[Moving]) -> Option<(f64, f64, f64)> {
 }
 
 /// The mean velocity between two fixes; none where they are too far apart in time.
-fn derived(before: &GnssFix, fix: &GnssFix) -> Option<Moving> {
+fn derived(before: &GnssFix, fix: &GnssFix) -> Option<MovingFix> {
     let dt = fix.t_s - before.t_s;
     if dt > BASELINE_S.1 {
         return None;
@@ -522,12 +527,12 @@ fn derived(before: &GnssFix, fix: &GnssFix) -> Option<Moving> {
     let lag_s = 0.5 * dt;
     let variance = (fix.pos_sigma_n.powf(2.0) + before.pos_sigma_n.powf(2.0)) / (dt * dt);
     let sigma_n = (variance + DVec3::splat((ACCELERATION * lag_s).powi(2))).powf(0.5);
-    Some(Moving {
+    Some(MovingFix {
         fix: *fix,
         v_n,
         sigma_n,
         lag_s,
-        pace: Pace::Fast,
+        pace: CarrierSpeed::Fast,
     })
 }
 
@@ -536,20 +541,20 @@ fn derived(before: &GnssFix, fix: &GnssFix) -> Option<Moving> {
 
 /// Lengths of static windows (s). A long one leaves less acceleration that GNSS does not see.
 const STILL_S: [f64; 4] = [2.0, 4.0, 8.0, 16.0];
-/// How long it takes from the first acceleration to a speed that GNSS shows (s).
+/// Time from the first acceleration to a speed that GNSS shows (s).
 const DEPARTURE_S: f64 = 3.0;
-/// How long the gyroscopes carry a levelling on (s).
+/// Longest time over which the gyroscopes propagate a levelling (s).
 const MAX_AGE_S: f64 = 60.0;
 /// Length of the window in motion (s).
 const MOVING_S: f64 = 5.0;
 /// Spread of specific force (m/s²) and mean angular rate (rad/s) above which nothing is static.
 const STILL: (f64, f64) = (0.5, 0.03);
-/// How many times the spread of the quietest window a static one may have: engines idle, roads shake more.
+/// Largest spread of a static window over that of the quietest one: engines idle, roads shake more.
 const QUIET: f64 = 3.0;
 
 /// Roll and pitch at the first moving fix.
 #[derive(Clone, Copy)]
-struct Level {
+struct LevelAngles {
     /// Without yaw.
     angles: RollPitchYaw,
     /// Standard deviation of both (rad).
@@ -558,7 +563,7 @@ struct Level {
 }
 
 /// Statistics of a window in the vehicle's axes.
-struct Window {
+struct StaticWindow {
     end_s: f64,
     seconds: f64,
     /// Mean specific force (m/s²) and angular rate (rad/s).
@@ -568,14 +573,14 @@ struct Window {
     spread: (f64, f64),
 }
 
-fn window(samples: &[ImuIncrement], q_s_b: DQuat) -> Window {
+fn window(samples: &[ImuIncrement], q_s_b: DQuat) -> StaticWindow {
     let (seconds, [f, omega]) = rates(samples);
     let spread = |of: fn(&ImuIncrement) -> DVec3, about: DVec3| {
         mean(samples.iter().map(|s| (of(s) - about).length_squared())).sqrt()
     };
     let spread = (spread(force, f), spread(rate, omega));
     let end_s = samples.last().map_or(f64::NAN, |s| s.t_s);
-    Window {
+    StaticWindow {
         end_s,
         seconds,
         f: q_s_b * f,
@@ -589,7 +594,7 @@ pub fn moves(imu: &[ImuIncrement]) -> bool {
     window(imu, DQuat::IDENTITY).spread.0 >= STILL.0
 }
 
-impl Scene<'_> {
+impl StartSearch<'_> {
     /// The tilt's standard deviation with the biases and a levelling of age `age_s` (rad).
     fn tilt_sigma(&self, age_s: f64, own: f64) -> f64 {
         (self.bias[0] / self.g)
@@ -602,12 +607,12 @@ impl Scene<'_> {
     ///
     /// A window is judged by its own standard deviation: what GNSS lets the vehicle accelerate unseen falls with
     /// its length, the drift of the gyroscopes grows with its age.
-    fn at_rest(&self, before: &[Moving], moving: &Moving) -> Option<Level> {
+    fn at_rest(&self, before: &[MovingFix], moving: &MovingFix) -> Option<LevelAngles> {
         let to_s = moving.fix.t_s;
         let ends = (0..)
             .map(|k| to_s - 0.25 * f64::from(k))
             .take_while(|end| to_s - end <= MAX_AGE_S);
-        let windows: Vec<Window> = ends
+        let windows: Vec<StaticWindow> = ends
             .flat_map(|end| STILL_S.map(|length| self.calm(end, length)))
             .flatten()
             .collect();
@@ -623,7 +628,7 @@ impl Scene<'_> {
     }
 
     /// The window, when the IMU sees nothing happen in it.
-    fn calm(&self, end_s: f64, length_s: f64) -> Option<Window> {
+    fn calm(&self, end_s: f64, length_s: f64) -> Option<StaticWindow> {
         let samples = between(self.recorded.imu, end_s - length_s, end_s);
         let q_s_b = self.settings.q_s_b;
         let (first, second) = samples.split_at(samples.len() / 2);
@@ -644,12 +649,17 @@ impl Scene<'_> {
     }
 
     /// The levelling of a window at the time of the fix, unless GNSS contradicts its standing still.
-    fn carried(&self, w: &Window, before: &[Moving], moving: &Moving) -> Option<Level> {
+    fn carried(
+        &self,
+        w: &StaticWindow,
+        before: &[MovingFix],
+        moving: &MovingFix,
+    ) -> Option<LevelAngles> {
         let (from, departed) = (w.end_s - w.seconds, w.end_s + DEPARTURE_S);
         let age_s = moving.fix.t_s - w.end_s;
         let (q, gained) = self.carry(w, moving.fix.t_s);
         let unseen = if moving.fix.velocity.is_some() {
-            let seen: Vec<&Moving> = before
+            let seen: Vec<&MovingFix> = before
                 .iter()
                 .filter(|m| (from..=departed).contains(&m.fix.t_s))
                 .collect();
@@ -661,7 +671,7 @@ impl Scene<'_> {
             (stays(before, from, departed) && agrees).then(|| moving.sigma() / (age_s * self.g))?
         };
         let own = (w.spread.0 / self.g / 10.0).hypot(unseen);
-        Some(Level {
+        Some(LevelAngles {
             angles: RollPitchYaw::from_quat(q),
             sigma: self.tilt_sigma(age_s, own),
             from: Levelling::AtRest(w.end_s),
@@ -670,7 +680,7 @@ impl Scene<'_> {
 
     /// A levelling at rest carried on with the gyroscopes: the attitude from level axes whose first is the
     /// heading of the body then, and the velocity gained in them.
-    fn carry(&self, w: &Window, to_s: f64) -> (DQuat, DVec3) {
+    fn carry(&self, w: &StaticWindow, to_s: f64) -> (DQuat, DVec3) {
         let mut q = level(w.f, DVec3::Z * -self.g).to_quat();
         let mut gained = DVec3::ZERO;
         for s in between(self.recorded.imu, w.end_s, to_s) {
@@ -682,7 +692,12 @@ impl Scene<'_> {
 
     /// Levelling while it moves: the mean specific force after the fix is the change of the GNSS velocity
     /// less gravity, in the axes of this heading.
-    fn in_motion(&self, after: &[Moving], heading: f64, heading_sigma: f64) -> Option<Level> {
+    fn in_motion(
+        &self,
+        after: &[MovingFix],
+        heading: f64,
+        heading_sigma: f64,
+    ) -> Option<LevelAngles> {
         let from = after.first()?;
         let near = after
             .iter()
@@ -700,7 +715,7 @@ impl Scene<'_> {
         let f_h = DQuat::from_rotation_z(-heading) * (a_n - DVec3::Z * self.g);
         let velocities = from.sigma().hypot(to.sigma()) / (seconds * self.g);
         let own = velocities.hypot(heading_sigma * a_n.truncate().length() / self.g);
-        Some(Level {
+        Some(LevelAngles {
             angles: level(dv / seconds, f_h),
             sigma: self.tilt_sigma(0.5 * seconds, own),
             from: Levelling::InMotion(seconds),
@@ -708,8 +723,8 @@ impl Scene<'_> {
     }
 }
 
-/// Whether velocities are those of rest, each and on average, as far as they are good to.
-fn slow(seen: &[&Moving]) -> bool {
+/// Returns true if velocities are zero to within their standard deviations, each and on average.
+fn slow(seen: &[&MovingFix]) -> bool {
     let n = seen.len() as f64;
     let mean = seen
         .iter()
@@ -718,13 +733,13 @@ fn slow(seen: &[&Moving]) -> bool {
         .length()
         / n;
     let sigma = (seen.iter().map(|m| m.sigma().powi(2)).sum::<f64>()).sqrt() / n;
-    let each = |m: &&Moving| m.speed() < 0.3_f64.max(4.0 * m.sigma());
+    let each = |m: &&MovingFix| m.speed() < 0.3_f64.max(4.0 * m.sigma());
     !seen.is_empty() && seen.iter().all(each) && mean < 0.2_f64.max(4.0 * sigma)
 }
 
-/// Whether the fixes in a stretch of time stay in one place, as far as they are good to: within four
-/// standard deviations of the first.
-fn stays(fixes: &[Moving], from: f64, to: f64) -> bool {
+/// Returns true if the fixes in a stretch of time stay within four standard deviations of the
+/// first.
+fn stays(fixes: &[MovingFix], from: f64, to: f64) -> bool {
     let within: Vec<&GnssFix> = fixes
         .iter()
         .map(|m| &m.fix)
@@ -758,7 +773,7 @@ fn level(f_b: DVec3, f_h: DVec3) -> RollPitchYaw {
 
 // Which of two starts the fixes that follow speak for: the filter is run from both, and its innovations tell.
 
-/// How much of the recording is tried at first (s). Doubled while the two starts are not told apart.
+/// Length of the recording that is tried first (s). Doubled until the two starts are told apart.
 const TRIAL_S: f64 = 60.0;
 /// A heading that the smoother moves by more than so many of its standard deviations is not known as well as it says.
 const MOVED: f64 = 3.0;
@@ -767,7 +782,7 @@ const WIDEST_DEG: f64 = 30.0;
 /// Difference of −2 ln(likelihood) between forwards and backwards from which one is refuted: odds of e^10.
 const DECIDED: f64 = 20.0;
 
-/// How well a start agrees with the fixes after it.
+/// Agreement of a start with the fixes after it.
 #[derive(Clone, Copy)]
 struct Agreement {
     /// −2 ln(likelihood) of the innovations, up to a constant.

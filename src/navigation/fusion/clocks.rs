@@ -3,7 +3,7 @@
 //! The norm of the mean angular rate between two fixes does not depend on how the IMU is mounted, and in a road vehicle it
 //! is the rate of the course. The lag at which the two agree best is the difference of the clocks.
 
-use super::alignment::{Moving, coarse, courses, steps};
+use super::alignment::{MovingFix, coarse, courses, steps};
 use super::{Recorded, Settings, Solution, check_clocks, displaced, fuse};
 use crate::earth::ned_difference;
 use crate::ekf::Belief;
@@ -28,8 +28,8 @@ const MOST: usize = 2000;
 const FEWEST: usize = 30;
 /// Correlation from which the turns are the same ones.
 const SAME: f64 = 0.8;
-/// How much more of the turns must be left unexplained as the clocks are, and the least share that counts: between fixes
-/// the course of a vehicle is not quite its heading.
+/// Factor by which the clocks as given must leave more of the turns unexplained, and the least
+/// share that counts: between fixes the course of a vehicle is not quite its heading.
 const UNEXPLAINED: f64 = 2.0;
 const LEAST: f64 = 0.005;
 
@@ -71,7 +71,7 @@ pub fn clocks_apart(
 /// The lag of the gyroscopes at which the turns are the same ones (s), their correlation there and as the clocks are; by
 /// positions where velocities tell none.
 fn agreement(recorded: &Recorded<'_>, longest_s: f64) -> Option<[f64; 3]> {
-    let turned = Turned::new(recorded.imu);
+    let turned = TurnedAngle::new(recorded.imu);
     let steps = (longest_s / STEP_S) as i32;
     let of_turns = |gnss: &[GnssFix]| {
         let turns = turns(&recorded.with_gnss(gnss));
@@ -105,8 +105,8 @@ fn turns(recorded: &Recorded<'_>) -> Vec<Turn> {
 }
 
 /// The turn between two fixes; none where one of them hardly moves, or too much time is between them.
-fn turn((from, from_s): (&Moving, f64), (to, to_s): (&Moving, f64)) -> Option<Turn> {
-    let is_course = |m: &Moving| m.speed() >= m.needed();
+fn turn((from, from_s): (&MovingFix, f64), (to, to_s): (&MovingFix, f64)) -> Option<Turn> {
+    let is_course = |m: &MovingFix| m.speed() >= m.min_heading_speed();
     let seconds = to_s - from_s;
     let is_one = is_course(from) && is_course(to) && (APART_S.0..=APART_S.1).contains(&seconds);
     // Without its sign: the norm of the angular rate has none.
@@ -116,7 +116,7 @@ fn turn((from, from_s): (&Moving, f64), (to, to_s): (&Moving, f64)) -> Option<Tu
 
 /// Pearson's correlation of the turns with those of the gyroscopes `lag_s` later; none where fewer than half of them
 /// lie in the recording, or hardly any.
-fn correlation(turns: &[Turn], turned: &Turned, lag_s: f64) -> Option<f64> {
+fn correlation(turns: &[Turn], turned: &TurnedAngle, lag_s: f64) -> Option<f64> {
     let rate = |turn: &Turn| {
         // The sum of increments is a rotation only to first order; over seconds of a road turn that is
         // enough.
@@ -139,12 +139,12 @@ fn correlation(turns: &[Turn], turned: &Turned, lag_s: f64) -> Option<f64> {
 }
 
 /// The angle through which the IMU has turned, as the sum of its increments.
-struct Turned {
+struct TurnedAngle {
     times: Vec<f64>,
     angles: Vec<DVec3>,
 }
 
-impl Turned {
+impl TurnedAngle {
     fn new(imu: &[ImuIncrement]) -> Self {
         let mut angle = DVec3::ZERO;
         let add = |sample: &ImuIncrement| {
@@ -248,7 +248,8 @@ pub fn rest_of_origin(recorded: &Recorded<'_>, belief: &Belief, settings: &Setti
     delay_s + rest_s.map_or_else(|| vertex(&all, least), |[rest_s, _]| rest_s)
 }
 
-/// How far behind a step the parabola through it and its neighbours is least (s): a delay that the innovations hardly tell.
+/// Minimum of the parabola through a step and its neighbours (s behind the step): a delay that the
+/// innovations hardly show.
 fn vertex<T>(tried: &[(f64, f64, T)], least: usize) -> f64 {
     let three = least.checked_sub(1).and_then(|k| tried.get(k..k + 3));
     let Some([(_, before, _), (_, at, _), (_, after, _)]) = three else {

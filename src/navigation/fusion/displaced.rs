@@ -19,12 +19,12 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// How far off the filter is run (m; s).
+/// Offsets at which the filter is run (m; s).
 const OFF: [f64; 4] = [0.3, 0.3, 0.3, 0.03];
 /// The antenna's and the delay's among the four.
 pub(super) const ANTENNA: Range<usize> = 0..3;
 pub(super) const DELAY: Range<usize> = 3..4;
-/// How much of a recording is looked at (s).
+/// Longest part of a recording that is used (s).
 const MOST_S: f64 = 1200.0;
 /// Gauss-Newton steps at most, and the share of the NIS that another one must take away: a solution that is far off makes
 /// little of the first.
@@ -36,12 +36,12 @@ const LEFT: f64 = 0.9;
 /// An antenna farther off (m) and a delay longer (s) are none: what is wrong is something else.
 const FARTHEST: (f64, f64) = (10.0, 2.0);
 
-/// What makes the fixes agree with the IMU.
+/// Lever arm and delay at which the fixes agree with the IMU.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Displaced {
     /// Antenna from IMU: front, right, down (m), and standard deviations; none where it is as given.
     pub lever_arm_b: Option<[DVec3; 2]>,
-    /// How long the fixes are late (s), and its standard deviation; none where they are not.
+    /// Delay of the fixes (s), and its standard deviation; none where it is not significant.
     pub delay_s: Option<[f64; 2]>,
     /// Mean NIS per component as it is, and with these.
     pub nis: [f64; 2],
@@ -55,7 +55,7 @@ pub fn displaced(
     settings: &Settings,
 ) -> Option<Displaced> {
     let to_s = start.t_s + MOST_S;
-    let scene = Scene {
+    let scene = OffsetSearch {
         recorded: recorded.until(to_s),
         belief,
         start,
@@ -75,7 +75,7 @@ pub fn displaced(
         }
     };
     let scale = scale(&best);
-    let kept = normal.needed(&x, scale)?;
+    let kept = normal.significant_parts(&x, scale)?;
     let (x, covariance) = normal.without_the_rest(&x, &kept)?;
     // either would do where both are kept for want of one that is needed by itself
     if normal.cost(&x, 0..4)? < COSTLY * scale {
@@ -100,15 +100,15 @@ pub fn displaced(
     })
 }
 
-/// What is run again.
-struct Scene<'a> {
+/// Input of the repeated filter runs.
+struct OffsetSearch<'a> {
     recorded: Recorded<'a>,
     belief: &'a Belief,
     start: &'a Start,
     settings: &'a Settings,
 }
 
-impl Scene<'_> {
+impl OffsetSearch<'_> {
     /// The innovations of each fix that is used, with the antenna and the delay off by `x`.
     fn innovations(&self, x: &Vector4<f64>) -> Option<Vec<Option<FixRecord>>> {
         let gnss = earlier(self.recorded.gnss, x[3]);
@@ -172,7 +172,7 @@ pub(super) struct Normal {
 }
 
 impl Normal {
-    /// What the absence of a part costs in −2 ln(likelihood), the others as good as they can be.
+    /// Increase of −2 ln(likelihood) without a part, the other parts re-estimated.
     pub(super) fn cost(&self, x: &Vector4<f64>, part: Range<usize>) -> Option<f64> {
         let n = part.len();
         let block = self
@@ -184,7 +184,11 @@ impl Normal {
     }
 
     /// The parts that `x` owes its gain to. Costs count `scale` times less.
-    pub(super) fn needed(&self, x: &Vector4<f64>, scale: f64) -> Option<Vec<Range<usize>>> {
+    pub(super) fn significant_parts(
+        &self,
+        x: &Vector4<f64>,
+        scale: f64,
+    ) -> Option<Vec<Range<usize>>> {
         let [antenna, delay] = [self.cost(x, ANTENNA)?, self.cost(x, DELAY)?];
         let limit = COSTLY * scale;
         Some(match (antenna > limit, delay > limit) {
@@ -242,16 +246,16 @@ const APART: f64 = 1.5;
 /// The first component of the position and of the velocity.
 const PARTS: [usize; 2] = [0, 3];
 
-/// How long the errors of a receiver's fixes last.
+/// Correlation time of the errors of a receiver's fixes.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Correlation {
-    /// As the innovations show.
+    /// Estimated from the innovations.
     #[default]
     Auto,
     /// No longer than one fix.
     None,
-    /// Those of positions so many seconds, those of velocities no longer than one fix.
+    /// This many seconds for positions; velocities are uncorrelated.
     Seconds(f64),
 }
 
@@ -260,7 +264,8 @@ pub enum Correlation {
 pub struct Whiteness {
     /// Autocorrelation at lag 1: 0 if right.
     pub lag_1: f64,
-    /// What white innovations exceed once in a thousand recordings, or what is worth a word.
+    /// Limit that white innovations exceed once in a thousand recordings, or the smallest relevant
+    /// value.
     pub limit: f64,
 }
 
@@ -292,7 +297,7 @@ impl Whiteness {
         Self::of_series(&all)
     }
 
-    /// Of times and normalised innovations.
+    /// Autocorrelation of a series of times and normalised innovations.
     pub(super) fn of_series(series: &[(f64, impl AsRef<[f64]>)]) -> Option<Self> {
         let interval_s = median(series.windows(2).map(|w| w[1].0 - w[0].0))?;
         let neighbours = series
@@ -313,7 +318,7 @@ impl Whiteness {
         })
     }
 
-    /// Whether the innovations are correlated.
+    /// Returns true if the innovations are correlated.
     pub fn is_correlated(&self) -> bool {
         self.lag_1 > self.limit
     }
@@ -321,8 +326,8 @@ impl Whiteness {
 
 /// A solution and the fixes that it believes.
 #[derive(Debug, Clone)]
-pub struct Weighed {
-    /// What came out.
+pub struct WeightedSolution {
+    /// The solution.
     pub solution: Solution,
     /// The solution with standard deviations as stated, where they are not.
     pub as_stated: Option<Solution>,
@@ -332,9 +337,9 @@ pub struct Weighed {
     pub sigma_factors: [f64; 2],
 }
 
-impl Weighed {
+impl WeightedSolution {
     /// The solution whose innovations tell what the fixes are worth.
-    pub fn judged(&self) -> &Solution {
+    pub fn with_stated_sigmas(&self) -> &Solution {
         self.as_stated.as_ref().unwrap_or(&self.solution)
     }
 
@@ -356,7 +361,7 @@ pub fn fuse_correlated(
     start: &Start,
     settings: &Settings,
     (reference, correlation): (Option<&Reference>, Correlation),
-) -> Result<Weighed, FusionError> {
+) -> Result<WeightedSolution, FusionError> {
     let ungated = Settings {
         gate: None,
         ..settings.clone()
@@ -399,7 +404,7 @@ pub fn fuse_correlated(
             (solution, Some(stated))
         }
     };
-    Ok(Weighed {
+    Ok(WeightedSolution {
         solution,
         as_stated,
         whiteness,

@@ -81,7 +81,7 @@ pub struct FoundOffset {
 /// Errors that are no fault of a filter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(tag = "doubt", rename_all = "snake_case")]
-pub enum Doubt {
+pub enum SetupFault {
     /// Both are so far apart all the time (m).
     Apart {
         /// Median horizontal distance (m).
@@ -122,7 +122,7 @@ pub struct Judgement {
     /// The same without the offset that was found.
     pub without_offset: Option<DriveVerdict>,
     /// Other explanations of the errors.
-    pub doubts: Vec<Doubt>,
+    pub doubts: Vec<SetupFault>,
     /// Another clock or point of the reference that was found, also where it explains little.
     pub offset: Option<FoundOffset>,
     /// Root mean square errors; NaN where not known.
@@ -192,7 +192,7 @@ pub fn judge(
             _ => true,
         };
         match matters {
-            true => doubts.push(Doubt::Offset(found)),
+            true => doubts.push(SetupFault::Offset(found)),
             false => without_offset = None,
         }
     }
@@ -203,7 +203,7 @@ pub fn judge(
     let left = without_offset.as_ref().map(|w| w.verdict.kind);
     let kind = match (doubts.as_slice(), left) {
         ([], _) => own,
-        ([Doubt::Offset(_)], Some(left)) if left > VerdictKind::Undecided => left,
+        ([SetupFault::Offset(_)], Some(left)) if left > VerdictKind::Undecided => left,
         _ => VerdictKind::Doubtful,
     };
     let horizontal_max_m = errors
@@ -338,11 +338,11 @@ fn doubts(
     reference: &Reference,
     given: ReferenceOffset,
     errors: &[StatedErrors],
-) -> Vec<Doubt> {
+) -> Vec<SetupFault> {
     let mut found = Vec::new();
     let metres = median(errors.iter().map(|e| horizontal(&e.values))).unwrap_or(0.0);
     if metres > APART_M {
-        found.push(Doubt::Apart { metres });
+        found.push(SetupFault::Apart { metres });
     }
     let down = || errors.iter().map(|e| e.values[2]);
     let middle = median(down()).unwrap_or(0.0);
@@ -350,7 +350,7 @@ fn doubts(
     let sigma = median(errors.iter().map(|e| e.sigma[2]).filter(|s| s.is_finite()));
     let scatter = scatter.max(sigma.unwrap_or(0.0));
     if middle.abs() > HEIGHT.0.max(HEIGHT.1 * scatter) {
-        found.push(Doubt::Height { metres: -middle });
+        found.push(SetupFault::Height { metres: -middle });
     }
     found.extend(turned_axes(rows, reference, given));
     found
@@ -453,8 +453,8 @@ fn transformed(
     reference: &Reference,
     given: ReferenceOffset,
     stated: &DriveVerdict,
-    doubts: &[Doubt],
-) -> Vec<(usize, Doubt)> {
+    doubts: &[SetupFault],
+) -> Vec<(usize, SetupFault)> {
     if stated.verdict.kind <= VerdictKind::Undecided {
         return Vec::new();
     }
@@ -463,7 +463,7 @@ fn transformed(
         mean(known.map(|r| r * r)).sqrt()
     };
     let plain = |block: usize| &stated.error_over_sigma.0[3 * block..3 * block + 3];
-    let are_axes_others = doubts.iter().any(|d| matches!(d, Doubt::Axes { .. }));
+    let are_axes_others = doubts.iter().any(|d| matches!(d, SetupFault::Axes { .. }));
     let looks: Vec<&StatedRow> = rows.iter().step_by(rows.len().div_ceil(FITTED)).collect();
     let try_one = |t: &Transformation| {
         let [far, spread] = departures(plain(t.block))?;
@@ -482,7 +482,7 @@ fn transformed(
         let [left, uneven] = departures(&after)?;
         let is_cause = far > FAR.ln() + 3.0 * left;
         let is_shape = !t.is_uneven || spread > FAR.ln() / 2.0 + 2.0 * uneven;
-        let doubt = Doubt::Transformed {
+        let doubt = SetupFault::Transformed {
             cause: t.cause,
             times: rms(plain(t.block)),
             left: rms(&after),
@@ -494,7 +494,7 @@ fn transformed(
         let found = own.filter_map(try_one);
         found.min_by(|a, b| a.0.total_cmp(&b.0))
     };
-    let found: Vec<Option<(f64, Doubt)>> = (0..3).map(best).collect();
+    let found: Vec<Option<(f64, SetupFault)>> = (0..3).map(best).collect();
     let is_right = |block: usize| {
         let off = departures(plain(block));
         found[block].is_some() || off.is_none_or(|[far, _]| far < OTHERS.ln())
@@ -509,7 +509,11 @@ fn transformed(
 
 /// Axes of the body, or of navigation, that are others than the reference's: turned by quarters of a circle about them, all the
 /// time. Any other angle is an error.
-fn turned_axes(rows: &[StatedRow], reference: &Reference, given: ReferenceOffset) -> Option<Doubt> {
+fn turned_axes(
+    rows: &[StatedRow],
+    reference: &Reference,
+    given: ReferenceOffset,
+) -> Option<SetupFault> {
     let pairs: Vec<(DQuat, DQuat)> = rows
         .iter()
         .filter(|row| row.has[1])
@@ -524,7 +528,7 @@ fn turned_axes(rows: &[StatedRow], reference: &Reference, given: ReferenceOffset
     let turned = turned.or_else(|| Some((quarter_turns(of_navigation.collect())?, "navigation")));
     turned.map(|(q, axes)| {
         let rpy = RollPitchYaw::from_quat(q);
-        Doubt::Axes {
+        SetupFault::Axes {
             axes,
             angles_deg: [rpy.roll, rpy.pitch, rpy.yaw].map(|a| a / DEG),
         }
@@ -588,7 +592,7 @@ fn found_offset(
             if normal.cost(&off, 0..4)? < COSTLY {
                 return None;
             }
-            let needed = normal.needed(&off, COSTLY / 20.0)?;
+            let needed = normal.significant_parts(&off, COSTLY / 20.0)?;
             [needed.contains(&DELAY), needed.contains(&ANTENNA)]
         }
     };

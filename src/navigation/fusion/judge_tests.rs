@@ -1,13 +1,15 @@
 use super::*;
 use crate::earth::moved;
 use crate::rng::StreamKey;
-use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start, Turning};
+use crate::trajectory::profile::{
+    Bank, Length, Profile, ProfileStart, Segment, SegmentKind, Turning,
+};
 use crate::trajectory::{Trajectory, TrajectorySample};
 use rand_distr::{Distribution, StandardNormal};
 
 /// Figures of eight for 800 s at 12 m/s.
 fn drive() -> Trajectory {
-    let start = Start {
+    let start = ProfileStart {
         t_s: 0.0,
         lat: 0.8,
         lon: 0.2,
@@ -21,12 +23,12 @@ fn drive() -> Trajectory {
         ramp_s: None,
     };
     let turn = |degrees: f64| {
-        segment(Kind::Turn {
+        segment(SegmentKind::Turn {
             angle: degrees * DEG,
             by: Turning::Duration(30.0),
         })
     };
-    let straight = || segment(Kind::Straight(Length::Duration(10.0)));
+    let straight = || segment(SegmentKind::Straight(Length::Duration(10.0)));
     let segments = (0..10).flat_map(|_| [turn(270.0), straight(), turn(-270.0), straight()]);
     let profile = Profile {
         start,
@@ -137,7 +139,7 @@ fn another_clock_and_another_point_are_found() {
             .collect();
         for (k, rows) in [early, ahead].iter().enumerate() {
             let judgement = judged(rows, &reference);
-            let [Doubt::Offset(found)] = judgement.doubts[..] else {
+            let [SetupFault::Offset(found)] = judgement.doubts[..] else {
                 panic!("{:?}", judgement.doubts)
             };
             let (off, sigma) = (found.offset, found.sigma);
@@ -222,7 +224,7 @@ fn simple_transformations_are_named() {
     for (cause, change) in cases {
         let judgement = changed(1.0, change);
         let [
-            Doubt::Transformed {
+            SetupFault::Transformed {
                 cause: found, left, ..
             },
         ] = judgement.doubts[..]
@@ -243,7 +245,7 @@ fn simple_transformations_are_named() {
         );
         for block in 0..3 {
             let judgement = changed(1.0, &|row| sigmas(row, block, &|s| s / scale));
-            let is_named = |d: &Doubt| matches!(d, Doubt::Transformed { .. });
+            let is_named = |d: &SetupFault| matches!(d, SetupFault::Transformed { .. });
             assert!(
                 !judgement.doubts.iter().any(is_named),
                 "{scale}, {block}: {:?}",
@@ -316,13 +318,15 @@ fn frames_and_units_are_named() {
     assert!(
         high.doubts
             .iter()
-            .any(|d| matches!(d, Doubt::Height { metres } if (metres - 47.0).abs() < 1.0)),
+            .any(|d| matches!(d, SetupFault::Height { metres } if (metres - 47.0).abs() < 1.0)),
         "{:?}",
         high.doubts
     );
     let flu = changed(&|row| row.state.q_b_n *= DQuat::from_rotation_x(180.0 * DEG));
     assert!(
-        flu.doubts.iter().any(|d| matches!(d, Doubt::Axes { .. })),
+        flu.doubts
+            .iter()
+            .any(|d| matches!(d, SetupFault::Axes { .. })),
         "{:?}",
         flu.doubts
     );
@@ -335,7 +339,7 @@ fn frames_and_units_are_named() {
         radians
             .doubts
             .iter()
-            .any(|d| matches!(d, Doubt::Transformed { .. })),
+            .any(|d| matches!(d, SetupFault::Transformed { .. })),
         "{:?}",
         radians.doubts
     );

@@ -61,12 +61,12 @@ mod withheld;
 
 pub use clocks::{ClocksApart, clocks_apart, earlier, rest_of_origin, rough_origin};
 pub use displaced::{
-    Correlation, Displaced, Weighed, Whiteness, displaced, fuse_correlated, interval_s,
+    Correlation, Displaced, WeightedSolution, Whiteness, displaced, fuse_correlated, interval_s,
 };
 pub use gate::GATE_LEVEL;
 pub use outcome::{
-    Assessment, Drift, Ends, Finding, FixCounts, FromReference, FusionError, OutageDrift, Outcome,
-    Outliers, SmoothedOutage, SmoothedOutcome, assess, outcome,
+    EndError, Finding, FixCounts, FromReference, FusionAssessment, FusionError, FusionFigures,
+    OutageDrift, OutageEnds, Outliers, SmoothedOutage, SmoothedOutcome, assess, outcome,
 };
 pub use run::{LONGEST_GAP_S, bridged, fuse};
 pub use vehicle::{
@@ -93,14 +93,14 @@ fn horizontal(values: &Nine) -> f64 {
     values[0].hypot(values[1])
 }
 
-/// What was recorded, each in order of time.
+/// Recorded measurements, each in order of time.
 #[derive(Debug, Clone, Copy)]
 pub struct Recorded<'a> {
     /// Samples whose intervals follow one another.
     pub imu: &'a [ImuIncrement],
     /// Fixes.
     pub gnss: &'a [GnssFix],
-    /// What the vehicle knows of its own velocity.
+    /// Velocity constraints and odometer speeds of the vehicle.
     pub aids: &'a [VehicleVelocity],
 }
 
@@ -143,13 +143,14 @@ fn kept(gnss: &[GnssFix], outages: &[Outage]) -> Vec<GnssFix> {
     gnss.iter().filter(is_kept).copied().collect()
 }
 
-/// How it is fused.
+/// Settings of a fusion.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Settings {
     /// The IMU in the vehicle: takes the IMU's axes, returns front, right, down.
     #[serde(rename = "imu_to_vehicle_xyzw")]
     pub q_s_b: DQuat,
-    /// How well that is known about the vehicle's front, right and down axes (rad): 0 as given.
+    /// Standard deviation of the mounting about the vehicle's front, right and down axes (rad): 0
+    /// for an exact one.
     #[serde(rename = "mounting_sigma_rad")]
     pub mounting_sigma_b: DVec3,
     /// Antenna from IMU: front, right, down (m).
@@ -163,21 +164,21 @@ pub struct Settings {
     pub gate: Option<f64>,
     /// Rows of the solution a second.
     pub rows_hz: f64,
-    /// Whether every row is estimated a second time, from what was recorded before and after it.
+    /// True if a smoother estimates every row from the measurements before and after it.
     pub smooth: bool,
 }
 
-/// Where the filter starts.
+/// Initial state of the filter.
 #[derive(Debug, Clone)]
 pub struct Start {
     /// When (s).
     pub t_s: f64,
     /// Position of the IMU, velocity, attitude of the vehicle.
     pub state: NavState,
-    /// How well they are known.
+    /// Standard deviations of the state.
     pub sigma: InitialSettings,
-    /// How they were found; none where they were given.
-    pub found: Option<Found>,
+    /// Method of the alignment; none where the state was given.
+    pub found: Option<AlignmentSummary>,
 }
 
 /// Heading at the start that is given.
@@ -191,19 +192,19 @@ pub struct Heading {
     pub sigma: f64,
 }
 
-/// How [`alignment::coarse`] found a start.
+/// Result of [`alignment::coarse`] beside the state.
 #[derive(Debug, Clone, Copy)]
-pub struct Found {
-    /// Where roll and pitch come from.
+pub struct AlignmentSummary {
+    /// Source of roll and pitch.
     pub level: Levelling,
     /// Standard deviation of the course as a heading, or of the heading that was given (degrees).
     pub course_sigma_deg: f64,
-    /// Whether the heading was given.
+    /// True if the heading was given.
     pub is_given: bool,
-    /// Whether the vehicle goes backwards along its course.
+    /// True if the vehicle goes backwards along its course.
     pub is_reversing: bool,
-    /// How far the fixes of the next minute move the heading from the course (degrees), where that is more than three
-    /// standard deviations: wind, slip.
+    /// Change of the heading from the course by the fixes of the next minute (degrees), where it
+    /// exceeds three standard deviations: wind, slip.
     pub moved_deg: Option<f64>,
 }
 
@@ -240,7 +241,7 @@ pub struct RowError {
     pub values: Nine,
     /// Standard deviations of these, by the filter and the reference's velocity together.
     pub sigma: Nine,
-    /// How well the velocity of the reference is known (m/s).
+    /// Standard deviation of the reference's velocity (m/s).
     pub velocity_sigma: f64,
     /// Normalised by the covariance of the nine, of which these are the roots of the diagonal: its mean is 9 if both
     /// are right.
@@ -252,7 +253,7 @@ pub struct RowError {
 pub struct FixRecord {
     /// Time (s).
     pub t_s: f64,
-    /// Whether it was used; in an outage it is not, nor is an outlier.
+    /// True if it was used: not in an outage, and not if it is an outlier.
     pub used: bool,
     /// The bound of the NIS, of an outlier that was rejected.
     pub rejected_above: Option<f64>,
@@ -270,7 +271,7 @@ pub struct FixRecord {
     pub error: Option<Nine>,
 }
 
-/// What came out.
+/// Solution of a fusion.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Solution {
     /// States at `rows_hz`.

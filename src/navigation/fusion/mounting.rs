@@ -1,12 +1,14 @@
-//! How the IMU sits in a road vehicle, found from the drive itself.
+//! Mounting angles of the IMU in a road vehicle, estimated from the drive itself.
 //!
-//! The vehicle is taken to move along its x axis, forwards for the most part, without slip and without bank on
-//! average. First the specific force is compared with what the change of the GNSS velocity says it is along the track
-//! (`track`): gravity gives roll and pitch, accelerations and turns the yaw. Then the filter of the fusion
-//! carries the attitude of the IMU through the whole drive, its biases estimated, and the mounting is the mean
-//! rotation from it to the track (`refined`).
+//! The vehicle is assumed to move along its x axis, forwards for the most part, without slip and
+//! without bank on average. First the specific force is compared with the change of the GNSS
+//! velocity along the track (`track`): gravity gives roll and pitch; accelerations and turns give
+//! the yaw. Then the fusion filter propagates the attitude of the IMU through the whole drive with
+//! its biases estimated, and the mounting is the mean rotation from it to the track (`refined`).
 
-use super::alignment::{Alignment, Moving, Pace, between, carried, coarse, courses, steps};
+use super::alignment::{
+    Alignment, CarrierSpeed, MovingFix, between, carried, coarse, courses, steps,
+};
 use super::outcome::{is_contradicted, nis_per_component};
 use super::{Recorded, Row, Settings, fuse};
 use crate::earth::gravity_down;
@@ -31,7 +33,7 @@ pub struct Mounting {
     pub sigma_b: DVec3,
     /// Distance driven with a known course (m).
     pub way_m: f64,
-    /// How many times the stated standard deviations of the fixes it was found with.
+    /// Factor on the stated standard deviations of the fixes with which it was found.
     pub sigma_factor: f64,
 }
 
@@ -125,13 +127,13 @@ const FEWEST: usize = 6;
 
 /// Sums over blocks of time.
 #[derive(Default)]
-struct Blocks {
+struct BlockSums {
     /// Number of the block, and the sum in it.
     sums: Vec<(i64, f64)>,
     weight: f64,
 }
 
-impl Blocks {
+impl BlockSums {
     /// Adds `value` of weight `weight` at a time, times in order.
     fn add(&mut self, t_s: f64, value: f64, weight: f64) {
         let block = (t_s / BLOCK_S).floor() as i64;
@@ -172,17 +174,18 @@ impl Blocks {
 const ROWS_HZ: f64 = 2.0;
 /// Banks and slopes of roads beside those of the track, at a time (rad).
 const AT_A_TIME: DVec3 = DVec3::new(2.0 * DEG, 1.0 * DEG, 0.0);
-/// What a body leans and nods under an acceleration (rad per m/s²), and how far the IMU is from the axle that does not
-/// steer (m): in a turn the course there leaves the axis.
+/// Roll and pitch of a body under an acceleration (rad per m/s²), and the distance of the IMU from
+/// the axle that does not steer (m): in a turn the course there leaves the axis.
 const LEAN: f64 = 1.0 * DEG;
 const AXLE_M: f64 = 2.0;
-/// What no drive shows (rad). Roads fall to the side by 2 to 2.5 % (1.1 to 1.4°), always to the same one for who keeps to it;
-/// loads tilt a body; a vehicle does not run quite along its axis.
+/// Systematic part that no drive shows (rad). Roads fall to the side by 2 to 2.5 % (1.1 to 1.4°),
+/// to the same side wherever traffic keeps to one; loads tilt a body; a vehicle does not run quite
+/// along its axis.
 const UNSEEN: DVec3 = DVec3::new(1.5 * DEG, 0.5 * DEG, 0.3 * DEG);
-/// How many times the standard deviation of the rough yaw the filter begins with: its own, from the same data, is hardly
-/// counted twice then.
+/// Factor on the standard deviation of the rough yaw for the filter's start: the filter uses the
+/// same data, which are hardly counted twice then.
 const LOOSE: f64 = 3.0;
-/// How many standard deviations the yaw of the filter may be from the rough one.
+/// Largest difference between the filter's yaw and the rough one, in standard deviations.
 const APART: f64 = 4.0;
 /// Banks of roads and leaning bodies are less than this, root mean square (rad).
 const BANKED: f64 = 8.0 * DEG;
@@ -205,7 +208,7 @@ fn agreeing(mean: DQuat, sigma: f64) -> Result<(), Refused> {
 }
 
 /// An instant in motion.
-struct Moment {
+struct MotionSample {
     t_s: f64,
     /// Takes the axes of the vehicle as it was mounted so far to those of the track.
     q: DQuat,
@@ -243,8 +246,8 @@ fn through(
     }
     let pace = courses(recorded.gnss, recorded.imu)
         .first()
-        .map_or(Pace::Fast, |moving| moving.pace);
-    let mut moments: Vec<Moment> = solution
+        .map_or(CarrierSpeed::Fast, |moving| moving.pace);
+    let mut moments: Vec<MotionSample> = solution
         .rows
         .windows(3)
         .filter_map(|w| moment([&w[0], &w[1], &w[2]], pace))
@@ -258,7 +261,7 @@ fn through(
     }
     // Three parts: what scatters over the drive, what the filter itself is wrong by all along, and what no
     // drive shows.
-    let scatter = DVec3::from_array(blocks.each_ref().map(Blocks::sigma));
+    let scatter = DVec3::from_array(blocks.each_ref().map(BlockSums::sigma));
     let sigma_b = (scatter.powf(2.0) + of_filter(&moments).powf(2.0) + UNSEEN.powf(2.0)).powf(0.5);
     agreeing(mean, rough.1.hypot(sigma_b.z))?;
     let q_s_b = (mean * rough.0).normalize();
@@ -272,10 +275,10 @@ fn through(
 }
 
 /// The vehicle beside its track at a row that moves fast enough for a course.
-fn moment([before, row, after]: [&Row; 3], pace: Pace) -> Option<Moment> {
+fn moment([before, row, after]: [&Row; 3], pace: CarrierSpeed) -> Option<MotionSample> {
     let (v_n, speed) = (row.state.v_n, row.state.v_n.truncate().length());
     let of_velocity = row.sigma[3].max(row.sigma[4]);
-    if speed < pace.needed(of_velocity) {
+    if speed < pace.min_heading_speed(of_velocity) {
         return None;
     }
     let seconds = after.t_s - before.t_s;
@@ -293,7 +296,7 @@ fn moment([before, row, after]: [&Row; 3], pace: Pace) -> Option<Moment> {
     let others = DVec3::new(lean, lean.hypot(row.sigma[5] / speed), slip);
     let q = track_attitude(v_n, row.sigma[5]).inverse() * row.state.q_b_n;
     let sigma = (of_filter.powf(2.0) + AT_A_TIME.powf(2.0) + others.powf(2.0)).powf(0.5);
-    Some(Moment {
+    Some(MotionSample {
         t_s: row.t_s,
         q,
         sigma,
@@ -302,11 +305,13 @@ fn moment([before, row, after]: [&Row; 3], pace: Pace) -> Option<Moment> {
     })
 }
 
-/// Where the vehicle goes backwards its front is behind the track's. More of the way is forwards.
-fn turn_to_front(moments: &mut [Moment]) -> Result<(), Refused> {
-    let is_against = |m: &Moment| (m.q * DVec3::X).x < 0.0;
-    let way =
-        |of: &dyn Fn(&&Moment) -> bool| moments.iter().filter(of).map(|m| m.way_m).sum::<f64>();
+/// Turns the track around where the vehicle goes backwards. Most of the way is assumed to be
+/// forwards.
+fn turn_to_front(moments: &mut [MotionSample]) -> Result<(), Refused> {
+    let is_against = |m: &MotionSample| (m.q * DVec3::X).x < 0.0;
+    let way = |of: &dyn Fn(&&MotionSample) -> bool| {
+        moments.iter().filter(of).map(|m| m.way_m).sum::<f64>()
+    };
     let (against, all) = (way(&|m| is_against(m)), way(&|_| true));
     let share = against.min(all - against) / all;
     if share > UNDECIDED {
@@ -325,18 +330,19 @@ fn turn_to_front(moments: &mut [Moment]) -> Result<(), Refused> {
 }
 
 /// The rotation about which the moments deviate by nothing on average.
-fn mean(moments: &[Moment]) -> DQuat {
+fn mean(moments: &[MotionSample]) -> DQuat {
     let mut mean = moments.first().map_or(DQuat::IDENTITY, |m| m.q);
     // each step takes the curvature of rotations anew; five are enough from anywhere
     for _ in 0..5 {
-        let step = DVec3::from_array(deviations(moments, mean).each_ref().map(Blocks::mean));
+        let step = DVec3::from_array(deviations(moments, mean).each_ref().map(BlockSums::mean));
         mean = (DQuat::from_scaled_axis(step) * mean).normalize();
     }
     mean
 }
 
-/// What banks into its turns is an aircraft, whose way says little of its attitude.
-fn upright(moments: &[Moment], mean: DQuat) -> Result<(), Refused> {
+/// Refuses a carrier that banks into its turns: an aircraft, whose track says little of its
+/// attitude.
+fn upright(moments: &[MotionSample], mean: DQuat) -> Result<(), Refused> {
     let square = moments
         .iter()
         .map(|m| deviation(m, mean).x.powi(2))
@@ -354,14 +360,14 @@ fn upright(moments: &[Moment], mean: DQuat) -> Result<(), Refused> {
 }
 
 /// The deviation of a moment from a rotation, about the track's axes (rad).
-fn deviation(moment: &Moment, mean: DQuat) -> DVec3 {
+fn deviation(moment: &MotionSample, mean: DQuat) -> DVec3 {
     let q = moment.q * mean.inverse();
     (if q.w < 0.0 { -q } else { q }).to_scaled_axis()
 }
 
 /// The deviations of all, in blocks.
-fn deviations(moments: &[Moment], mean: DQuat) -> [Blocks; 3] {
-    let mut blocks: [Blocks; 3] = std::array::from_fn(|_| Blocks::default());
+fn deviations(moments: &[MotionSample], mean: DQuat) -> [BlockSums; 3] {
+    let mut blocks: [BlockSums; 3] = std::array::from_fn(|_| BlockSums::default());
     for m in moments {
         let deviation = deviation(m, mean).to_array();
         for (i, sum) in blocks.iter_mut().enumerate() {
@@ -372,7 +378,7 @@ fn deviations(moments: &[Moment], mean: DQuat) -> [Blocks; 3] {
 }
 
 /// The filter's own standard deviations on average: its errors last, and are not less for being looked at often.
-fn of_filter(moments: &[Moment]) -> DVec3 {
+fn of_filter(moments: &[MotionSample]) -> DVec3 {
     let weights: DVec3 = moments.iter().map(|m| m.sigma.powf(-2.0)).sum();
     let sums: DVec3 = moments
         .iter()
@@ -388,7 +394,8 @@ fn of_filter(moments: &[Moment]) -> DVec3 {
 
 /// Times between two velocities whose difference is an acceleration (s).
 const APART_S: (f64, f64) = (0.9, 5.0);
-/// What the accelerations of a vehicle differ from those of its antenna by (m/s²): sway, vibrations, the arm between.
+/// Standard deviation of a vehicle's acceleration from that of its antenna (m/s²): sway, vibration,
+/// lever arm.
 const SWAY: f64 = 0.5;
 /// Slopes of roads (rad): vertical velocities that are worse than this are not believed.
 const SLOPE: f64 = 3.0 * DEG;
@@ -396,7 +403,7 @@ const SLOPE: f64 = 3.0 * DEG;
 const ROUGH: f64 = 20.0 * DEG;
 
 /// A stretch between two velocities.
-struct Stretch {
+struct VelocityChange {
     t_s: f64,
     /// Mean specific force in the axes of the IMU and along the track, in the middle of the stretch (m/s²).
     f_s: DVec3,
@@ -416,7 +423,7 @@ fn track_attitude(v_n: DVec3, sigma_down: f64) -> DQuat {
 /// The rotation from the IMU to the track, and the standard deviation of its yaw (rad).
 fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), Refused> {
     let stretches = stretches(recorded, settings);
-    let mut seen = Blocks::default();
+    let mut seen = BlockSums::default();
     stretches.iter().for_each(|s| seen.add(s.t_s, 0.0, 1.0));
     if seen.count() < FEWEST {
         // the sum of nothing is -0
@@ -427,7 +434,7 @@ fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), R
         return Err(too_slow(seconds));
     }
     let weights: f64 = stretches.iter().map(|s| s.weight).sum();
-    let mean = |of: fn(&Stretch) -> DVec3| {
+    let mean = |of: fn(&VelocityChange) -> DVec3| {
         stretches.iter().map(|s| of(s) * s.weight).sum::<DVec3>() / weights
     };
     let (mean_s, mean_track) = (mean(|s| s.f_s), mean(|s| s.f_track));
@@ -435,7 +442,7 @@ fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), R
     let level = DQuat::from_rotation_arc(mean_s.normalize(), mean_track.normalize());
     let up = mean_track.normalize();
     // less their means, so that neither a bias of the accelerometers nor a tilt counts as acceleration
-    let pair = |s: &Stretch| (level * (s.f_s - mean_s), s.f_track - mean_track);
+    let pair = |s: &VelocityChange| (level * (s.f_s - mean_s), s.f_track - mean_track);
     // Wahba's problem about one axis: both vectors projected across `up`, sums of their sine and cosine.
     let torque = |u: DVec3, w: DVec3| up.dot(u.cross(w));
     let held = |u: DVec3, w: DVec3| u.dot(w) - up.dot(u) * up.dot(w);
@@ -448,7 +455,7 @@ fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), R
     };
     let none = DQuat::IDENTITY;
     let turn = DQuat::from_axis_angle(up, sum(none, &torque).atan2(sum(none, &held)));
-    let mut torques = Blocks::default();
+    let mut torques = BlockSums::default();
     for s in &stretches {
         let (u, w) = pair(s);
         torques.add(s.t_s, torque(turn * u, w), s.weight);
@@ -465,10 +472,10 @@ fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), R
 }
 
 /// The stretches between fixes that have a course.
-fn stretches(recorded: &Recorded<'_>, settings: &Settings) -> Vec<Stretch> {
-    let courses: Vec<Moving> = courses(recorded.gnss, recorded.imu)
+fn stretches(recorded: &Recorded<'_>, settings: &Settings) -> Vec<VelocityChange> {
+    let courses: Vec<MovingFix> = courses(recorded.gnss, recorded.imu)
         .into_iter()
-        .filter(|m| m.speed() >= m.needed())
+        .filter(|m| m.speed() >= m.min_heading_speed())
         .collect();
     let steps = steps(&courses, APART_S.0);
     steps
@@ -480,9 +487,9 @@ fn stretches(recorded: &Recorded<'_>, settings: &Settings) -> Vec<Stretch> {
 fn stretch(
     recorded: &Recorded<'_>,
     settings: &Settings,
-    (from, from_s): (&Moving, f64),
-    (to, to_s): (&Moving, f64),
-) -> Option<Stretch> {
+    (from, from_s): (&MovingFix, f64),
+    (to, to_s): (&MovingFix, f64),
+) -> Option<VelocityChange> {
     let seconds = to_s - from_s;
     let samples = between(recorded.imu, from_s, to_s);
     if !(APART_S.0..=APART_S.1).contains(&seconds) || samples.is_empty() {
@@ -499,7 +506,7 @@ fn stretch(
     let sigma_down = from.sigma_n.z.hypot(to.sigma_n.z) / 2.0;
     let to_track = track_attitude((from.v_n + to.v_n) / 2.0, sigma_down).inverse();
     let sigma = from.sigma().hypot(to.sigma()) / seconds;
-    Some(Stretch {
+    Some(VelocityChange {
         t_s: (from_s + to_s) / 2.0,
         f_s: to_middle * dv / covered,
         f_track: to_track * f_n,
@@ -514,7 +521,7 @@ mod blocks_tests {
     /// Of 400 values of ±1, neighbours as often alike as not, the mean has the standard deviation 1/√400.
     #[test]
     fn the_scatter_of_blocks_is_that_of_their_mean() {
-        let mut blocks = Blocks::default();
+        let mut blocks = BlockSums::default();
         for k in 0..400 {
             let value = if k % 4 < 2 { 1.0 } else { -1.0 };
             (0..10).for_each(|i| {
@@ -529,7 +536,7 @@ mod blocks_tests {
             blocks.sigma()
         );
         // neighbours that are all alike in pairs: half as many values
-        let mut pairs = Blocks::default();
+        let mut pairs = BlockSums::default();
         (0..400).for_each(|k| {
             pairs.add(
                 BLOCK_S * f64::from(k),

@@ -1,8 +1,8 @@
 //! Figures of a fusion: fixes used, consistency, errors at the ends of outages. They serialize as `summary.json` has them.
 
 use super::{
-    AidInnovations, FixRecord, Nine, Row, RowError, Solution, Weighed, Withheld, aid_innovations,
-    horizontal,
+    AidInnovations, FixRecord, Nine, Row, RowError, Solution, WeightedSolution, Withheld,
+    aid_innovations, horizontal,
 };
 use crate::linalg::{by_value, mean, median};
 use crate::metrics::{DriveVerdict, NormalisedErrors, PerState, Verdict, VerdictKind};
@@ -12,7 +12,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Distance at the end of an outage, and what the filter states of it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Drift {
+pub struct EndError {
     /// Horizontal distance (m).
     pub horizontal_m: f64,
     /// Difference down (m).
@@ -29,18 +29,18 @@ pub struct OutageDrift {
     pub outage: Outage,
     /// Fixes that were withheld.
     pub fixes_withheld: usize,
-    /// Whether a fix follows it.
+    /// True if a fix follows it.
     followed_by_fix: bool,
     /// Against the first fix after it (the last withheld one, when none follows).
-    pub end_from_fix: Option<Drift>,
+    pub end_from_fix: Option<EndError>,
     /// Against the reference at that time.
-    pub end_from_reference: Option<Drift>,
+    pub end_from_reference: Option<EndError>,
 }
 
 /// Innovations of the fixes that end outages and gaps, all together: the only ones that the filter was not led to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Ends {
-    /// How many outages and gaps.
+pub struct OutageEnds {
+    /// Number of outages and gaps.
     pub count: usize,
     /// Root mean square of the horizontal error over its standard deviation: 1 if right.
     pub error_over_sigma: f64,
@@ -72,7 +72,7 @@ pub struct Outliers {
 
 /// Figures of a solution.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Outcome {
+pub struct FusionFigures {
     /// Fixes.
     pub fixes: FixCounts,
     /// Mean NIS of the fixes used or rejected, divided by their number of components: 1 if all is as believed. A rejected
@@ -84,7 +84,7 @@ pub struct Outcome {
     /// Errors at the end of each outage.
     pub outages: Vec<OutageDrift>,
     /// The ends of all outages and gaps, where there are any.
-    pub ends: Option<Ends>,
+    pub ends: Option<OutageEnds>,
     /// Differences of the rows from the reference, where one reaches them.
     pub reference: Option<FromReference>,
     /// Figures of the smoothed solution, where there is one.
@@ -104,9 +104,10 @@ pub struct FromReference {
     pub error_over_sigma: PerState<f64>,
     /// Mean NEES.
     pub nees_mean: f64,
-    /// What it is if both are right.
+    /// Degrees of freedom of the NEES: its mean if both are right.
     nees_dof: usize,
-    /// How well the velocity of the reference is known, which the NEES allows for: root mean square (m/s).
+    /// Root mean square of the standard deviation of the reference's velocity, which the NEES
+    /// includes (m/s).
     pub velocity_sigma_m_s: f64,
     /// Verdict on the errors over their standard deviations.
     pub verdict: Option<DriveVerdict>,
@@ -142,11 +143,11 @@ pub struct SmoothedOutage {
 }
 
 /// The figures of a solution with these outages.
-pub fn outcome(solution: &Solution, outages: &[Outage]) -> Outcome {
+pub fn outcome(solution: &Solution, outages: &[Outage]) -> FusionFigures {
     let outliers = outliers(solution);
     let rejected = outliers.as_ref().map_or(0, |outliers| outliers.t_s.len());
     let used = solution.fixes.iter().filter(|f| f.used).count();
-    Outcome {
+    FusionFigures {
         fixes: FixCounts {
             used,
             withheld: solution.fixes.len() - used - rejected,
@@ -179,7 +180,7 @@ pub(super) const APART: (f64, f64) = (10.0, 5.0);
 
 /// The fixes that nothing was used before for so long. Their horizontal innovations are two normal numbers each, and the
 /// sum of m of their squares, normalised, is chi-square of 2m degrees.
-fn ends(solution: &Solution) -> Option<Ends> {
+fn ends(solution: &Solution) -> Option<OutageEnds> {
     let known: Vec<&FixRecord> = solution.fixes.iter().filter(|f| f.used).collect();
     let steps = known.windows(2).map(|w| w[1].t_s - w[0].t_s);
     let apart_s = APART.0.max(APART.1 * median(steps)?);
@@ -191,7 +192,7 @@ fn ends(solution: &Solution) -> Option<Ends> {
     let (count, sum) = (of_ends.len(), of_ends.iter().sum::<f64>());
     let degrees = 2.0 * count as f64;
     let p_value = ChiSquared::new(degrees).ok()?.sf(sum);
-    Some(Ends {
+    Some(OutageEnds {
         count,
         error_over_sigma: (sum / degrees).sqrt(),
         p_value,
@@ -291,7 +292,7 @@ fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
     let withheld = || solution.fixes.iter().filter(|f| outage.withholds(f.t_s));
     let after = solution.fixes.iter().find(|f| f.t_s + 1e-9 >= outage.end_s);
     let last = after.or(withheld().next_back());
-    let end_from_fix = last.map(|f| Drift {
+    let end_from_fix = last.map(|f| EndError {
         horizontal_m: f.innovation[0].hypot(f.innovation[1]),
         down_m: f.innovation[2],
         expected_sigma_m: f.sigma[0].hypot(f.sigma[1]),
@@ -299,7 +300,7 @@ fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
     let end_from_reference = last.and_then(|f| {
         let error = f.error?;
         let (horizontal_m, expected_sigma_m) = (horizontal(&error), f.horizontal_sigma_m);
-        Some(Drift {
+        Some(EndError {
             horizontal_m,
             down_m: error[2],
             expected_sigma_m,
@@ -351,7 +352,7 @@ pub enum Finding {
     Correlated {
         /// Autocorrelation of the innovations from one fix to the next, of position or velocity.
         lag_1: f64,
-        /// How many times the stated standard deviation of position the filter believes.
+        /// Factor on the stated standard deviation of position in the filter.
         pos_sigma_factor: f64,
         /// The same of velocity.
         vel_sigma_factor: f64,
@@ -363,7 +364,7 @@ pub enum Finding {
     },
     /// Minutes in which most fixes are too far from the solution.
     Minutes {
-        /// How many of them.
+        /// Number of such minutes.
         bad: usize,
         /// All minutes with fixes.
         of: usize,
@@ -374,13 +375,13 @@ pub enum Finding {
     },
     /// Mean NIS of what the vehicle knows.
     Aid {
-        /// As [`super::AidInnovations`] has it.
+        /// Name as in [`super::AidInnovations`].
         aid: &'static str,
         /// Divided by the number of components: 1 if right.
         nis_per_component: f64,
     },
     /// Errors at the ends of outages and gaps.
-    Ends(Ends),
+    Ends(OutageEnds),
     /// Errors against the reference.
     Reference {
         /// Verdict on them.
@@ -392,10 +393,10 @@ pub enum Finding {
 
 /// VerdictKind and evidence.
 #[derive(Debug, Clone)]
-pub struct Assessment {
+pub struct FusionAssessment {
     /// The gravest of the findings.
     pub verdict: VerdictKind,
-    /// What was found, the gravest first.
+    /// Findings, the gravest first.
     pub findings: Vec<(VerdictKind, Finding)>,
 }
 
@@ -413,13 +414,13 @@ pub(super) fn nis_bound(components: usize) -> f64 {
 /// Judges a solution: its fixes with standard deviations as stated, its errors as believed. `of_start` is what speaks
 /// against the start, as the alignment found it, `withheld` the errors at the ends of withheld windows.
 pub fn assess(
-    weighed: &Weighed,
-    outcome: &Outcome,
+    weighed: &WeightedSolution,
+    outcome: &FusionFigures,
     of_start: &[(VerdictKind, Finding)],
     withheld: Option<Withheld>,
-) -> Assessment {
+) -> FusionAssessment {
     let mut findings = of_start.to_vec();
-    let of_fixes = weighed.judged();
+    let of_fixes = weighed.with_stated_sigmas();
     let correlated = correlated(weighed);
     findings.push(match (nis(of_fixes), correlated) {
         // errors that last make small innovations of right standard deviations
@@ -459,10 +460,10 @@ pub fn assess(
     let verdict = findings
         .first()
         .map_or(VerdictKind::Consistent, |(verdict, _)| *verdict);
-    Assessment { verdict, findings }
+    FusionAssessment { verdict, findings }
 }
 
-/// Whether the fixes contradict a solution.
+/// Returns true if the fixes contradict a solution.
 pub(super) fn is_contradicted(solution: &Solution, of_start: &[(VerdictKind, Finding)]) -> bool {
     let found = [Some(nis(solution)), stretches(solution)];
     of_start
@@ -472,7 +473,7 @@ pub(super) fn is_contradicted(solution: &Solution, of_start: &[(VerdictKind, Fin
 }
 
 /// Errors that last: standard deviations as stated are then too small.
-fn correlated(weighed: &Weighed) -> Option<(VerdictKind, Finding)> {
+fn correlated(weighed: &WeightedSolution) -> Option<(VerdictKind, Finding)> {
     let lag_1 = weighed.correlation()?;
     let [pos_sigma_factor, vel_sigma_factor] = weighed.sigma_factors;
     let verdict = match pos_sigma_factor.max(vel_sigma_factor) > 1.0 {
@@ -560,7 +561,7 @@ fn far(fixes: &[&FixRecord]) -> Option<f64> {
 }
 
 /// Errors at the ends of outages and gaps that are larger than stated.
-fn ends_finding(outcome: &Outcome) -> Option<(VerdictKind, Finding)> {
+fn ends_finding(outcome: &FusionFigures) -> Option<(VerdictKind, Finding)> {
     let ends = outcome.ends?;
     let degrees = 2 * ends.count;
     let sum = degrees as f64 * ends.error_over_sigma.powi(2);
@@ -604,7 +605,7 @@ pub enum FusionError {
     Place {
         /// The first fix after the start (s).
         t_s: f64,
-        /// How far (m).
+        /// Distance (m).
         metres: f64,
         /// Horizontal standard deviation of both (m).
         sigma_m: f64,
@@ -614,13 +615,13 @@ pub enum FusionError {
     Pole {
         /// When (s).
         t_s: f64,
-        /// Where (degrees).
+        /// Latitude (degrees).
         lat_deg: f64,
     },
-    /// What a smoother would have to keep.
+    /// The smoother needs too much memory.
     #[error("the smoother would take {:.1} GB for {marks} rows and fixes of {states} states, 2 GB at most", bytes / 1e9)]
     Memory {
-        /// How much (bytes).
+        /// Its size (bytes).
         bytes: f64,
         /// Rows and fixes.
         marks: f64,
@@ -639,8 +640,8 @@ pub enum FusionError {
 const WEEK_S: f64 = 604_800.0;
 
 impl FusionError {
-    /// How late the fixes are by their clock, where that is why nothing overlaps (s): whole weeks, or what makes both
-    /// recordings begin in the same second.
+    /// Clock delay of the fixes that explains the lack of overlap (s): whole weeks, or the value
+    /// that starts both recordings in the same second.
     pub fn delay_s(&self) -> Option<f64> {
         let Self::Clocks { imu, gnss } = self else {
             return None;
@@ -679,12 +680,12 @@ mod assessment_tests {
         }
     }
 
-    fn judged(solution: &Solution) -> Assessment {
+    fn judged(solution: &Solution) -> FusionAssessment {
         assess(&weighed(solution), &outcome(solution, &[]), &[], None)
     }
 
-    fn weighed(solution: &Solution) -> Weighed {
-        Weighed {
+    fn weighed(solution: &Solution) -> WeightedSolution {
+        WeightedSolution {
             solution: solution.clone(),
             as_stated: None,
             whiteness: [crate::fusion::Whiteness::of(&solution.fixes), None],
@@ -791,7 +792,7 @@ mod assessment_tests {
                 .any(|(kind, _)| *kind == VerdictKind::Undecided),
             "{found:?}"
         );
-        let answered = Weighed {
+        let answered = WeightedSolution {
             sigma_factors: [1.0, 4.3],
             ..weighed(&all)
         };

@@ -1,5 +1,5 @@
-//! What a vehicle knows of its own velocity, made from a recording: it moves neither sideways nor up, a wheel turns, it
-//! stands.
+//! Velocity measurements that a vehicle provides: no sideways or vertical motion (NHC), wheel
+//! speed, standstill (ZUPT).
 
 use super::alignment::courses;
 use super::{Recorded, Whiteness, kept};
@@ -14,7 +14,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Speeds below and above which a vehicle stands and moves (m/s).
 const SPEEDS: (f64, f64) = (0.3, 1.0);
-/// How far a speed tells (s).
+/// Time over which a speed is valid (s).
 const REACH_S: f64 = 1.0;
 /// A sample so many times as long as the median one bridges a gap.
 const LONG: f64 = 1.5;
@@ -69,7 +69,7 @@ pub struct AidInnovations {
     pub count: usize,
     /// Mean NIS divided by the number of components: 1 if right.
     pub nis_per_component: f64,
-    /// Where that lies if right, 95 %.
+    /// 95 % band of it for a consistent filter.
     pub nis_band: Band,
     /// Autocorrelation of the innovations from one measurement to the next; none where they are few.
     pub whiteness: Option<Whiteness>,
@@ -113,7 +113,7 @@ pub fn vehicle_velocities(
     } else {
         wheel.iter().map(|w| (w.t_s, w.m_s.abs())).collect()
     };
-    let scene = Scene {
+    let scene = StandstillSearch {
         imu,
         speeds,
         step_s: median(imu.iter().map(|s| s.dt_s)).unwrap_or(1.0),
@@ -147,7 +147,7 @@ pub fn vehicle_velocities(
     all
 }
 
-/// How many times the speed of the fixes a wheel reads where both move: the median; none where they never do.
+/// Median ratio of the wheel's speed to that of the fixes while moving; none where they never move.
 pub fn wheel_ratio(
     recorded: &Recorded<'_>,
     wheel: &[WheelSpeed],
@@ -181,14 +181,14 @@ fn speeds(recorded: &Recorded<'_>, outages: &[Outage]) -> Vec<(f64, f64)> {
 }
 
 /// A recording that may stand.
-struct Scene<'a> {
+struct StandstillSearch<'a> {
     imu: &'a [ImuIncrement],
     /// Times (s) and speeds (m/s).
     speeds: Vec<(f64, f64)>,
     step_s: f64,
 }
 
-impl Scene<'_> {
+impl StandstillSearch<'_> {
     /// The samples of the half second that ends with sample `k`; none where it bridges a gap.
     fn window(&self, k: usize) -> Option<&[ImuIncrement]> {
         let samples = (WINDOW_S / self.step_s).round().max(2.0) as usize;
@@ -199,14 +199,14 @@ impl Scene<'_> {
             .then_some(window)
     }
 
-    fn motion(&self, t_s: f64) -> Motion {
+    fn motion(&self, t_s: f64) -> MotionState {
         let from = self.speeds.partition_point(|(t, _)| *t < t_s - REACH_S);
         let near = &self.speeds[from..self.speeds.partition_point(|(t, _)| *t <= t_s + REACH_S)];
         match near {
-            [] => Motion::Unknown,
-            _ if near.iter().all(|(_, speed)| *speed < SPEEDS.0) => Motion::Still,
-            _ if near.iter().all(|(_, speed)| *speed > SPEEDS.1) => Motion::Moving,
-            _ => Motion::Slow,
+            [] => MotionState::Unknown,
+            _ if near.iter().all(|(_, speed)| *speed < SPEEDS.0) => MotionState::Still,
+            _ if near.iter().all(|(_, speed)| *speed > SPEEDS.1) => MotionState::Moving,
+            _ => MotionState::Slow,
         }
     }
 
@@ -245,9 +245,9 @@ const KEPT: f64 = 0.9;
 /// Fewest windows at rest that tell the noise.
 const FEWEST: usize = 10;
 
-/// What fixes or a wheel say of an instant.
+/// Motion at an instant according to fixes or a wheel.
 #[derive(Clone, Copy, PartialEq)]
-enum Motion {
+enum MotionState {
     /// It stands.
     Still,
     /// Neither is sure.
@@ -301,15 +301,15 @@ fn degrees(samples: usize) -> f64 {
 
 impl Standstill {
     /// Learns it from windows of one length; none where too few stand.
-    fn learn(windows: &[(&[ImuIncrement], Motion)]) -> Option<Self> {
-        let of = |motion: Motion| {
+    fn learn(windows: &[(&[ImuIncrement], MotionState)]) -> Option<Self> {
+        let of = |motion: MotionState| {
             windows
                 .iter()
                 .filter(move |(_, m)| *m == motion)
                 .map(|(window, _)| *window)
         };
-        let still: Vec<Moments> = of(Motion::Still).map(moments).collect();
-        let samples = of(Motion::Still).next()?.len();
+        let still: Vec<Moments> = of(MotionState::Still).map(moments).collect();
+        let samples = of(MotionState::Still).next()?.len();
         if still.len() < FEWEST {
             return None;
         }
@@ -328,10 +328,12 @@ impl Standstill {
             .inverse_cdf(1.0 - MISSES)
             / degrees(samples);
         let of_still = quantile(
-            of(Motion::Still).map(|w| found.statistic(w)).collect(),
+            of(MotionState::Still).map(|w| found.statistic(w)).collect(),
             KEPT,
         );
-        let moving: Vec<f64> = of(Motion::Moving).map(|w| found.statistic(w)).collect();
+        let moving: Vec<f64> = of(MotionState::Moving)
+            .map(|w| found.statistic(w))
+            .collect();
         let of_moving = if moving.is_empty() {
             f64::INFINITY
         } else {
@@ -353,12 +355,12 @@ impl Standstill {
         window.iter().map(of_sample).sum::<f64>() / degrees(window.len())
     }
 
-    /// Whether a window is one of standstill, of which fixes or a wheel say this.
-    fn stands(&self, window: &[ImuIncrement], motion: Motion) -> bool {
+    /// Returns true if the vehicle stands still in a window, given the motion by fixes or a wheel.
+    fn stands(&self, window: &[ImuIncrement], motion: MotionState) -> bool {
         match motion {
-            Motion::Still => self.statistic(window) < self.thresholds[0],
-            Motion::Unknown => self.statistic(window) < self.thresholds[1],
-            Motion::Slow | Motion::Moving => false,
+            MotionState::Still => self.statistic(window) < self.thresholds[0],
+            MotionState::Unknown => self.statistic(window) < self.thresholds[1],
+            MotionState::Slow | MotionState::Moving => false,
         }
     }
 }
@@ -412,7 +414,7 @@ mod standstill_tests {
         recording(windows, seed, |_| [DVec3::ZERO; 2])
     }
 
-    fn as_moving(imu: &[ImuIncrement], motion: Motion) -> Vec<(&[ImuIncrement], Motion)> {
+    fn as_moving(imu: &[ImuIncrement], motion: MotionState) -> Vec<(&[ImuIncrement], MotionState)> {
         imu.chunks(N).map(|window| (window, motion)).collect()
     }
 
@@ -422,7 +424,7 @@ mod standstill_tests {
     #[test]
     fn white_noise_is_missed_as_rarely_as_stated() {
         let learnt = at_rest(4000, 1);
-        let found = Standstill::learn(&as_moving(&learnt, Motion::Still)).unwrap();
+        let found = Standstill::learn(&as_moving(&learnt, MotionState::Still)).unwrap();
         assert!(
             (found.sigma[0] / 0.05 - 1.0).abs() < 5e-3
                 && (found.sigma[1] / 3e-3 - 1.0).abs() < 5e-3
@@ -430,7 +432,7 @@ mod standstill_tests {
         let fresh = at_rest(4000, 2);
         let missed = fresh
             .chunks(N)
-            .filter(|window| !found.stands(window, Motion::Unknown))
+            .filter(|window| !found.stands(window, MotionState::Unknown))
             .count();
         assert!((missed as f64 - 40.0).abs() < 28.0, "{missed}");
     }
@@ -446,19 +448,19 @@ mod standstill_tests {
             ]
         };
         let moves = recording(2000, 4, sway);
-        let mut windows = as_moving(&rest, Motion::Still);
-        windows.extend(as_moving(&moves, Motion::Moving));
+        let mut windows = as_moving(&rest, MotionState::Still);
+        windows.extend(as_moving(&moves, MotionState::Moving));
         let found = Standstill::learn(&windows).unwrap();
         assert_eq!(
             moves
                 .chunks(N)
-                .filter(|window| found.stands(window, Motion::Unknown))
+                .filter(|window| found.stands(window, MotionState::Unknown))
                 .count(),
             0
         );
         assert!(
             rest.chunks(N)
-                .filter(|window| found.stands(window, Motion::Unknown))
+                .filter(|window| found.stands(window, MotionState::Unknown))
                 .count()
                 > 190
         );
@@ -470,12 +472,12 @@ mod standstill_tests {
     #[test]
     fn false_alarms_are_as_rare_as_stated() {
         let (rest, smooth, fresh) = (at_rest(200, 5), at_rest(4000, 6), at_rest(4000, 7));
-        let mut windows = as_moving(&rest, Motion::Still);
-        windows.extend(as_moving(&smooth, Motion::Moving));
+        let mut windows = as_moving(&rest, MotionState::Still);
+        windows.extend(as_moving(&smooth, MotionState::Moving));
         let found = Standstill::learn(&windows).unwrap();
         let alarms = fresh
             .chunks(N)
-            .filter(|window| found.stands(window, Motion::Unknown))
+            .filter(|window| found.stands(window, MotionState::Unknown))
             .count();
         assert!((alarms as f64) < 4.0 + 4.0 * 8.0_f64.sqrt(), "{alarms}");
     }
@@ -483,7 +485,10 @@ mod standstill_tests {
     #[test]
     fn too_few_windows_at_rest_tell_nothing() {
         let rest = at_rest(FEWEST - 1, 8);
-        assert_eq!(Standstill::learn(&as_moving(&rest, Motion::Still)), None);
+        assert_eq!(
+            Standstill::learn(&as_moving(&rest, MotionState::Still)),
+            None
+        );
         assert_eq!(Standstill::learn(&[]), None);
     }
 }

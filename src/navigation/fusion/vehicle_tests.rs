@@ -14,7 +14,7 @@ use crate::sensors::aiding::{AidingSettings, NhcSettings, OdometerSettings, Zupt
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{FilterPass, TruthSide};
-use crate::simulation::{Plan, Recording, record};
+use crate::simulation::{Plan, SimulatedRecording, record};
 use crate::trajectory::Trajectory;
 use glam::{DQuat, DVec3};
 use rand::SeedableRng;
@@ -49,7 +49,7 @@ fn nhc(mounting_sigma_deg: f64) -> AidingSettings {
 fn recorded(
     aiding: &AidingSettings,
     runs: u64,
-    mut then: impl FnMut(u64, &Recording, &Start, &Belief),
+    mut then: impl FnMut(u64, &SimulatedRecording, &Start, &Belief),
 ) {
     let (trajectory, model) = (town(), consumer());
     let aided = scenario(aiding.clone());
@@ -142,7 +142,7 @@ fn the_scale_of_a_wheel_is_found() {
 }
 
 /// What the filter makes of the outage with and without the constraint.
-struct Ends {
+struct OutageEnds {
     /// Sum of the squared horizontal errors (m²).
     errors: f64,
     /// Sum of what the filter states of them (m²).
@@ -153,9 +153,9 @@ struct Ends {
     smoothed: f64,
 }
 
-fn ends(aiding: &AidingSettings, runs: u64) -> Ends {
+fn ends(aiding: &AidingSettings, runs: u64) -> OutageEnds {
     let reference = town().into();
-    let mut sums = Ends {
+    let mut sums = OutageEnds {
         errors: 0.0,
         stated: 0.0,
         nis: 0.0,

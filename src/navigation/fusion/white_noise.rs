@@ -87,7 +87,7 @@ fn stated(axis: &Composite, band: f64) -> f64 {
 
 impl OwnNoise {
     /// The model with this noise for the white noise of the sensor.
-    pub fn put_into(&self, model: &mut Model) {
+    pub fn apply_to(&self, model: &mut Model) {
         let channels = Channel::ALL.into_iter().filter(|c| c.sensor == self.sensor);
         for channel in channels {
             let processes = &mut model.axes[channel.index()].processes;

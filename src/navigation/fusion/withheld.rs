@@ -3,7 +3,7 @@
 
 use super::displaced::interval_s;
 use super::outcome::used;
-use super::{FixRecord, FusionError, Recorded, Settings, Start, Weighed, fuse};
+use super::{FixRecord, FusionError, Recorded, Settings, Start, WeightedSolution, fuse};
 use crate::ekf::Belief;
 use crate::gnss::GnssFix;
 use crate::linalg::mean;
@@ -45,7 +45,7 @@ pub fn withheld(
     belief: &Belief,
     start: &Start,
     settings: &Settings,
-    weighed: &Weighed,
+    weighed: &WeightedSolution,
 ) -> Result<Option<Withheld>, FusionError> {
     let first_s = start.t_s + SETTLING_S;
     let fixes: Vec<&FixRecord> = used(&weighed.solution).collect();

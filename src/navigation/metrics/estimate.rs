@@ -75,7 +75,7 @@ impl Estimate {
     }
 }
 
-/// How many values a statistic is made of, and how many independent ones they are worth.
+/// Number of values in a statistic, and the number of independent values they are equivalent to.
 #[derive(Debug, Clone, Copy)]
 pub struct SampleSize {
     /// Values.
@@ -204,12 +204,13 @@ pub(super) fn quantile_interval(
 
 // Where consistency statistics of a correct filter lie: NEES and NIS means, coverage.
 
-/// Where a statistic of a correct filter lies, 95 % unless said otherwise (discrete ones: at least).
+/// Interval of a statistic for a consistent filter, 95 % unless said otherwise (discrete ones: at
+/// least).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Band {
     /// 2.5 % (or what was asked for) lie below.
     pub lower: f64,
-    /// As many lie above.
+    /// Upper end: as many lie above.
     pub upper: f64,
 }
 
@@ -219,7 +220,7 @@ impl Band {
         upper: f64::NAN,
     };
 
-    /// Whether a value lies in the band, its ends included.
+    /// Returns true if a value lies in the band, its ends included.
     pub(crate) fn contains(&self, value: f64) -> bool {
         self.lower <= value && value <= self.upper
     }

@@ -1,9 +1,10 @@
-//! What a covariance analysis says: the figures that runs would scatter about, without a run.
+//! Expected figures by covariance analysis: the values about which runs would scatter, without a
+//! run.
 
 use super::estimate::{Estimate, PerState, QuadraticForm};
 use super::outage::{EpochMetrics, is_beyond_linear, within};
 use super::summary::{
-    AccuracySummary, Nis, OutageSummary, Recovery, Spread, Summary, with_verdicts,
+    AccuracySummary, Nis, OutageSummary, QuantileSummary, Recovery, Summary, with_verdicts,
 };
 use super::verdict;
 use crate::ekf::Belief;
@@ -169,12 +170,12 @@ fn outage((start_s, end_s): (f64, f64), end: &Judged, epochs: &[EpochMetrics]) -
         rmse_end: PerState(end.errors.rmse()),
         nees_end: consistency.nees,
         log_density_end: consistency.log_density,
-        horizontal_error_end_m: Spread {
+        horizontal_error_end_m: QuantileSummary {
             p50,
             p95,
             p999: Some(p999),
             max: f64::NAN,
-            ..Spread::default()
+            ..QuantileSummary::default()
         },
         reconvergence_s: Recovery {
             p50: f64::NAN,

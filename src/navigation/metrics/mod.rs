@@ -23,11 +23,11 @@ mod verdict;
 pub use estimate::{Band, Estimate, PerState, QuadraticForm, SampleSize, chi_square_band};
 pub use expected::{Expected, horizontal_quantiles};
 pub use outage::{Budget, EpochMetrics, epochs};
-pub use ratio::{EpochRow, Measured, OutageComparison, StateRatio, compare};
+pub use ratio::{EpochRow, ExperimentResult, OutageComparison, StateRatio, compare};
 pub(crate) use summary::name_and_limit;
 pub use summary::{
-    AccuracySummary, Consistency, Coverage, Met, Nis, OutageSummary, Recovery, ReductionQuality,
-    Requirement, Spread, Summary, TOLERANCE,
+    AccuracySummary, ConsistencySummary, Coverage, Nis, OutageSummary, QuantileSummary, Recovery,
+    ReductionQuality, Requirement, RequirementResult, Summary, TOLERANCE,
 };
 pub use verdict::{
     ALL_STATES, Basis, DriveVerdict, NormalisedErrors, OutageVerdict, StateName, Verdict,

@@ -1,7 +1,7 @@
 //! Statistics of one outage.
 
 use super::estimate::{Estimate, PerState, SampleSize, quantile_interval, sample_quantile};
-use super::summary::{AccuracySummary, OutageSummary, Recovery, Spread};
+use super::summary::{AccuracySummary, OutageSummary, QuantileSummary, Recovery};
 use crate::linalg::mean;
 use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{FilterPass, Judged, NamedSource};
@@ -46,7 +46,7 @@ pub(super) fn outages(result: &RunResult, epochs: &[EpochMetrics]) -> Vec<Outage
             nees_end_std_error: nees.std_error,
             log_density_end: density.value,
             log_density_end_std_error: density.std_error,
-            horizontal_error_end_m: Spread {
+            horizontal_error_end_m: QuantileSummary {
                 p50: sample_quantile(&horizontal, 0.5),
                 p95: sample_quantile(&horizontal, 0.95),
                 p999: None,
@@ -74,11 +74,12 @@ pub(super) fn within(
     epochs.iter().filter(move |e| outage.withholds(e.t_s))
 }
 
-/// Whether tilts in an outage shift the velocity down by more than 0.3 of the standard deviation that linear theory gives it
-/// at the end, `sigma_m_s`.
+/// Returns true if tilts in an outage shift the down velocity by more than 0.3 of its standard
+/// deviation at the end by linear theory, `sigma_m_s`.
 ///
-/// A tilt ψ shortens what is left upright of the specific force to g cos ψ: the vehicle seems to accelerate downwards with
-/// gψ²/2, whatever the sign of ψ, which no linear analysis contains. Below 0.3, runs were as it expects them to 10 %.
+/// A tilt ψ reduces the vertical component of the specific force to g cos ψ: the vehicle seems to
+/// accelerate downwards with gψ²/2, whatever the sign of ψ, which no linear analysis contains.
+/// Below 0.3, runs agreed with linear theory to 10 %.
 pub(super) fn is_beyond_linear(
     window: (f64, f64),
     epochs: &[EpochMetrics],
@@ -106,12 +107,12 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
 
 // Statistics at one reporting epoch.
 
-/// What the runs say at one epoch (m, m/s, degrees).
+/// Statistics of the runs at one epoch (m, m/s, degrees).
 #[derive(Debug, Clone)]
 pub struct EpochMetrics {
     /// Time on the trajectory (s).
     pub t_s: f64,
-    /// Whether a fix was used.
+    /// True if a fix was used.
     pub gnss: bool,
     /// Runs behind the numbers.
     pub count: u64,

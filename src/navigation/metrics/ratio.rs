@@ -23,16 +23,18 @@ pub struct EpochRow {
 
 /// The results of an experiment, as far as ratios need them.
 #[derive(Debug, Clone)]
-pub struct Measured {
+pub struct ExperimentResult {
     /// Epochs in time order.
     pub epochs: Vec<EpochRow>,
     /// Runs in run order.
     pub runs: Vec<RunRecord>,
     /// Outages (start, end) (s).
     pub outages: Vec<(f64, f64)>,
-    /// As in [`RunResult`](crate::simulation::RunResult): runs beyond these share their noise.
+    /// Number of independent windows, as in [`RunResult`](crate::simulation::RunResult): more runs
+    /// than these share their noise.
     pub independent_windows: Option<f64>,
-    /// Whether the one run stands for what covariance analysis expects: it has no Monte-Carlo error.
+    /// True if the one run is the expectation of a covariance analysis: it has no Monte-Carlo
+    /// error.
     pub is_expected: bool,
 }
 
@@ -79,11 +81,11 @@ pub struct OutageComparison {
 /// # Errors
 /// When epochs or outages differ.
 pub fn compare(
-    candidate: &Measured,
-    reference: &Measured,
+    candidate: &ExperimentResult,
+    reference: &ExperimentResult,
     paired: bool,
 ) -> Result<Vec<OutageComparison>, String> {
-    let differ = |what: &str, words: &dyn Fn(&Measured) -> String| {
+    let differ = |what: &str, words: &dyn Fn(&ExperimentResult) -> String| {
         let [own, other] = [candidate, reference].map(words);
         format!("the {what} differ: {own} against {other} of the reference")
     };
@@ -114,8 +116,8 @@ pub fn compare(
 }
 
 fn outage(
-    candidate: &Measured,
-    reference: &Measured,
+    candidate: &ExperimentResult,
+    reference: &ExperimentResult,
     index: usize,
     (start_s, end_s): (f64, f64),
     paired: bool,
@@ -191,12 +193,12 @@ type Records<'a> = Vec<&'a OutageRecord>;
 
 /// The records of one outage on both sides: of the runs that neither side lost when paired.
 fn records<'a>(
-    candidate: &'a Measured,
-    reference: &'a Measured,
+    candidate: &'a ExperimentResult,
+    reference: &'a ExperimentResult,
     outage: usize,
     paired: bool,
 ) -> (Records<'a>, Records<'a>) {
-    let kept = |e: &'a Measured| {
+    let kept = |e: &'a ExperimentResult| {
         e.runs
             .iter()
             .filter(|r| !r.diverged && r.outages.len() > outage)
@@ -229,9 +231,9 @@ fn root((ratio, half_width_pct): MeanRatio) -> (f64, Option<[f64; 2]>) {
     (pct(root), half.map(interval))
 }
 
-/// How the runs of two experiments belong together.
+/// Correspondence between the runs of two experiments.
 struct Pairing {
-    /// Whether run k of both saw the same noise.
+    /// True if run k of both had the same noise.
     paired: bool,
     /// Independent windows of noise, where they are limited.
     windows: Option<f64>,

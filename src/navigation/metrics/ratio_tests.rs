@@ -27,13 +27,13 @@ fn run(run: u64, see: f64, error: f64) -> RunRecord {
     }
 }
 
-fn experiment(asee: &[f64], runs: Vec<RunRecord>) -> Measured {
+fn experiment(asee: &[f64], runs: Vec<RunRecord>) -> ExperimentResult {
     let epochs = asee
         .iter()
         .enumerate()
         .map(|(i, a)| row(i as f64, *a))
         .collect();
-    Measured {
+    ExperimentResult {
         epochs,
         runs,
         outages: vec![(1.0, 3.0)],
@@ -74,7 +74,7 @@ fn an_epoch_at_a_typed_time_is_on_the_side_of_its_fix() {
         let shifted = |asee: &[f64]| {
             let mut made = experiment(asee, vec![run(0, 1.5, 1.0), run(1, 1.5, 1.0)]);
             made.epochs.iter_mut().for_each(|epoch| epoch.t_s += 0.36);
-            Measured {
+            ExperimentResult {
                 outages: vec![outage],
                 ..made
             }
@@ -241,7 +241,7 @@ fn runs_that_either_side_lost_are_not_paired() {
 #[test]
 fn other_outages_or_epochs_are_refused_in_words() {
     let reference = experiment(&[1.0; 3], vec![]);
-    let other = Measured {
+    let other = ExperimentResult {
         outages: vec![(5.0, 7.5)],
         ..reference.clone()
     };
@@ -282,7 +282,7 @@ fn what_calibrations_leave_open_widens_the_interval() {
         "{state:?}"
     );
     // of two covariance analyses, which draw nothing, they are the only interval there is
-    let expected = |made: Measured| Measured {
+    let expected = |made: ExperimentResult| ExperimentResult {
         is_expected: true,
         ..made
     };

@@ -2,7 +2,7 @@
 
 use super::estimate::{Band, PerState, SampleSize, chi_square_band, coverage_band};
 use super::outage::{Budget, EpochMetrics, outages};
-use super::verdict::{OutageVerdict, Verdict, VerdictKind, judged};
+use super::verdict::{OutageVerdict, Verdict, VerdictKind, verdicts};
 use crate::linalg::{by_value, mean};
 use crate::simulation::lincov::{self, Assessment};
 use crate::simulation::{GainsUsed, NEES_DOF, REPORTED, REPORTED_NAMES, RunResult};
@@ -11,14 +11,14 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::fmt;
 use std::str::FromStr;
 
-/// What the user reads first.
+/// Summary of an experiment: `summary.json`.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Summary {
     /// Layout version.
     pub schema_version: u32,
     /// "monte-carlo", "lincov" or "both".
     pub method: &'static str,
-    /// Whether the filter is as good as it believes.
+    /// Verdict on the filter's consistency.
     pub verdict: Verdict,
     /// Runs, diverged ones included.
     pub runs: u64,
@@ -40,25 +40,26 @@ pub struct Summary {
     /// Outages in time order.
     pub outages: Vec<OutageSummary>,
     /// Normalised estimation error squared of position, velocity and attitude.
-    pub nees: Consistency,
+    pub nees: ConsistencySummary,
     /// Normalised innovation squared of the fixes.
     pub nis: Nis,
     /// Share of runs inside the filter's ellipsoid of position and attitude.
     pub coverage: Coverage,
-    /// What the reduction to 15 states costs; none where it loses nothing.
+    /// Cost of the reduction to 15 states; none where it loses nothing.
     pub reduction: Option<ReductionQuality>,
     /// Largest error that the strapdown alone makes at the IMU's rate, over the sigma that the filter states; 0 (and not in
     /// files) where the trajectory closes.
     #[serde(skip_serializing_if = "is_zero")]
     pub strapdown_over_sigma: f64,
-    /// What covariance analysis expects, where it stands beside runs.
+    /// Summary by covariance analysis, beside one by runs.
     pub lincov: Option<Box<Summary>>,
-    /// Whether covariance analysis has another verdict, and figures that the runs contradict: errors are no longer small.
+    /// True if covariance analysis gives another verdict and figures that the runs contradict:
+    /// errors are too large for linear theory.
     #[serde(skip)]
     pub is_contradicted: bool,
-    /// What was required, and whether it is met.
+    /// Requirements, each with its result.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub require: Vec<Met>,
+    pub require: Vec<RequirementResult>,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands references")]
@@ -84,7 +85,7 @@ pub struct OutageSummary {
     pub start_s: f64,
     /// First instant with a fix again (s).
     pub end_s: f64,
-    /// Whether the filter is as good at its end as it believes.
+    /// Verdict on the filter's consistency at its end.
     pub verdict: OutageVerdict,
     /// Mean over the outage's epochs of the ASEE.
     pub asee_mean: PerState<f64>,
@@ -119,8 +120,8 @@ pub struct OutageSummary {
     /// Its Monte-Carlo standard error.
     pub log_density_end_std_error: f64,
     /// Horizontal error at the same instant.
-    pub horizontal_error_end_m: Spread,
-    /// Whether covariance analysis finds errors in it that are beyond linear theory.
+    pub horizontal_error_end_m: QuantileSummary,
+    /// True if its errors are beyond linear theory by covariance analysis.
     pub beyond_linear: bool,
     /// Time until the error is back to what it was before.
     pub reconvergence_s: Recovery,
@@ -132,7 +133,7 @@ pub struct OutageSummary {
 /// Quantiles of a distribution over runs, with distribution-free 95 % intervals (null: too few runs), widened by what the
 /// calibration of what makes the errors leaves open where its draws are there; of a covariance analysis that alone.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
-pub struct Spread {
+pub struct QuantileSummary {
     /// Median.
     pub p50: f64,
     /// 95 % quantile.
@@ -158,9 +159,9 @@ pub struct Recovery {
     pub never: Option<u64>,
 }
 
-/// Whether a chi-square statistic is where a correct filter puts it.
+/// Chi-square statistic with its band for a consistent filter.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
-pub struct Consistency {
+pub struct ConsistencySummary {
     /// Degrees of freedom: what a correct filter's mean is.
     pub dof: usize,
     /// Mean over epochs and runs.
@@ -207,7 +208,7 @@ impl Summary {
     /// The summary of a Monte-Carlo experiment.
     pub fn of(result: &RunResult, epochs: &[EpochMetrics], seed: u64) -> Self {
         let windows = result.independent_windows;
-        let (verdict, verdicts) = judged(&result.runs, result.outages.len(), windows);
+        let (verdict, verdicts) = verdicts(&result.runs, result.outages.len(), windows);
         let diverged = result.runs.iter().filter(|r| r.diverged);
         let diverged_runs: Vec<u64> = diverged.map(|r| r.run).collect();
         Self {
@@ -224,7 +225,7 @@ impl Summary {
         }
     }
 
-    /// What is said of epochs alone.
+    /// Summary of the epochs alone.
     pub(super) fn over(
         epochs: &[EpochMetrics],
         verdict: Verdict,
@@ -259,10 +260,10 @@ fn count(epochs: &[EpochMetrics], windows: Option<f64>) -> f64 {
     SampleSize::of(epochs.iter().map(|e| e.count).max().unwrap_or(0), windows).independent
 }
 
-fn nees(epochs: &[EpochMetrics], windows: Option<f64>) -> Consistency {
+fn nees(epochs: &[EpochMetrics], windows: Option<f64>) -> ConsistencySummary {
     let band = chi_square_band(NEES_DOF, count(epochs, windows));
     let [mean, lower95, upper95, fraction_inside] = over_epochs(epochs, band, |e| e.nees.value);
-    Consistency {
+    ConsistencySummary {
         dof: NEES_DOF,
         mean,
         lower95,
@@ -349,8 +350,9 @@ impl Summary {
             self.contradicts(expected) && self.verdict.kind != expected.verdict.kind;
     }
 
-    /// Whether a figure of the runs (RMSE of every state and NEES at the end of each outage, means over the run of RMSE, NEES
-    /// and coverage) is further from the expected one, in its own Monte-Carlo standard errors, than chance explains.
+    /// Returns true if a figure of the runs (RMSE of every state and NEES at the end of each
+    /// outage, means over the run of RMSE, NEES and coverage) is further from the expected one, in
+    /// Monte-Carlo standard errors, than chance explains.
     fn contradicts(&self, expected: &Self) -> bool {
         let distance = |value: f64, error: f64, expected: f64| (value - expected) / error;
         let v = &self.verdict;
@@ -388,7 +390,7 @@ impl Summary {
 /// A ratio of RMSE to standard deviation that is further from 1 at the end of an outage deserves a warning.
 pub const TOLERANCE: f64 = 0.1;
 
-/// What the covariance analysis says of the reduced filter where the model is true.
+/// Quality of the reduced filter by covariance analysis, with the model as truth.
 #[derive(Debug, Clone, Serialize)]
 pub struct ReductionQuality {
     /// True RMSE over the filter's own standard deviation at the end of each outage: above 1 it is
@@ -455,7 +457,7 @@ impl ReductionQuality {
 
 /// The figure that a limit is set on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Figure {
+enum LimitedFigure {
     /// Median of the horizontal error at the end of an outage.
     P50,
     /// Its 95 % quantile.
@@ -470,25 +472,25 @@ enum Figure {
 /// `consistent`, a verdict.
 #[derive(Debug, Clone, Copy)]
 pub struct Requirement {
-    figure: Figure,
+    figure: LimitedFigure,
     limit: f64,
 }
 
 /// Position and velocity down among the reported states.
 const DOWN: [usize; 2] = [2, 5];
 
-/// Whether a requirement is met, and by how much.
+/// Requirement with its result and margin.
 #[derive(Debug, Clone, Serialize)]
-pub struct Met {
+pub struct RequirementResult {
     /// The figure.
     pub name: String,
     /// The most it may be.
     pub limit: f64,
-    /// What it is, at its worst.
+    /// Its largest value.
     pub value: f64,
     /// The outage at whose end that is (from 0); none: the mean over the run.
     pub outage: Option<usize>,
-    /// Whether it is within the limit, and a covariance analysis alone can say so.
+    /// True if it is within the limit; by covariance analysis, only where linear theory holds.
     pub met: bool,
     /// The outage (from 0) in which errors are beyond linear theory, where covariance analysis would call the limit met and cannot, for
     /// want of what comes after that outage, or where runs decide in its place.
@@ -508,7 +510,7 @@ impl FromStr for Requirement {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         if text.trim() == "consistent" {
             return Ok(Self {
-                figure: Figure::Consistent,
+                figure: LimitedFigure::Consistent,
                 limit: 1.0 + TOLERANCE,
             });
         }
@@ -516,9 +518,9 @@ impl FromStr for Requirement {
             let (name, limit) = name_and_limit(text)?;
             let state = name.strip_prefix("rmse_").unwrap_or(name);
             let figure = match name {
-                "p50_m" => Figure::P50,
-                "p95_m" => Figure::P95,
-                _ => Figure::Rmse(REPORTED_NAMES.iter().position(|known| *known == state)?),
+                "p50_m" => LimitedFigure::P50,
+                "p95_m" => LimitedFigure::P95,
+                _ => LimitedFigure::Rmse(REPORTED_NAMES.iter().position(|known| *known == state)?),
             };
             Some(Self { figure, limit })
         };
@@ -529,26 +531,26 @@ impl FromStr for Requirement {
 }
 
 impl Requirement {
-    /// Whether it says anything only of outages.
+    /// Returns true for a figure that exists only with outages.
     pub const fn needs_outage(&self) -> bool {
-        matches!(self.figure, Figure::P50 | Figure::P95)
+        matches!(self.figure, LimitedFigure::P50 | LimitedFigure::P95)
     }
 
     /// Its name.
     pub fn name(&self) -> String {
         match self.figure {
-            Figure::P50 => "p50_m".to_owned(),
-            Figure::P95 => "p95_m".to_owned(),
-            Figure::Rmse(state) => format!("rmse_{}", REPORTED_NAMES[state]),
-            Figure::Consistent => "consistent".to_owned(),
+            LimitedFigure::P50 => "p50_m".to_owned(),
+            LimitedFigure::P95 => "p95_m".to_owned(),
+            LimitedFigure::Rmse(state) => format!("rmse_{}", REPORTED_NAMES[state]),
+            LimitedFigure::Consistent => "consistent".to_owned(),
         }
     }
 
     /// Compares the limit with the expectation of the covariance analysis where there is one, else with the runs. From the first
     /// outage that is beyond linear theory on, position and velocity down are not in the analysis: the runs beside it decide, and
     /// without runs no limit is met. All other figures hold (docs/limits.md).
-    pub fn check(&self, summary: &Summary) -> Met {
-        if self.figure == Figure::Consistent {
+    pub fn check(&self, summary: &Summary) -> RequirementResult {
+        if self.figure == LimitedFigure::Consistent {
             let Verdict {
                 kind,
                 ratio,
@@ -557,7 +559,7 @@ impl Requirement {
                 ..
             } = summary.verdict;
             let (name, met) = (self.name(), kind == VerdictKind::Consistent);
-            return Met {
+            return RequirementResult {
                 name,
                 limit: self.limit,
                 value: ratio,
@@ -569,12 +571,12 @@ impl Requirement {
         // Free of chance: a limit is then not kept or missed by the luck of the runs.
         let expected = summary.lincov.as_deref().unwrap_or(summary);
         let of_outage = |o: &OutageSummary| match self.figure {
-            Figure::P50 => o.horizontal_error_end_m.p50,
-            Figure::P95 => o.horizontal_error_end_m.p95,
-            Figure::Rmse(state) => o.rmse_end.0[state],
-            Figure::Consistent => o.verdict.ratio,
+            LimitedFigure::P50 => o.horizontal_error_end_m.p50,
+            LimitedFigure::P95 => o.horizontal_error_end_m.p95,
+            LimitedFigure::Rmse(state) => o.rmse_end.0[state],
+            LimitedFigure::Consistent => o.verdict.ratio,
         };
-        let is_down = matches!(self.figure, Figure::Rmse(state) if DOWN.contains(&state));
+        let is_down = matches!(self.figure, LimitedFigure::Rmse(state) if DOWN.contains(&state));
         let is_shifted = |o: &OutageSummary| o.beyond_linear;
         let shifted = expected
             .outages
@@ -589,7 +591,7 @@ impl Requirement {
         let worst = ends.max_by(|a, b| (a.1.is_nan().cmp(&b.1.is_nan())).then(a.1.total_cmp(&b.1)));
         let (outage, value) = match (worst, self.figure) {
             (Some((outage, value)), _) => (Some(outage), value),
-            (None, Figure::Rmse(state)) => (None, expected.accuracy.rmse_mean.0[state]),
+            (None, LimitedFigure::Rmse(state)) => (None, expected.accuracy.rmse_mean.0[state]),
             (None, _) => (None, f64::NAN),
         };
         let (is_kept, is_sampled) = (value <= self.limit, summary.runs > 0);
@@ -600,7 +602,7 @@ impl Requirement {
         };
         let beyond_linear = shifted.filter(|_| decides);
         let met = is_kept && (is_sampled || beyond_linear.is_none());
-        Met {
+        RequirementResult {
             name: self.name(),
             limit: self.limit,
             value,
@@ -614,7 +616,7 @@ impl Requirement {
 impl fmt::Display for Requirement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.figure {
-            Figure::Consistent => f.write_str("consistent"),
+            LimitedFigure::Consistent => f.write_str("consistent"),
             _ => write!(f, "{}<={}", self.name(), self.limit),
         }
     }

@@ -1,15 +1,17 @@
-//! Whether a filter is as good as it believes: one verdict, from the normalised errors of all runs.
+//! Verdict on the consistency of a filter, from the normalised errors of all runs.
 //!
-//! Statistics: NEES and (error/SEE)² of every reported state, as means over the whole run and at the end of
-//! each outage. Of a right filter each is a mean of chi-square variables, one of 9 or of 1 degree of freedom
-//! for each independent sample. Of simulated runs that is a run: the epochs of one run hang together, so a mean
-//! over epochs is given the freedom of a single epoch, an interval that holds whatever their correlation and is exact
-//! at the ends of outages. Of one recorded drive the errors themselves show how long they last
-//! ([`SampleSize::of_series`]). All statistics together alarm on a right filter with probability 1 % at most
-//! (Bonferroni), and what is significant but smaller than 10 % is let pass.
+//! Statistics: NEES and (error/SEE)² of every reported state, as means over the whole run and at
+//! the end of each outage. For a consistent filter each is a mean of chi-square variables, with 9
+//! or 1 degrees of freedom per independent sample. For simulated runs a sample is a run: the epochs
+//! of one run are correlated, so a mean over epochs gets the degrees of freedom of a single epoch,
+//! an interval that holds for any correlation and is exact at the ends of outages. For one recorded
+//! drive the errors themselves show their correlation time ([`SampleSize::of_series`]). All
+//! statistics together alarm on a consistent filter with probability 1 % at most (Bonferroni), and
+//! a significant difference below 10 % is not reported.
 //!
-//! A filter that does not alarm is consistent only where the samples would have found errors that matter: 25 % above the
-//! filter's standard deviations in all states together, 50 % in one of them. Fewer samples leave it undecided.
+//! A filter without an alarm is consistent only if the samples would have detected relevant errors:
+//! 25 % above the filter's standard deviations in all states together, 50 % in one of them. With
+//! fewer samples the verdict is undecided.
 
 use super::estimate::{Estimate, PerState, SampleSize, chi_square_interval};
 use crate::simulation::{NEES_DOF, OutageRecord, REPORTED, REPORTED_NAMES, RunRecord, TOLERANCE};
@@ -173,14 +175,14 @@ pub struct OutageVerdict {
 
 /// Verdicts on the whole and on each outage, from the records of the runs through a number of outages, those that diverged left
 /// out. No outage is called wrong where the filter is not. A run that diverged did so in every outage, since nobody knows when.
-pub(super) fn judged(
+pub(super) fn verdicts(
     runs: &[RunRecord],
     outages: usize,
     windows: Option<f64>,
 ) -> (Verdict, Vec<OutageVerdict>) {
     let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
     let independent = SampleSize::of(kept.len() as u64, windows).independent;
-    let judge = Judge::of_runs(&kept, outages, windows, independent);
+    let judge = ConsistencyTest::of_runs(&kept, outages, windows, independent);
     let lost = (kept.len() < runs.len()).then_some(VerdictKind::Diverged);
     let kind = lost.unwrap_or_else(|| judge.kind(None));
     let basis = match windows {
@@ -202,7 +204,7 @@ pub(super) fn expected(
     beyond_linear: Option<usize>,
 ) -> (Verdict, Vec<OutageVerdict>) {
     let outages = record.outages.len();
-    let judge = Judge::of_runs(&[record], outages, None, f64::INFINITY);
+    let judge = ConsistencyTest::of_runs(&[record], outages, None, f64::INFINITY);
     let kind = match judge.kind(None) {
         VerdictKind::Consistent if beyond_linear.is_some() => VerdictKind::Doubtful,
         kind => kind,
@@ -220,7 +222,7 @@ impl Verdict {
     /// From the records of the runs through a number of outages, those that diverged left out;
     /// `independent_windows` as in [`RunResult`](crate::simulation::RunResult).
     pub fn of(runs: &[RunRecord], outages: usize, independent_windows: Option<f64>) -> Self {
-        judged(runs, outages, independent_windows).0
+        verdicts(runs, outages, independent_windows).0
     }
 
     /// The verdict on one recorded drive with outages (start, end) (s): errors in order of time. None without errors over their
@@ -292,7 +294,7 @@ impl Verdict {
             (_, Some(state)) => samples_of_state[state],
             _ => independent,
         };
-        let mut judge = Judge::new(&[&record], outages.len(), None, known.len(), samples);
+        let mut judge = ConsistencyTest::new(&[&record], outages.len(), None, known.len(), samples);
         // Slow errors that are small by chance leave fast ones, which look like many samples: one is sure.
         let tail = judge.tail;
         let few = judge.statistics.iter_mut();
@@ -347,7 +349,7 @@ impl Verdict {
             freedom,
             limits: ratio_limits(freedom, tail),
         };
-        let judge = Judge {
+        let judge = ConsistencyTest {
             statistics: vec![together],
             tail,
         };
@@ -363,12 +365,12 @@ impl Verdict {
         })
     }
 
-    /// Whether it rests on covariance analysis, not on runs.
+    /// Returns true if it rests on covariance analysis instead of runs.
     pub fn is_expected(&self) -> bool {
         self.basis == Basis::Expectation
     }
 
-    /// Whether the errors are of another order than the filter believes.
+    /// Returns true if the errors exceed the filter's sigma by an order of magnitude.
     pub fn is_far_off(&self) -> bool {
         self.nees > FAR
     }
@@ -413,14 +415,14 @@ fn ratio_limits((dof, samples): (usize, f64), tail: f64) -> (f64, f64) {
 }
 
 /// The statistics of some samples and what a right filter's are.
-struct Judge {
+struct ConsistencyTest {
     /// All states together and each of them, over the whole run and at the end of each outage.
     statistics: Vec<Statistic>,
     /// Probability that one of them is beyond a limit.
     tail: f64,
 }
 
-impl Judge {
+impl ConsistencyTest {
     /// For runs that all count alike.
     fn of_runs(
         runs: &[&RunRecord],
@@ -541,7 +543,7 @@ impl Judge {
         enough
     }
 
-    /// Whether a statistic is significantly and materially off.
+    /// Verdict of a statistic that is off both significantly and materially; else none.
     fn fault(statistic: &Statistic) -> Option<VerdictKind> {
         let (lower, upper) = statistic.limits;
         let ratio = statistic.ratio.value;

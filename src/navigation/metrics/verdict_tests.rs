@@ -115,7 +115,7 @@ fn each_outage_has_a_verdict_of_its_own() {
     all.iter_mut()
         .zip(wrong)
         .for_each(|(run, wrong)| run.outages.extend(wrong.outages));
-    let found = judged(&all, 2, None).1;
+    let found = verdicts(&all, 2, None).1;
     assert_eq!(found[0].kind, VerdictKind::Consistent);
     assert_eq!(
         (found[1].kind, found[1].worst_state),
@@ -125,7 +125,7 @@ fn each_outage_has_a_verdict_of_its_own() {
     assert_eq!(Verdict::of(&all, 2, None).worst_outage, Some(1));
     all[7].diverged = true;
     assert!(
-        judged(&all, 2, None)
+        verdicts(&all, 2, None)
             .1
             .iter()
             .all(|v| v.kind == VerdictKind::Diverged)
@@ -200,7 +200,7 @@ fn too_few_runs_leave_a_right_filter_undecided() {
         "{decided:?}"
     );
     assert!(one_less.detectable_state_ratio > 1.5 && decided.times_to_decide.is_none());
-    assert!(judged(&runs(8, 1, 3, [1.0; 9]), 1, None).1[0].kind == VerdictKind::Undecided);
+    assert!(verdicts(&runs(8, 1, 3, [1.0; 9]), 1, None).1[0].kind == VerdictKind::Undecided);
     assert_eq!(verdict(8, 2.5).kind, VerdictKind::Overconfident);
 }
 

@@ -1,7 +1,9 @@
-//! What a vehicle knows of its own motion: the non-holonomic constraint, a wheel, standstill, a heading.
+//! Aiding by the vehicle's motion: the non-holonomic constraint, an odometer, zero velocity, a
+//! heading.
 //!
-//! Each is believed by the filter as white noise, and its lasting errors as states where a deviation of theirs is
-//! given. What is truly wrong with it stands apart in a table `truth`, so that a filter that leaves it out is seen.
+//! The filter models each with white noise, and with states for lasting errors where their standard
+//! deviation is given. The true errors stand apart in a table `truth`, so that a filter that leaves
+//! them out is detected.
 //!
 //! The vehicle's axes are forward, right, down, those of the reference. Models of the errors:
 //! [Groves](crate::bibliography::Groves13), sec. 15.3 (constraints) and 16.3 (odometers).
@@ -29,12 +31,12 @@ pub struct AidingSettings {
 }
 
 impl AidingSettings {
-    /// Whether there is none.
+    /// Returns true if no aid is set.
     pub fn is_none(&self) -> bool {
         self.rates().next().is_none()
     }
 
-    /// Those that are there, and their rates (Hz).
+    /// Aids that are set, and their rates (Hz).
     pub fn rates(&self) -> impl Iterator<Item = (Aid, f64)> {
         let rate = |aid| Some((aid, self.common(aid)?.0));
         Aid::ALL.into_iter().filter_map(rate)
@@ -74,7 +76,7 @@ impl AidingSettings {
         })
     }
 
-    /// Whether an aid is part of the receiver: it measures nothing in outages.
+    /// Returns true for an aid that is part of the receiver and so measures nothing in outages.
     pub(crate) fn is_of_gnss(&self, aid: Aid) -> bool {
         let heading = self.heading.as_ref().filter(|_| aid == Aid::Heading);
         heading.is_some_and(|heading| heading.source == HeadingSource::Antennas)
@@ -160,7 +162,7 @@ impl Aid {
     /// All, in the order of their use at one instant.
     pub(crate) const ALL: [Self; 4] = [Self::Nhc, Self::Odometer, Self::Zupt, Self::Heading];
 
-    /// As its table is called.
+    /// Name of its table.
     pub const fn name(self) -> &'static str {
         ["nhc", "odometer", "zupt", "heading"][self as usize]
     }
@@ -208,7 +210,7 @@ impl AidingSettings {
         found
     }
 
-    /// What is truly wrong with them beside white noise (m/s, rad, 1).
+    /// True errors beside white noise (m/s, rad, 1).
     pub(crate) fn errors(&self) -> Vec<AidError> {
         use AidPart::*;
         let mut all = Vec::new();
@@ -347,10 +349,12 @@ impl AidPart {
         (source, key)
     }
 
-    /// What a unit of it adds to the measurement along an axis of the vehicle (a heading has one, 0), which moves with
-    /// this velocity (m/s) and acceleration (m/s²), both in the vehicle's axes.
+    /// Derivative of the measurement along an axis of the vehicle (0 for a heading) with respect to
+    /// it. The vehicle moves with this velocity (m/s) and acceleration (m/s²), both in its own
+    /// axes.
     ///
-    /// The axes of the vehicle are those of the IMU turned by the small angles m: its velocity there is v − m × v.
+    /// The axes of the vehicle are those of the IMU turned by the small angles m: its velocity
+    /// there is v − m × v.
     pub(crate) fn coefficient(self, axis: usize, v_b: DVec3, a_b: DVec3) -> f64 {
         match (self, axis) {
             (Self::MountingYaw, 1) => -v_b.x,
@@ -366,7 +370,7 @@ impl AidPart {
     }
 }
 
-/// How an error goes on.
+/// Time behaviour of an error.
 #[derive(Clone, Copy)]
 pub(crate) enum Law {
     /// The same value in every run.
@@ -495,7 +499,7 @@ pub struct NhcSettings {
     /// 0: none.
     #[schemars(with = "Amount")]
     pub mounting_sigma_deg: f64,
-    /// What is truly wrong with it.
+    /// Its true errors.
     pub truth: NhcErrors,
 }
 
@@ -536,7 +540,7 @@ pub struct OdometerSettings {
     /// Scale factor of the wheel, as the filter expects it (1 σ): a state; 0: none.
     #[schemars(with = "Amount")]
     pub scale_sigma: f64,
-    /// What is truly wrong with it.
+    /// Its true errors.
     pub truth: OdometerErrors,
 }
 
@@ -565,7 +569,7 @@ pub struct ZuptSettings {
     /// Standard deviation of one measurement, white, as the filter believes (m/s).
     #[schemars(with = "Measurable")]
     pub sigma_m_s: f64,
-    /// What is truly wrong with it.
+    /// Its true errors.
     pub truth: ZuptErrors,
 }
 
@@ -594,13 +598,13 @@ pub struct HeadingSettings {
     /// Standard deviation of one measurement, white, as the filter believes (degrees).
     #[schemars(with = "Measurable")]
     pub sigma_deg: f64,
-    /// What measures it.
+    /// Sensor of the heading.
     pub source: HeadingSource,
-    /// What is truly wrong with it.
+    /// Its true errors.
     pub truth: HeadingErrors,
 }
 
-/// What measures a heading.
+/// Sensor of a heading.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeadingSource {

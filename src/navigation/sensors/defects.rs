@@ -1,4 +1,5 @@
-//! What is wrong with the true IMU beside its noise. The filter knows nothing of it but what `[initial]` lets it expect.
+//! Errors of the true IMU beside its noise. The filter knows only as much of them as `[initial]`
+//! states.
 
 use super::normal;
 use crate::imu::{ImuSample, MAX_RATE_HZ, Sensor};
@@ -41,7 +42,7 @@ pub struct ImuSettings {
     #[schemars(with = "NonNegative", range(max = MAX_G_SENSITIVITY))]
     #[serde(skip_serializing_if = "is_zero")]
     pub g_sensitivity_rad_s_per_m_s2: f64,
-    /// What accelerometers rectify.
+    /// Vibration rectified by the accelerometers.
     pub vibration: Option<Vibration>,
     /// Its temperature, and what that does.
     pub temperature: Option<Temperature>,
@@ -132,7 +133,7 @@ impl ImuSettings {
         all.into_iter().filter(|(_, _, sigma, _)| *sigma > 0.0)
     }
 
-    /// Whether the true IMU has no error beside its noise.
+    /// Returns true if the IMU has no error beside its noise.
     pub(crate) fn is_ideal(&self) -> bool {
         Self {
             rate_hz: self.rate_hz,
@@ -292,7 +293,7 @@ impl Temperature {
     }
 }
 
-/// What an error of a sensor's axis is proportional to.
+/// Quantity to which an error of a sensor's axis is proportional.
 pub(crate) enum Felt {
     /// Nothing that changes: a bias.
     Unit,
@@ -304,7 +305,7 @@ pub(crate) enum Felt {
     Warming,
 }
 
-/// What an IMU feels over a sample.
+/// Motion and temperature of the IMU over a sample.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Surroundings {
     /// Specific force (m/s²) and angular rate (rad/s) in b.
@@ -316,7 +317,7 @@ pub(crate) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Of a true sample at a time on the trajectory that begins with the sample `first`.
+    /// Environment of a true sample at a time; the trajectory begins with the sample `first`.
     pub(crate) fn at(
         settings: &ImuSettings,
         sample: &ImuSample,
@@ -335,7 +336,7 @@ impl Surroundings {
         }
     }
 
-    /// What an error is proportional to.
+    /// Value of the quantity to which an error is proportional.
     pub(crate) fn value(&self, of: Felt) -> f64 {
         match of {
             Felt::Unit => 1.0,

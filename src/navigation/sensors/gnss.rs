@@ -157,7 +157,7 @@ fn parse_sigmas_or_none<'de, D: Deserializer<'de>>(
     })
 }
 
-/// How the velocity's standard deviations are written.
+/// Serialised form of the velocity's standard deviations.
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected three numbers or \"none\"")]
 enum SigmasOrNone {

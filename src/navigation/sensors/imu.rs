@@ -9,7 +9,7 @@ use crate::units::Refused;
 use crate::wavelet::haar;
 use rand::RngExt;
 
-/// What makes the errors of the true IMU.
+/// Source of the true IMU's errors.
 #[derive(Debug, Clone, Copy)]
 pub enum Truth<'a> {
     /// Synthesised from a model, per run and axis.
@@ -42,9 +42,9 @@ pub enum TruthError {
     TooShort {
         /// Name of the recording.
         recording: String,
-        /// How long it lasts (s).
+        /// Its length (s).
         has_s: f64,
-        /// How long the trajectory lasts (s).
+        /// Length of the trajectory (s).
         needs_s: f64,
     },
 }
@@ -84,8 +84,8 @@ impl Truth<'_> {
         }
     }
 
-    /// How many windows of `samples` samples the recordings hold side by side: runs beyond these share noise
-    /// with others. None for a model, which gives every run noise of its own.
+    /// Number of disjoint windows of `samples` samples in the recordings: more runs than these
+    /// share noise. None for a model, which gives every run its own noise.
     pub(crate) fn independent_windows(&self, samples: usize) -> Option<f64> {
         match self {
             Self::Model(_) | Self::Drawn(_) => None,
@@ -131,7 +131,7 @@ fn check_recording(recording: &Recording, imu_hz: f64, needs: usize) -> Result<(
 /// The errors of up to eight runs, side by side.
 #[derive(Debug, Clone)]
 pub struct LaneErrors<'a> {
-    source: Source<'a>,
+    source: ErrorSource<'a>,
     /// For each sample, accelerometer (m/s²) and gyroscope (rad/s); the first `used` have been handed out.
     block: Vec<[Vec3; 2]>,
     used: usize,
@@ -139,7 +139,7 @@ pub struct LaneErrors<'a> {
 }
 
 #[derive(Debug, Clone)]
-enum Source<'a> {
+enum ErrorSource<'a> {
     /// One synthesizer for each channel.
     Synthesised(Box<[Synthesizer<LaneGenerator>; 6]>),
     /// For each run the rest of its window on the six channels, and the level from which that started (m/s² or rad/s).
@@ -159,7 +159,7 @@ impl<'a> LaneErrors<'a> {
         samples: usize,
     ) -> Self {
         let synthesised = |model_of: &dyn Fn(u64) -> &'a Model| {
-            Source::Synthesised(Box::new(Channel::ALL.map(|channel| {
+            ErrorSource::Synthesised(Box::new(Channel::ALL.map(|channel| {
                 let source = &*channel.to_string();
                 let keys = keys.iter().map(|key| StreamKey { source, ..*key });
                 let runs = keys.map(|key| (model_of(key.run).axis(channel), key));
@@ -184,7 +184,7 @@ impl<'a> LaneErrors<'a> {
                         (&all[start..start + samples], level)
                     })
                 };
-                Source::Recorded(keys.iter().map(window).collect())
+                ErrorSource::Recorded(keys.iter().map(window).collect())
             }
         };
         Self {
@@ -211,8 +211,10 @@ impl<'a> LaneErrors<'a> {
         self.block.resize(first + BLOCK, [Vec3::ZERO; 2]);
         for channel in Channel::ALL {
             match &mut self.source {
-                Source::Synthesised(channels) => channels[channel.index()].fill(&mut self.channel),
-                Source::Recorded(windows) => {
+                ErrorSource::Synthesised(channels) => {
+                    channels[channel.index()].fill(&mut self.channel)
+                }
+                ErrorSource::Recorded(windows) => {
                     self.channel.fill(Lanes::ZERO);
                     for (lane, window) in windows.iter_mut().enumerate() {
                         let (left, level) = &mut window[channel.index()];

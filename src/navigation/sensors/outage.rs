@@ -20,8 +20,9 @@ pub struct Outage {
     pub end_s: f64,
 }
 
-/// What a time that is typed and the same time as a multiple of 1/rate differ by at most (s): times of days, 1e5 s, are
-/// rounded to 1.5e-11 s, so that some tens of roundings are less, and no two samples are as near.
+/// Largest difference between a typed time and the same time as a multiple of 1/rate (s): times of
+/// days, 1e5 s, are rounded to 1.5e-11 s, so that some tens of roundings are less, and no two
+/// samples are as near.
 const SLACK_S: f64 = 1e-9;
 
 impl Outage {
@@ -38,7 +39,7 @@ impl Outage {
         },
     ];
 
-    /// Whether a fix at `t_s` is missing.
+    /// Returns true if a fix at `t_s` is missing.
     pub fn withholds(&self, t_s: f64) -> bool {
         self.start_s <= t_s + SLACK_S && !self.is_over(t_s)
     }
@@ -218,7 +219,7 @@ pub enum OutageError {
 }
 
 impl OutageError {
-    /// What to know to correct it.
+    /// Hint for correcting it.
     pub fn hint(&self) -> Option<&str> {
         match self {
             Self::Setting(_) => None,
@@ -232,7 +233,7 @@ impl OutageError {
 pub struct PlacedOutages {
     /// In time order, apart from one another.
     pub windows: Vec<Outage>,
-    /// Where they are not what was asked for.
+    /// Remarks on outages that differ from the request.
     pub remarks: Vec<String>,
 }
 
@@ -333,7 +334,7 @@ impl RandomOutages {
 
 // What outages are asked for, and the one rule of runs, studies and fusions that places them on data.
 
-/// What is asked for: the union of all kinds.
+/// Requested outages: the union of all kinds.
 #[derive(Debug, Clone, Default)]
 pub struct OutagePlan {
     /// Windows asked for by their times: they must lie on the data.

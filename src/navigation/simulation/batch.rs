@@ -2,7 +2,7 @@
 
 use super::gains::{GainsUsed, SharedFilter};
 use super::plan::{Event, Plan};
-use super::source::{Measured, Source};
+use super::source::{LaneMeasurements, LaneSource};
 use super::{BIASES, COVERAGE_DOF, EpochSums, NEES_DOF, OutageRecord, REPORTED, RunRecord};
 use crate::earth::ned_difference;
 use crate::ekf::covariance::{PSI, R, V};
@@ -41,11 +41,11 @@ pub(super) fn run_candidates(
     live: usize,
     filters: &[BatchFilter<'_>],
 ) -> Vec<Batch> {
-    let mut source = Source::new(plan, first, live);
+    let mut source = LaneSource::new(plan, first, live);
     let starts = source.starts(plan);
-    let mut candidates: Vec<Candidate<'_>> = filters
+    let mut candidates: Vec<LaneFilter<'_>> = filters
         .iter()
-        .map(|filter| Candidate::new(plan, *filter, &starts, live))
+        .map(|filter| LaneFilter::new(plan, *filter, &starts, live))
         .collect();
     let mut done = 0;
     for (index, event) in plan.events.iter().enumerate() {
@@ -64,7 +64,11 @@ pub(super) fn run_candidates(
 }
 
 /// Uses all measurements of an instant; returns the NIS of the fix.
-pub(super) fn measure(ekf: &mut Ekf, plan: &Plan<'_>, measured: &Measured) -> Option<Lanes> {
+pub(super) fn measure(
+    ekf: &mut Ekf,
+    plan: &Plan<'_>,
+    measured: &LaneMeasurements,
+) -> Option<Lanes> {
     let nis = measured.fix.as_ref().map(|fix| update(ekf, fix));
     if let (Some(h), Some(baro)) = (&measured.height, plan.experiment.baro) {
         let _ = update_height(ekf, h, baro.sigma_m);
@@ -94,7 +98,7 @@ fn use_aid(ekf: &mut Ekf, plan: &Plan<'_>, aid: Aid, value: &Vec3) {
 }
 
 /// One filter on eight runs, and what is kept of it.
-struct Candidate<'a> {
+struct LaneFilter<'a> {
     ekf: Ekf,
     /// The same along the reference, where runs share its gains.
     shared: Option<&'a SharedFilter>,
@@ -106,7 +110,7 @@ struct Candidate<'a> {
     nis: (Lanes, u64),
 }
 
-impl<'a> Candidate<'a> {
+impl<'a> LaneFilter<'a> {
     fn new(
         plan: &Plan<'_>,
         (belief, shared): BatchFilter<'a>,
@@ -139,7 +143,13 @@ impl<'a> Candidate<'a> {
     }
 
     /// Outage ends, the fix if one is used, the report if one is due.
-    fn at_event(&mut self, plan: &Plan<'_>, index: usize, event: &Event, measured: &Measured) {
+    fn at_event(
+        &mut self,
+        plan: &Plan<'_>,
+        index: usize,
+        event: &Event,
+        measured: &LaneMeasurements,
+    ) {
         let shared = self.shared.map(|shared| &shared[index]);
         if let Some(shared) = shared {
             shared.before.iter().for_each(|p| self.ekf.p.set_shared(p));
@@ -168,7 +178,7 @@ impl<'a> Candidate<'a> {
             return;
         }
         settle(&mut self.ekf);
-        let found = Assessment::of(&self.ekf, self.live, &event.reference);
+        let found = LaneAssessment::of(&self.ekf, self.live, &event.reference);
         let log_density = found.log_density(&self.ekf);
         for (_, records) in plan
             .outages
@@ -280,7 +290,7 @@ fn standard_deviations(ekf: &Ekf, jacobian: &[DVec3; 3]) -> [Lanes; REPORTED] {
 // How far eight runs are from the reference, and how far their filters believe they are.
 
 /// Errors and beliefs of eight runs at one instant; the covariance must be settled.
-struct Assessment {
+struct LaneAssessment {
     /// The filter's own standard deviation of each reported state (m, m/s, degrees).
     see: [Lanes; REPORTED],
     /// Error of each reported state, estimate − truth (m, m/s, degrees).
@@ -293,7 +303,7 @@ struct Assessment {
     nees: Lanes,
 }
 
-impl Assessment {
+impl LaneAssessment {
     /// Logarithm of the density of the errors under the filter's belief.
     fn log_density(&self, ekf: &Ekf) -> Lanes {
         ekf.p
@@ -327,7 +337,7 @@ impl Assessment {
     }
 }
 
-/// What eight runs report at one epoch.
+/// Reported values of eight runs at one epoch.
 struct EpochLanes {
     t_s: f64,
     gnss: bool,
@@ -341,9 +351,9 @@ struct EpochLanes {
 }
 
 impl EpochLanes {
-    /// What the first `live` lanes report at an event.
+    /// Reported values of the first `live` lanes at an event.
     fn of(ekf: &Ekf, live: usize, plan: &Plan<'_>, event: &Event) -> Self {
-        let found = Assessment::of(ekf, live, &event.reference);
+        let found = LaneAssessment::of(ekf, live, &event.reference);
         let states: [usize; COVERAGE_DOF] =
             std::array::from_fn(|i| if i < 3 { 3 * R + i } else { 3 * PSI + i - 3 });
         let coverage = ekf

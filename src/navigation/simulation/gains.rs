@@ -7,7 +7,7 @@
 use super::REPORTED;
 use super::batch::{Batch, BatchFilter, measure, run_candidates};
 use super::plan::{Event, Plan};
-use super::source::Measured;
+use super::source::LaneMeasurements;
 use crate::ekf::covariance::SharedCovariance;
 use crate::ekf::{Belief, Ekf, FixUpdate, GainSource, SharedUpdate, advance, settle};
 use crate::lanes::{LANES, Vec3};
@@ -201,7 +201,7 @@ fn along_reference(plan: &Plan<'_>, belief: &Belief) -> SharedFilter {
         settle(&mut ekf);
         let before = plan.ends_outage(index).then(|| ekf.p.shared());
         ekf.gains = GainSource::Kept(Vec::new());
-        let _ = measure(&mut ekf, plan, &Measured::exact(plan, event));
+        let _ = measure(&mut ekf, plan, &LaneMeasurements::exact(plan, event));
         let GainSource::Kept(updates) = std::mem::take(&mut ekf.gains) else {
             unreachable!("they were kept")
         };

@@ -11,7 +11,7 @@ pub(crate) use batch::reported_error;
 pub use gains::{Gains, GainsUsed, run_batch};
 pub(crate) use plan::samples_per;
 pub use plan::{Experiment, ExperimentError, Plan};
-pub use source::{Recording, record};
+pub use source::{SimulatedRecording, record};
 
 use serde::{Deserialize, Serialize};
 
@@ -58,7 +58,7 @@ pub(crate) const COVERAGE_DOF: usize = 6;
 pub struct EpochSums {
     /// Time on the trajectory (s).
     pub t_s: f64,
-    /// Whether a GNSS fix was used at this epoch.
+    /// True if a GNSS fix was used at this epoch.
     pub gnss: bool,
     /// Runs summed (diverged runs are left out).
     pub count: u64,
@@ -86,7 +86,7 @@ pub struct EpochSums {
     pub covered: u64,
 }
 
-/// What is kept of one run in one outage.
+/// Record of one run in one outage.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct OutageRecord {
     /// Mean over the outage's reporting epochs (start ≤ t < end) of the SEE of each reported state.
@@ -107,12 +107,12 @@ pub struct OutageRecord {
     pub reconvergence_s: f64,
 }
 
-/// What is kept of one run.
+/// Record of one run.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct RunRecord {
     /// Run, counted from 0: with the seed it names every random number of the run.
     pub run: u64,
-    /// Whether state or covariance stopped being finite; such a run is in no sum.
+    /// True if state or covariance stopped being finite; such a run is in no sum.
     pub diverged: bool,
     /// One record an outage.
     pub outages: Vec<OutageRecord>,
@@ -143,8 +143,8 @@ pub struct RunResult {
     pub coverage_level: f64,
     /// IMU epochs processed, all runs.
     pub run_epochs: u64,
-    /// How many windows of the recordings that made the errors do not overlap: more runs than these share
-    /// their noise. None: every run has noise of its own.
+    /// Number of disjoint windows of the recordings that made the errors: more runs than these
+    /// share their noise. None: every run has noise of its own.
     pub independent_windows: Option<f64>,
     /// The gains of the filter.
     #[serde(default)]

@@ -1,4 +1,4 @@
-//! What all runs of an experiment share, computed once: ideal samples, reference, schedule.
+//! Common data of all runs of an experiment, computed once: ideal samples, reference, schedule.
 
 use super::gains::{Decision, Gains};
 use crate::earth::{GravityModel, MAX_LATITUDE};
@@ -27,7 +27,7 @@ pub struct Experiment<'a> {
     pub rate_hz: f64,
     /// Gravity of truth and filter.
     pub gravity: GravityModel,
-    /// What makes the inertial errors.
+    /// Source of the inertial errors.
     pub truth: Truth<'a>,
     /// The candidates: filters that run on the same noise, each with its own belief.
     pub beliefs: &'a [Belief],
@@ -35,15 +35,15 @@ pub struct Experiment<'a> {
     pub gnss: &'a GnssSettings,
     /// The start.
     pub initial: &'a InitialSettings,
-    /// What is wrong with the true IMU beside its noise.
+    /// Errors of the true IMU beside its noise.
     pub defects: &'a ImuSettings,
     /// A barometer, if there is one.
     pub baro: Option<&'a BaroSettings>,
-    /// What the vehicle knows of its own motion.
+    /// Vehicle constraints and sensors.
     pub aiding: &'a AidingSettings,
-    /// How the filters use a fix.
+    /// Measurement update with a fix: standard or iterated.
     pub update: FixUpdate,
-    /// Where runs take their gains from.
+    /// Source of the gains.
     pub gains: Gains,
     /// When fixes are missing.
     pub outages: &'a [Outage],
@@ -91,15 +91,15 @@ pub(super) struct Event {
     pub reference: NavState,
     /// Reference position and velocity of the antenna: lat, lon (rad), h (m), v_n (m/s).
     pub antenna: ([f64; 3], DVec3),
-    /// Whether the receiver has an epoch here.
+    /// True if the receiver has an epoch here.
     pub gnss_epoch: bool,
-    /// Whether its fix is used.
+    /// True if its fix is used.
     pub fix: bool,
-    /// Whether the barometer has a height here.
+    /// True if the barometer has a height here.
     pub baro: bool,
-    /// What the vehicle measures of itself here.
+    /// Aiding measurements of the vehicle here.
     pub aids: Vec<Aided>,
-    /// Whether the epoch is reported (1 Hz).
+    /// True if the epoch is reported (1 Hz).
     pub report: bool,
 }
 
@@ -169,7 +169,7 @@ impl<'a> Plan<'a> {
         self.decision.get_or_init(|| Decision::new(self))
     }
 
-    /// What the IMU feels over a sample, as it is in its middle.
+    /// Motion and temperature of the IMU in the middle of a sample.
     pub(super) fn felt(&self, sample: usize) -> Surroundings {
         felt(self.experiment, sample, &self.ideal[sample], &self.ideal[0])
     }
@@ -338,11 +338,11 @@ pub(super) struct Aided {
     pub v_b: DVec3,
     /// Acceleration of the vehicle with respect to the Earth, in b (m/s²).
     pub a_b: DVec3,
-    /// Whether an outage withholds it.
+    /// True if an outage withholds it.
     pub withheld: bool,
 }
 
-/// What the vehicle measures of itself, of these aids.
+/// True measurements of these aids.
 fn aided<'a>(
     experiment: &Experiment<'_>,
     t_s: f64,

@@ -1,4 +1,4 @@
-//! What is random of eight runs: starts, inertial errors, fixes, heights, what a vehicle measures of itself.
+//! Random quantities of eight runs: starts, inertial errors, fixes, heights, aiding measurements.
 
 use super::plan::{Aided, Event, Plan};
 use crate::earth::moved;
@@ -19,15 +19,15 @@ use crate::units::DEG;
 use glam::{DQuat, DVec3};
 use std::ops::Range;
 
-/// What eight runs measure at an instant.
-pub(super) struct Measured {
+/// Measurements of eight runs at an instant.
+pub(super) struct LaneMeasurements {
     pub fix: Option<Fix>,
     pub height: Option<Lanes>,
     /// Velocities along the vehicle's axes (m/s); of a heading the first is the yaw (rad).
     pub aids: Vec<(Aid, Vec3)>,
 }
 
-impl Measured {
+impl LaneMeasurements {
     /// The measurements of an instant without error.
     pub(super) fn exact(plan: &Plan<'_>, event: &Event) -> Self {
         let aids = event.aids.iter().filter(|aided| !aided.withheld);
@@ -62,7 +62,7 @@ fn exact_aid(event: &Event, aided: &Aided) -> Vec3 {
 }
 
 /// Everything random of eight runs.
-pub(super) struct Source<'a> {
+pub(super) struct LaneSource<'a> {
     /// Rate of the IMU (Hz).
     rate_hz: f64,
     imu: LaneErrors<'a>,
@@ -75,7 +75,7 @@ pub(super) struct Source<'a> {
     keys: Vec<StreamKey<'a>>,
 }
 
-impl<'a> Source<'a> {
+impl<'a> LaneSource<'a> {
     pub(super) fn new(plan: &Plan<'a>, first: u64, live: usize) -> Self {
         let experiment = plan.experiment;
         let key = |run| StreamKey {
@@ -140,9 +140,9 @@ impl<'a> Source<'a> {
 
     /// The measurements of this epoch. Fixes are drawn within outages too, so that an outage changes no random number
     /// after it.
-    pub(super) fn measured(&mut self, plan: &Plan<'_>, event: &Event) -> Measured {
+    pub(super) fn measured(&mut self, plan: &Plan<'_>, event: &Event) -> LaneMeasurements {
         let fix = event.gnss_epoch.then(|| self.fix(plan, event));
-        Measured {
+        LaneMeasurements {
             fix: fix.filter(|_| event.fix),
             height: self.height(plan, event),
             aids: self.aids(event),
@@ -159,7 +159,7 @@ impl<'a> Source<'a> {
         Some(h)
     }
 
-    /// What the vehicle measures of itself at this epoch.
+    /// Aiding measurements of the vehicle at this epoch.
     fn aids(&mut self, event: &Event) -> Vec<(Aid, Vec3)> {
         let after_s = event.sample as f64 / self.rate_hz;
         let mut measure = |aided: &Aided| {
@@ -219,9 +219,9 @@ fn nominal_start(plan: &Plan<'_>, key: StreamKey<'_>) -> NavState {
 
 // One run as its sensors record it: the data that fusion reads, made by the machinery of the runs.
 
-/// What was recorded, and where the filter would start.
+/// Recorded measurements of one run, and the initial state of its filter.
 #[derive(Debug, Clone)]
-pub struct Recording {
+pub struct SimulatedRecording {
     /// Samples, increments over the interval that ends at their time.
     pub imu: Vec<ImuIncrement>,
     /// Fixes outside the outages, with the standard deviations they were drawn from.
@@ -233,9 +233,9 @@ pub struct Recording {
 /// Samples whose errors are drawn at a time.
 const BLOCK: usize = 4096;
 
-/// What the sensors record in a run: the same noise as the run itself has.
-pub fn record(plan: &Plan<'_>, run: u64) -> Recording {
-    let mut source = Source::new(plan, run, 1);
+/// Records the sensors in a run, with the same noise as in the run itself.
+pub fn record(plan: &Plan<'_>, run: u64) -> SimulatedRecording {
+    let mut source = LaneSource::new(plan, run, 1);
     let fix = |event: &Event| {
         let fix = source.fix(plan, event); // at every epoch, so that outages change no number
         let velocity = |v_n: Vec3| GnssVelocity::new(v_n.lane(0), fix.vel_sigma_m_s);
@@ -269,7 +269,7 @@ pub fn record(plan: &Plan<'_>, run: u64) -> Recording {
             });
         }
     }
-    Recording {
+    SimulatedRecording {
         imu,
         gnss,
         start: source.starts(plan)[0],

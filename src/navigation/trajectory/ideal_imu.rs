@@ -1,4 +1,4 @@
-//! What a perfect integrating IMU measures along a trajectory.
+//! Samples of an ideal integrating IMU along a trajectory.
 
 use crate::earth::{GravityModel, OMEGA_IE, gravity_down, normal};
 use crate::imu::{ImuSample, MAX_RATE_HZ};
@@ -53,7 +53,7 @@ pub(crate) struct IdealSamples<'a> {
 }
 
 impl<'a> IdealSamples<'a> {
-    /// As [`ideal_imu`].
+    /// Prepares the samples of [`ideal_imu`].
     pub(crate) fn new(
         trajectory: &'a Trajectory,
         rate_hz: f64,

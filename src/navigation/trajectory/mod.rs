@@ -39,11 +39,11 @@ pub struct TrajectorySample {
 
 /// Samples that no trajectory goes through. `index` counts samples from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Error {
+pub enum TrajectoryError {
     /// A spline needs four samples.
     #[error("{found} samples: a trajectory needs at least 4")]
     TooFew {
-        /// How many were given.
+        /// Number of samples.
         found: usize,
     },
     /// NaN or infinity.
@@ -90,7 +90,7 @@ pub enum Error {
     },
 }
 
-impl Error {
+impl TrajectoryError {
     /// The sample at fault, counted from 0, if it is one.
     pub const fn index(&self) -> Option<usize> {
         match self {
@@ -138,7 +138,7 @@ impl Trajectory {
     /// # Errors
     /// Fewer than four samples, a value that is not finite, time that does not increase, latitude beyond
     /// ±89.9°, more than 60° of rotation between two samples.
-    pub fn from_samples(samples: &[TrajectorySample]) -> Result<Self, Error> {
+    pub fn from_samples(samples: &[TrajectorySample]) -> Result<Self, TrajectoryError> {
         check(samples)?;
         let origin_e = geodetic_to_ecef(samples[0].lat, samples[0].lon, samples[0].h);
         let mut q_last = DQuat::IDENTITY;
@@ -265,9 +265,9 @@ impl Piece {
     }
 }
 
-fn check(samples: &[TrajectorySample]) -> Result<(), Error> {
+fn check(samples: &[TrajectorySample]) -> Result<(), TrajectoryError> {
     if samples.len() < 4 {
-        return Err(Error::TooFew {
+        return Err(TrajectoryError::TooFew {
             found: samples.len(),
         });
     }
@@ -275,26 +275,26 @@ fn check(samples: &[TrajectorySample]) -> Result<(), Error> {
     for (index, s) in samples.iter().enumerate() {
         let named = [("t_s", s.t_s), ("lat", s.lat), ("lon", s.lon), ("h", s.h)];
         if let Some((what, value)) = named.into_iter().find(|(_, v)| !v.is_finite()) {
-            return Err(Error::NotFinite { index, what, value });
+            return Err(TrajectoryError::NotFinite { index, what, value });
         }
         let norm = s.q_b_n.length();
         // Zero, NaN and infinity alike: none can be made a unit quaternion.
         if !norm.is_normal() {
-            return Err(Error::NotFinite {
+            return Err(TrajectoryError::NotFinite {
                 index,
                 what: "attitude",
                 value: norm,
             });
         }
         if s.t_s <= previous_s {
-            return Err(Error::Time {
+            return Err(TrajectoryError::Time {
                 index,
                 t_s: s.t_s,
                 previous_s,
             });
         }
         if s.lat.abs() > MAX_LATITUDE {
-            return Err(Error::Latitude {
+            return Err(TrajectoryError::Latitude {
                 index,
                 t_s: s.t_s,
                 lat_deg: s.lat / DEG,
@@ -310,13 +310,13 @@ fn check_rotation(
     index: usize,
     from: DQuat,
     to: DQuat,
-) -> Result<(), Error> {
+) -> Result<(), TrajectoryError> {
     let angle = (from.conjugate() * to).to_scaled_axis().length();
     if angle <= MAX_ROTATION {
         return Ok(());
     }
     let (t_s, previous_s) = (samples[index].t_s, samples[index - 1].t_s);
-    Err(Error::Rotation {
+    Err(TrajectoryError::Rotation {
         index,
         t_s,
         previous_s,

@@ -1,5 +1,5 @@
-//! Whether a trajectory could be a vehicle's: speed, acceleration, jerk and angular rate within limits,
-//! velocities that agree with positions.
+//! Plausibility of a trajectory: limits on speed, acceleration, jerk and angular rate; velocities
+//! that agree with positions.
 
 use super::Trajectory;
 use crate::linalg::{by_value, larger};
@@ -12,7 +12,8 @@ const JERK_WINDOW_S: f64 = 0.1;
 /// Excesses nearer than this to one another are one (s).
 const SAME_EVENT_S: f64 = 1.0;
 
-/// What has a limit, and its unit: speed, acceleration, change of acceleration over 0.1 s, angular rate.
+/// Limited quantities and their units: speed, acceleration, change of acceleration over 0.1 s,
+/// angular rate.
 const QUANTITIES: [(&str, &str); 4] = [
     ("speed", "m/s"),
     ("acceleration", "m/s²"),
@@ -20,13 +21,13 @@ const QUANTITIES: [(&str, &str); 4] = [
     ("angular rate", "deg/s"),
 ];
 
-/// What no land vehicle does, nor an aircraft that is not aerobatic: 350 m/s, 30 m/s², 35 m/s³, 200 deg/s. Recorded
-/// drives stay below 25 m/s³ but for glitches of the recording.
+/// Limits that no land vehicle and no aircraft outside aerobatics exceeds: 350 m/s, 30 m/s², 35
+/// m/s³, 200 deg/s. Recorded drives stay below 25 m/s³ but for glitches of the recording.
 pub const LIMITS: [f64; 4] = [350.0, 30.0, 35.0, 200.0];
 
 /// A stretch beyond a limit.
 #[derive(Debug, Clone, Copy)]
-pub struct Excess {
+pub struct LimitExcess {
     /// The quantity and its unit.
     pub quantity: (&'static str, &'static str),
     /// The limit.
@@ -41,7 +42,7 @@ pub struct Excess {
     pub end_s: f64,
 }
 
-impl fmt::Display for Excess {
+impl fmt::Display for LimitExcess {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (name, unit) = self.quantity;
         write!(
@@ -62,9 +63,9 @@ impl fmt::Display for Excess {
 
 /// The largest speed, acceleration, jerk and rate of a trajectory (SI), in the order of `Quantity::ALL`,
 /// and every stretch beyond the limits, in order of time.
-pub fn examine(trajectory: &Trajectory, limits: &[f64; 4]) -> ([f64; 4], Vec<Excess>) {
+pub fn examine(trajectory: &Trajectory, limits: &[f64; 4]) -> ([f64; 4], Vec<LimitExcess>) {
     let (mut largest, mut found) = ([0.0_f64; 4], Vec::new());
-    let mut open: [Option<Excess>; 4] = [None; 4];
+    let mut open: [Option<LimitExcess>; 4] = [None; 4];
     // Acceleration is linear between knots, so that its extremes are at knots.
     for &t_s in trajectory.knots() {
         for (i, value) in magnitudes(trajectory, t_s).into_iter().enumerate() {
@@ -73,7 +74,7 @@ pub fn examine(trajectory: &Trajectory, limits: &[f64; 4]) -> ([f64; 4], Vec<Exc
             // NaN lies beyond every limit: it is to be reported, not passed over.
             // A motion made to reach the limit exactly does so to rounding.
             if value.is_nan() || value > limit * (1.0 + 1e-6) {
-                let event = Excess {
+                let event = LimitExcess {
                     quantity: QUANTITIES[i],
                     limit,
                     worst: value,
@@ -93,7 +94,7 @@ pub fn examine(trajectory: &Trajectory, limits: &[f64; 4]) -> ([f64; 4], Vec<Exc
     (largest, found)
 }
 
-fn extend(event: &mut Excess, by: &Excess) {
+fn extend(event: &mut LimitExcess, by: &LimitExcess) {
     event.end_s = by.end_s;
     if by.worst > event.worst {
         (event.worst, event.worst_s) = (by.worst, by.worst_s);
@@ -155,7 +156,8 @@ impl VelocityMisfit {
         })
     }
 
-    /// Whether they contradict the positions: 0.1 m/s + 2 % of the speed in the mean, or 1 m/s + 10 % once.
+    /// Returns true if they contradict the positions: 0.1 m/s + 2 % of the speed in the mean, or 1
+    /// m/s + 10 % once.
     pub fn contradicts(&self) -> bool {
         self.rms > 0.1 + 0.02 * self.rms_speed || self.worst > 1.0 + 0.1 * self.rms_speed
     }

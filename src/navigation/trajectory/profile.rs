@@ -28,14 +28,14 @@ use serde::{Deserialize, Deserializer};
 /// A motion profile.
 #[derive(Debug, Clone)]
 pub struct Profile {
-    /// Where and how it starts.
-    pub start: Start,
-    /// What the vehicle does with its roll angle.
+    /// Initial state.
+    pub start: ProfileStart,
+    /// Roll angle in turns.
     pub bank: Bank,
     /// Time over which accelerations and rates build up and fade (s), unless a segment says otherwise or
     /// is shorter than twice that.
     pub ramp_s: f64,
-    /// What it does, in order.
+    /// Segments, in order.
     pub segments: Vec<Segment>,
 }
 
@@ -47,7 +47,7 @@ fn degrees<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> 
 /// The start of a profile (angles in rad; in files degrees).
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Start {
+pub struct ProfileStart {
     /// Time (s).
     #[serde(default)]
     pub t_s: f64,
@@ -89,9 +89,9 @@ pub enum Bank {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Segment {
-    /// What happens.
+    /// Kind of motion.
     #[serde(flatten)]
-    pub kind: Kind,
+    pub kind: SegmentKind,
     /// Height gained over the segment (m), negative downwards.
     #[serde(default)]
     pub climb_m: f64,
@@ -100,10 +100,10 @@ pub struct Segment {
     pub ramp_s: Option<f64>,
 }
 
-/// What happens in a segment (angles in rad; in files degrees).
+/// Motion in a segment (angles in rad; in files degrees).
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "lowercase")]
-pub enum Kind {
+pub enum SegmentKind {
     /// Constant speed and heading; at speed zero, standing.
     Straight(Length),
     /// Speed changes.
@@ -112,7 +112,7 @@ pub enum Kind {
         #[serde(rename = "to_speed_m_s")]
         #[schemars(with = "NonNegative")]
         to_speed: f64,
-        /// How fast.
+        /// Acceleration or duration.
         #[serde(flatten)]
         by: Acceleration,
     },
@@ -121,7 +121,7 @@ pub enum Kind {
         /// By how much, positive to the right.
         #[serde(rename = "angle_deg", deserialize_with = "degrees")]
         angle: f64,
-        /// How fast.
+        /// Turn rate, radius or duration.
         #[serde(flatten)]
         by: Turning,
     },
@@ -129,7 +129,7 @@ pub enum Kind {
     Climb {
         /// Height gained (m).
         height_m: f64,
-        /// How long it is.
+        /// Duration or distance.
         #[serde(flatten)]
         by: Length,
     },
@@ -149,7 +149,7 @@ pub enum Kind {
         /// The points; the path ends at the last and passes inside the others.
         #[schemars(length(min = 1))]
         points: Vec<Waypoint>,
-        /// How fast the turns are.
+        /// Rate or radius of the turns.
         #[serde(flatten)]
         by: Turning,
     },
@@ -160,7 +160,7 @@ const fn braking() -> f64 {
     1.5
 }
 
-/// How long a straight is.
+/// Length of a straight.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 pub enum Length {
     /// In time (s).
@@ -171,7 +171,7 @@ pub enum Length {
     Distance(#[schemars(with = "Positive")] f64),
 }
 
-/// How fast speed changes.
+/// Rate of a speed change.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 pub enum Acceleration {
     /// Within a time (s).
@@ -182,7 +182,7 @@ pub enum Acceleration {
     Peak(#[schemars(with = "Positive")] f64),
 }
 
-/// How fast heading changes.
+/// Rate of a heading change.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 pub enum Turning {
     /// Within a time (s).
@@ -204,8 +204,8 @@ impl Profile {
     ///
     /// # Errors
     /// The first value outside its domain, or segment that cannot be followed.
-    pub fn build(&self) -> Result<Trajectory, Error> {
-        let at_start = |problem| Error {
+    pub fn build(&self) -> Result<Trajectory, ProfileError> {
+        let at_start = |problem| ProfileError {
             segment: None,
             problem,
         };
@@ -223,15 +223,17 @@ impl Profile {
         .map_err(at_start)?;
         let mut path = Path::new(self);
         for (index, segment) in self.segments.iter().enumerate() {
-            path.follow(segment).map_err(|problem| Error {
+            path.follow(segment).map_err(|problem| ProfileError {
                 segment: Some(index),
                 problem,
             })?;
         }
-        let no_trajectory = |e: super::Error| {
+        let no_trajectory = |e: super::TrajectoryError| {
             let problem = Problem::new("segment", format!("gives no trajectory: {e}"));
             at_start(match e {
-                super::Error::Rotation { .. } => problem.advise("give the turn more time"),
+                super::TrajectoryError::Rotation { .. } => {
+                    problem.advise("give the turn more time")
+                }
                 _ => problem,
             })
         };
@@ -244,10 +246,10 @@ impl Profile {
 /// A profile that cannot be followed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{}: \"{}\" {problem}", place(*segment), problem.key)]
-pub struct Error {
+pub struct ProfileError {
     /// Which segment, counted from 0; none for the profile's own keys and its start.
     pub segment: Option<usize>,
-    /// What is wrong.
+    /// The problem.
     pub problem: Problem,
 }
 
@@ -323,7 +325,7 @@ struct Path<'a> {
 
 impl<'a> Path<'a> {
     fn new(profile: &'a Profile) -> Self {
-        let Start {
+        let ProfileStart {
             t_s,
             lat,
             lon,
@@ -341,7 +343,7 @@ impl<'a> Path<'a> {
             speed,
             samples: Vec::new(),
         };
-        let still = Motion {
+        let still = MotionInstant {
             horizontal: speed,
             heading,
             heading_rate: 0.0,
@@ -357,16 +359,16 @@ impl<'a> Path<'a> {
         let climb = segment.climb_m;
         // a piece is known by its duration, whatever says how long it is
         let length_key = match &segment.kind {
-            Kind::Straight(Length::Distance(_))
-            | Kind::Climb {
+            SegmentKind::Straight(Length::Distance(_))
+            | SegmentKind::Climb {
                 by: Length::Distance(_),
                 ..
             } => "distance_m",
-            Kind::Accelerate {
+            SegmentKind::Accelerate {
                 by: Acceleration::Peak(_),
                 ..
             } => "accel_m_s2",
-            Kind::Turn { by, .. } | Kind::Waypoints { by, .. } => match by {
+            SegmentKind::Turn { by, .. } | SegmentKind::Waypoints { by, .. } => match by {
                 Turning::Duration(_) => "duration_s",
                 Turning::Rate(_) => "rate_deg_s",
                 Turning::Radius(_) => "radius_m",
@@ -382,20 +384,22 @@ impl<'a> Path<'a> {
             _ => problem,
         };
         let followed = match &segment.kind {
-            Kind::Straight(length) => self.straight(*length, climb, ramp_s),
-            Kind::Climb { height_m, by } => self.straight(*by, climb + height_m, ramp_s),
-            Kind::Accelerate { to_speed, by } => self.accelerate(*to_speed, *by, climb, ramp_s),
-            Kind::Turn { angle, by } => {
+            SegmentKind::Straight(length) => self.straight(*length, climb, ramp_s),
+            SegmentKind::Climb { height_m, by } => self.straight(*by, climb + height_m, ramp_s),
+            SegmentKind::Accelerate { to_speed, by } => {
+                self.accelerate(*to_speed, *by, climb, ramp_s)
+            }
+            SegmentKind::Turn { angle, by } => {
                 let duration = self.turn_duration(*angle, *by, ramp_s)?;
                 self.push([duration, ramp_s], 0.0, *angle, climb)
             }
-            Kind::Stop { duration, decel } => {
+            SegmentKind::Stop { duration, decel } => {
                 if self.speed > 0.0 {
                     self.accelerate(0.0, Acceleration::Peak(*decel), 0.0, ramp_s)?;
                 }
                 self.straight(Length::Duration(*duration), climb, ramp_s)
             }
-            Kind::Waypoints { points, by } => self.waypoints(points, *by, climb, ramp_s),
+            SegmentKind::Waypoints { points, by } => self.waypoints(points, *by, climb, ramp_s),
         };
         followed.map_err(named)
     }
@@ -449,10 +453,16 @@ impl<'a> Path<'a> {
     }
 
     /// The piece that continues the path for a duration with a ramp (s).
-    fn piece(&self, [duration, ramp_s]: [f64; 2], speed: f64, heading: f64, climb: f64) -> Piece {
-        let shape = Shape::new(ramp_s / duration);
+    fn piece(
+        &self,
+        [duration, ramp_s]: [f64; 2],
+        speed: f64,
+        heading: f64,
+        climb: f64,
+    ) -> MotionPiece {
+        let shape = RampShape::new(ramp_s / duration);
         let (speed, heading) = ([self.speed, speed], [self.heading, heading]);
-        Piece {
+        MotionPiece {
             duration,
             shape,
             speed,
@@ -491,7 +501,7 @@ impl<'a> Path<'a> {
         Ok(())
     }
 
-    fn integrate(&mut self, piece: &Piece) {
+    fn integrate(&mut self, piece: &MotionPiece) {
         // A whole number of steps, so that the end of the piece, where the fourth derivative of the speed may
         // jump, is a sample.
         let n = (piece.duration / STEP_S - 1e-9).ceil().max(1.0);
@@ -516,7 +526,7 @@ impl<'a> Path<'a> {
         self.speed += piece.speed[1];
     }
 
-    fn sample(&mut self, t_s: f64, motion: &Motion) {
+    fn sample(&mut self, t_s: f64, motion: &MotionInstant) {
         let roll = match self.profile.bank {
             Bank::None => 0.0,
             // Level turn: the lateral specific force v·ψ̇ and gravity combine along the down axis of the
@@ -550,7 +560,7 @@ fn duration_of(change: f64, rate: f64, ramp_s: f64) -> f64 {
 }
 
 /// Rates of latitude and longitude (rad/s), [Groves](crate::bibliography::Groves13) eq. 2.111.
-fn rates(lat: f64, motion: &Motion) -> [f64; 2] {
+fn rates(lat: f64, motion: &MotionInstant) -> [f64; 2] {
     let ((sin_lat, cos_lat), (sin_psi, cos_psi)) = (lat.sin_cos(), motion.heading.sin_cos());
     let r = radii(sin_lat);
     let (north, east) = (motion.horizontal * cos_psi, motion.horizontal * sin_psi);
@@ -567,12 +577,12 @@ fn rates(lat: f64, motion: &Motion) -> [f64; 2] {
 /// quintic smooth step, stays, and falls likewise. Value, rate, and the rate's first two derivatives are
 /// continuous; outside [0, 1] nothing changes.
 #[derive(Clone, Copy)]
-struct Shape {
+struct RampShape {
     /// Share of the whole that each ramp takes, in (0, 1/2].
     ramp: f64,
 }
 
-impl Shape {
+impl RampShape {
     fn new(ramp: f64) -> Self {
         Self {
             ramp: ramp.min(0.5),
@@ -615,10 +625,10 @@ impl Shape {
 }
 
 /// A stretch of motion: everything as a function of the share x of its duration.
-struct Piece {
+struct MotionPiece {
     /// Duration (s).
     duration: f64,
-    shape: Shape,
+    shape: RampShape,
     /// Speed along the path at the start, and its change (m/s).
     speed: [f64; 2],
     /// Heading at the start, and its change (rad).
@@ -629,7 +639,7 @@ struct Piece {
 
 /// The motion at an instant.
 #[derive(Clone, Copy, PartialEq)]
-struct Motion {
+struct MotionInstant {
     /// Horizontal speed (m/s).
     horizontal: f64,
     /// Heading (rad) and its rate (rad/s).
@@ -641,7 +651,7 @@ struct Motion {
     h: f64,
 }
 
-impl Piece {
+impl MotionPiece {
     /// Length of the path (m): the mean of a symmetric change is half of it.
     fn length(&self) -> f64 {
         self.duration * (self.speed[0] + 0.5 * self.speed[1])
@@ -657,7 +667,7 @@ impl Piece {
         }
     }
 
-    fn at(&self, x: f64) -> Motion {
+    fn at(&self, x: f64) -> MotionInstant {
         let speed = self.speed[0] + self.speed[1] * self.shape.value(x);
         let (mut sin_slope, mut h) = (0.0, self.height[0]);
         if self.height[1] != 0.0 {
@@ -666,7 +676,7 @@ impl Piece {
             sin_slope = self.height[1] / self.length() * self.shape.rate(share);
             h += self.height[1] * self.shape.value(share);
         }
-        Motion {
+        MotionInstant {
             // Speed is along the path; what climbs does not go forwards.
             horizontal: speed * (1.0 - sin_slope * sin_slope).sqrt(),
             heading: self.heading[0] + self.heading[1] * self.shape.value(x),
@@ -688,7 +698,7 @@ const MAX_CORNER: f64 = 150.0 * DEG;
 pub struct Waypoint {
     /// Where.
     #[serde(flatten)]
-    pub place: Place,
+    pub place: HorizontalPosition,
     /// Height above the ellipsoid (m), if it is to change.
     #[serde(rename = "h_m")]
     #[schemars(range(min = -12_000, max = 1_000_000))]
@@ -698,7 +708,7 @@ pub struct Waypoint {
 /// A horizontal position.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(untagged)]
-pub enum Place {
+pub enum HorizontalPosition {
     /// Latitude and longitude (rad; in files degrees).
     Geodetic {
         /// Geodetic latitude.
@@ -765,8 +775,8 @@ impl Path<'_> {
     fn target(&self, point: &Waypoint) -> Result<[f64; 2], Problem> {
         let start = &self.profile.start;
         let [lat, lon, _] = match point.place {
-            Place::Geodetic { lat, lon } => [lat, lon, start.h],
-            Place::Local { north, east } => {
+            HorizontalPosition::Geodetic { lat, lon } => [lat, lon, start.h],
+            HorizontalPosition::Local { north, east } => {
                 let by_n = DVec3::new(north, east, 0.0);
                 moved([start.lat, start.lon, start.h], by_n)
             }
@@ -876,7 +886,7 @@ impl Path<'_> {
         Err(Problem::new("points", text).advise(NEARER))
     }
 
-    /// What is left to turn (rad) to the target after a turn by an angle.
+    /// Angle that remains to the target after a turn by `angle` (rad).
     fn miss(&self, angle: f64, target: [f64; 2], by: Turning, ramp_s: f64) -> Result<f64, Problem> {
         let [chord, _] = self.corner(angle, by, ramp_s)?;
         let (sin_psi, cos_psi) = (self.heading + 0.5 * angle).sin_cos();
@@ -916,7 +926,7 @@ mod piece_tests {
     #[test]
     fn rate_value_and_integral_are_derivatives_of_one_another() {
         for ramp in [0.05, 0.3, 0.5] {
-            let s = Shape::new(ramp);
+            let s = RampShape::new(ramp);
             assert_eq!(
                 (s.value(0.0), s.value(1.0), s.integral(0.0)),
                 (0.0, 1.0, 0.0)
@@ -941,8 +951,8 @@ mod piece_tests {
 
     #[test]
     fn height_follows_the_path_also_from_rest() {
-        let shape = Shape::new(0.25);
-        let piece = Piece {
+        let shape = RampShape::new(0.25);
+        let piece = MotionPiece {
             duration: 10.0,
             shape,
             speed: [0.0, 8.0],

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 fn straight(by: Length) -> Segment {
     Segment {
-        kind: Kind::Straight(by),
+        kind: SegmentKind::Straight(by),
         climb_m: 0.0,
         ramp_s: None,
     }
@@ -14,7 +14,7 @@ fn straight(by: Length) -> Segment {
 
 fn accelerate(to_speed: f64, by: Acceleration) -> Segment {
     Segment {
-        kind: Kind::Accelerate { to_speed, by },
+        kind: SegmentKind::Accelerate { to_speed, by },
         climb_m: 0.0,
         ramp_s: None,
     }
@@ -22,7 +22,7 @@ fn accelerate(to_speed: f64, by: Acceleration) -> Segment {
 
 fn turn(angle_deg: f64, by: Turning) -> Segment {
     Segment {
-        kind: Kind::Turn {
+        kind: SegmentKind::Turn {
             angle: angle_deg * DEG,
             by,
         },
@@ -32,7 +32,7 @@ fn turn(angle_deg: f64, by: Turning) -> Segment {
 }
 
 fn profile(speed: f64, segments: Vec<Segment>) -> Profile {
-    let start = Start {
+    let start = ProfileStart {
         t_s: 10.0,
         lat: 46.5 * DEG,
         lon: 6.6 * DEG,
@@ -172,7 +172,7 @@ fn coordinated_turns_bank() {
 #[test]
 fn acceleration_and_rate_are_continuous_over_a_stop_and_go_drive() {
     let stop = Segment {
-        kind: Kind::Stop {
+        kind: SegmentKind::Stop {
             duration: 5.0,
             decel: 3.0,
         },
@@ -204,7 +204,7 @@ fn acceleration_and_rate_are_continuous_over_a_stop_and_go_drive() {
 #[test]
 fn waypoints_are_met_at_the_end_and_passed_inside_before() {
     let local = |north: f64, east: f64, h: Option<f64>| Waypoint {
-        place: Place::Local { north, east },
+        place: HorizontalPosition::Local { north, east },
         h,
     };
     for (lat_deg, lon_deg) in [(46.5, 6.6), (-60.0, 179.99)] {
@@ -215,7 +215,7 @@ fn waypoints_are_met_at_the_end_and_passed_inside_before() {
         ];
         let by = Turning::LateralAccel(3.0);
         let segment = Segment {
-            kind: Kind::Waypoints { points, by },
+            kind: SegmentKind::Waypoints { points, by },
             climb_m: 0.0,
             ramp_s: Some(2.0),
         };
@@ -291,11 +291,11 @@ fn what_cannot_be_followed_is_refused() {
     let waypoints = |north, east| {
         let points = vec![
             Waypoint {
-                place: Place::Local { north, east },
+                place: HorizontalPosition::Local { north, east },
                 h: None,
             },
             Waypoint {
-                place: Place::Local {
+                place: HorizontalPosition::Local {
                     north: 2.0 * north,
                     east: 0.0,
                 },
@@ -303,7 +303,7 @@ fn what_cannot_be_followed_is_refused() {
             },
         ];
         Segment {
-            kind: Kind::Waypoints {
+            kind: SegmentKind::Waypoints {
                 points,
                 by: Turning::Radius(30.0),
             },

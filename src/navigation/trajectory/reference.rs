@@ -19,7 +19,7 @@ const ATTITUDE_JUMP: (f64, f64) = (10.0 * DEG, 200.0 * DEG);
 const NEIGHBOURS: usize = 5;
 /// A longer step than so many median ones, and than so long (s), is a gap: what is in it is a guess.
 const GAP: (f64, f64) = (1.5, 1.0 + 1e-6);
-/// What is left out on either side of a jump (s): smoothing spreads it.
+/// Length left out on either side of a jump (s): smoothing spreads it.
 const AROUND_JUMP_S: f64 = 1.0;
 /// A stretch with a jump at an end lasts at least so long (s), or is part of what jumps.
 const SHORTEST_S: f64 = 5.0;
@@ -86,7 +86,7 @@ impl fmt::Display for Fault {
 pub struct Break {
     /// The sample after it.
     pub index: usize,
-    /// What is wrong.
+    /// The fault.
     pub fault: Fault,
 }
 
@@ -135,9 +135,9 @@ impl Reference {
         })
     }
 
-    /// How well the velocity is known at an instant (m/s, each axis): it follows from the positions, and is as uneven
-    /// as they are. A filter that corrects its position by half a metre from one sample to the next, 20 ms later, does
-    /// not move at 25 m/s.
+    /// Standard deviation of the velocity at an instant (m/s, each axis): the velocity follows from
+    /// the positions and is as uneven as they are. A filter that corrects its position by half a
+    /// metre from one sample to the next, 20 ms later, does not move at 25 m/s.
     pub fn velocity_sigma(&self, t_s: f64) -> Option<f64> {
         let stretch = self.stretch(t_s)?;
         // the worse one of the knots on either side
@@ -154,8 +154,8 @@ impl Reference {
     }
 }
 
-/// How uneven the velocities of a spline through these positions are at its knots (m/s, each axis): everywhere as for
-/// positions with white errors, near a correction as that.
+/// Standard deviation of the velocities of a spline through these positions at its knots (m/s, each
+/// axis): as for positions with white errors everywhere, larger near a correction.
 fn velocity_sigma(curve: &Trajectory) -> Vec<f64> {
     let knots = curve.knots();
     let places: Vec<DVec3> = knots.iter().map(|t_s| curve.kinematics(*t_s).r_e).collect();
@@ -198,7 +198,7 @@ fn velocity_sigma(curve: &Trajectory) -> Vec<f64> {
         .collect()
 }
 
-/// Where samples do not follow one another as a vehicle moves.
+/// Finds the pairs of consecutive samples between which no vehicle moves that way.
 pub fn breaks(samples: &[TrajectorySample]) -> Vec<Break> {
     let steps = Steps::new(samples);
     let break_before = |index| steps.fault(index).map(|fault| Break { index, fault });
@@ -245,7 +245,7 @@ pub fn usable(samples: &[TrajectorySample], breaks: &[Break]) -> Vec<Range<usize
     found
 }
 
-/// What lies between consecutive samples.
+/// Differences between consecutive samples.
 struct Steps<'a> {
     samples: &'a [TrajectorySample],
     /// From the sample before (m), in e.
@@ -271,7 +271,7 @@ impl<'a> Steps<'a> {
         self.samples[index].t_s - self.samples[index - 1].t_s
     }
 
-    /// What is wrong with the step to sample `index`.
+    /// Fault of the step to sample `index`, if any.
     fn fault(&self, index: usize) -> Option<Fault> {
         let seconds = self.seconds(index);
         // Time first: everything below divides by the seconds.

@@ -169,7 +169,7 @@ fn unusable_samples_are_refused_by_name() {
     s[4].t_s = 3.0;
     assert_eq!(
         refused(&s),
-        Error::Time {
+        TrajectoryError::Time {
             index: 4,
             t_s: 3.0,
             previous_s: 3.0
@@ -193,7 +193,7 @@ fn unusable_samples_are_refused_by_name() {
     s[3].q_b_n = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
     assert!(matches!(
         refused(&s),
-        Error::NotFinite {
+        TrajectoryError::NotFinite {
             index: 3,
             what: "attitude",
             ..

@@ -16,7 +16,7 @@ mod wide;
 /// Runs in one batch.
 pub const LANES: usize = 8;
 
-/// What a formula may ask of a number: `f64`, or eight of them.
+/// Real scalar of a formula: `f64`, or eight of them in lanes.
 pub trait Real:
     Copy
     + From<f64>
@@ -125,7 +125,7 @@ impl Neg for Lanes {
     }
 }
 
-/// What follows from the four operations and `From<f64>`.
+/// Implements the operators that follow from the four operations and `From<f64>`.
 macro_rules! derived_operators {
     ($type:ty) => {
         impl std::ops::Mul<f64> for $type {

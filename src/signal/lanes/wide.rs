@@ -104,7 +104,7 @@ impl Bits for [u64; LANES] {
     lane_integer_operator!(shr_each, |x: u64, count| x >> count);
 }
 
-/// What the processor can do.
+/// Vector instructions of the processor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Level {
     /// Whatever the compiler makes of plain arrays.
@@ -132,7 +132,7 @@ impl Level {
         Self::Portable
     }
 
-    /// Whether this machine has it.
+    /// Returns true if this machine supports it.
     #[cfg(target_arch = "x86_64")]
     fn is_here(self) -> bool {
         self as u8 <= Self::best() as u8
@@ -153,7 +153,7 @@ impl std::fmt::Display for Level {
 /// than closures or `array::map`: what is not inlined into the dispatching function is not compiled for
 /// the wider units (a factor of four from one `map`, seen in the profile).
 pub trait Kernel {
-    /// What it returns.
+    /// Result of the computation.
     type Output;
     /// Computes with registers of type `W`.
     fn run<W: Wide>(self) -> Self::Output;

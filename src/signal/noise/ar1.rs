@@ -38,7 +38,7 @@ pub(super) fn haar_shape_of_kappa(kappa: f64, level: u32) -> (f64, f64) {
 
 /// ½ < phi < 1, in kappa = −ln phi, where nothing cancels.
 fn slow_shape(kappa: f64, m: f64) -> (f64, f64) {
-    let bracket = Slow::new(kappa).bracket(m);
+    let bracket = SlowTerms::new(kappa).bracket(m);
     // nu = s2·2κB for the stationary variance s2, and sigma2 = s2 (1 − e^(−2κ)) = s2·2κ e^(−κ) s(κ).
     let (s, s_log_derivative) = sinhc(kappa);
     let value = bracket.value * kappa.exp() / s;
@@ -108,7 +108,7 @@ pub(super) struct Bracket {
 }
 
 /// The parts of B that depend on κ alone, for 0 ≤ κ ≤ ln 2 (phi ≥ ½).
-pub(super) struct Slow {
+pub(super) struct SlowTerms {
     kappa: f64,
     /// 2·S(κ) and its derivative.
     excess: (f64, f64),
@@ -116,7 +116,7 @@ pub(super) struct Slow {
     sinhc_half: (f64, f64),
 }
 
-impl Slow {
+impl SlowTerms {
     pub(super) fn new(kappa: f64) -> Self {
         let (s, ds) = sinh_series::<1>(0.5 * kappa);
         let (excess, excess_derivative) = sinh_series::<3>(kappa);
@@ -208,7 +208,7 @@ pub(crate) const ALLAN_PEAK_AT: f64 = 1.892_617_8;
 pub(super) fn markov_haar_shape(kappa: f64, level: u32) -> (f64, f64) {
     let m = half_scale(level);
     if kappa < LN_2 {
-        let bracket = Slow::new(kappa).bracket(m);
+        let bracket = SlowTerms::new(kappa).bracket(m);
         let value = 2.0 * kappa * bracket.value;
         (value, 2.0 * bracket.value + value * bracket.log_derivative)
     } else {
@@ -230,7 +230,7 @@ pub(super) fn markov_haar_shape(kappa: f64, level: u32) -> (f64, f64) {
 pub(super) fn unit_markov(kappa: f64, samples: u32) -> f64 {
     // The textbook form loses every digit as kappa → 0; this one is a sum of positive terms.
     if kappa < LN_2 && samples > 1 {
-        return 4.0 * kappa * Slow::new(kappa).bracket(f64::from(samples)).value;
+        return 4.0 * kappa * SlowTerms::new(kappa).bracket(f64::from(samples)).value;
     }
     let phi = (-kappa).exp();
     match samples {

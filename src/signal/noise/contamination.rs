@@ -143,7 +143,7 @@ impl Contamination {
         rules
     }
 
-    /// Whether anything is done to a replicate (counted from 1).
+    /// Returns true if a replicate (counted from 1) is contaminated.
     pub fn touches(&self, replicate: u64) -> bool {
         self.rules
             .iter()

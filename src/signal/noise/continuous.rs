@@ -60,7 +60,7 @@ pub fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, Refused> {
     Ok(Model { rate_hz, axes })
 }
 
-/// Whether two rates are the same to the precision of a clock (1 ppm).
+/// Returns true if two rates agree to the precision of a clock (1 ppm).
 pub fn same_rate(a_hz: f64, b_hz: f64) -> bool {
     (a_hz / b_hz - 1.0).abs() < 1e-6
 }

@@ -140,7 +140,7 @@ impl Pair {
     }
 
     /// Smallest and largest ratio of its Allan deviation to that of the model.
-    pub fn closure(&self, curve: &Curve) -> Closure {
+    pub fn closure(&self, curve: &AllanCurve) -> PairClosure {
         let ratio = |p: &Point| Ratio {
             ratio: (self.allan_variance(p.samples, curve.rate_hz) / p.whole).sqrt(),
             tau_s: f64::from(p.samples) / curve.rate_hz,
@@ -148,7 +148,7 @@ impl Pair {
         let ratios: Vec<Ratio> = curve.points.iter().map(ratio).collect();
         let by_ratio = |a: &&Ratio, b: &&Ratio| a.ratio.total_cmp(&b.ratio);
         let first = ratios[0];
-        Closure {
+        PairClosure {
             lowest: *ratios.iter().min_by(by_ratio).unwrap_or(&first),
             highest: *ratios.iter().max_by(by_ratio).unwrap_or(&first),
         }
@@ -166,7 +166,7 @@ pub struct Ratio {
 
 /// The closure certificate: how an exported pair compares with the model over the horizon.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Closure {
+pub struct PairClosure {
     /// Smallest ratio over the horizon.
     pub lowest: Ratio,
     /// Largest ratio over the horizon.
@@ -175,7 +175,7 @@ pub struct Closure {
 
 /// The Allan variance that a pair has to stand for.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Curve {
+pub struct AllanCurve {
     axes: Vec<Composite>,
     rate_hz: f64,
     points: Vec<Point>,
@@ -194,7 +194,7 @@ struct Point {
     carried: f64,
 }
 
-impl Curve {
+impl AllanCurve {
     /// The Allan variance of the largest of some axes at each averaging time of the horizon.
     ///
     /// # Errors
@@ -249,7 +249,8 @@ impl Curve {
         correlation_time_s(&[self, other], policy)
     }
 
-    /// Whether all axes are the same white noise and random walk, so that the largest is one of them.
+    /// Returns true if all axes have the same white noise and random walk, so that the largest is
+    /// one of them.
     fn is_white_and_walk(&self) -> bool {
         let pair = |p: &Process| matches!(p.kind(), Kind::White | Kind::RandomWalk);
         self.axes
@@ -362,13 +363,13 @@ fn bias(t_corr_s: Option<f64>, samples: u32, rate_hz: f64) -> f64 {
 }
 
 /// The pair of a policy.
-fn pair(curve: &Curve, policy: Policy, kind: Bias) -> Pair {
+fn pair(curve: &AllanCurve, policy: Policy, kind: Bias) -> Pair {
     let t_corr_s = match kind {
         Bias::Walk => None,
         Bias::MarkovOf(t_corr_s) => Some(t_corr_s),
         Bias::Markov => Some(correlation_time_s(&[curve], policy)),
     };
-    let found = Problem::new(curve, policy, t_corr_s).solve();
+    let found = PairProblem::new(curve, policy, t_corr_s).solve();
     let (density, amplitude) = (found.white.sqrt(), found.bias.sqrt());
     match t_corr_s {
         None => Pair {
@@ -389,14 +390,18 @@ fn pair(curve: &Curve, policy: Policy, kind: Bias) -> Pair {
 
 /// The correlation time whose pairs are the closest to the curves together (s). A curve without a bias is as close with
 /// any: it has no say.
-fn correlation_time_s(curves: &[&Curve], policy: Policy) -> f64 {
+fn correlation_time_s(curves: &[&AllanCurve], policy: Policy) -> f64 {
     // A quarter of the horizon's begin looks white over it, thirty times its end like a random walk.
     let horizon = curves[0].horizon;
     let (low, high) = (horizon.from_s / 4.0, horizon.to_s * 30.0);
     let misfit = |ln_t: f64| -> f64 {
         curves
             .iter()
-            .map(|curve| Problem::new(curve, policy, Some(ln_t.exp())).solve().misfit)
+            .map(|curve| {
+                PairProblem::new(curve, policy, Some(ln_t.exp()))
+                    .solve()
+                    .misfit
+            })
             .sum()
     };
     least(low.ln(), high.ln(), 30, misfit).0.exp()
@@ -404,21 +409,21 @@ fn correlation_time_s(curves: &[&Curve], policy: Policy) -> f64 {
 
 /// Squares of N and of K (or sigma_b), and the sum of squares of the logarithms of the Allan deviation ratios.
 #[derive(Clone, Copy)]
-struct Solution {
+struct PairSolution {
     white: f64,
     bias: f64,
     misfit: f64,
 }
 
 /// One row per averaging time: Allan variances of unit white noise and unit bias, and the model's.
-struct Problem {
+struct PairProblem {
     rows: Vec<[f64; 3]>,
     reference: [f64; 3],
     policy: Policy,
 }
 
-impl Problem {
-    fn new(curve: &Curve, policy: Policy, t_corr_s: Option<f64>) -> Self {
+impl PairProblem {
+    fn new(curve: &AllanCurve, policy: Policy, t_corr_s: Option<f64>) -> Self {
         let row = |p: &Point| {
             let target = if policy == Policy::Envelope {
                 p.whole
@@ -439,7 +444,7 @@ impl Problem {
     }
 
     /// Searches the white variance: the bias follows from it in both policies.
-    fn solve(&self) -> Solution {
+    fn solve(&self) -> PairSolution {
         let [w, _, target] = self.reference;
         let most = match self.policy {
             Policy::Envelope => self
@@ -468,7 +473,7 @@ impl Problem {
 
     /// The bias that goes with a white variance: through the model's Allan variance at the reference, or over it
     /// everywhere.
-    fn with_white(&self, white: f64) -> Solution {
+    fn with_white(&self, white: f64) -> PairSolution {
         let rest = |[w, b, target]: &[f64; 3]| ((target - white * w) / b).max(0.0);
         let bias = match self.policy {
             Policy::Envelope => self.rows.iter().map(rest).fold(0.0, f64::max),
@@ -477,7 +482,7 @@ impl Problem {
         // Half: the logarithm is of the deviation, the rows are variances.
         let log_ratio = |[w, b, target]: &[f64; 3]| 0.5 * ((white * w + bias * b) / target).ln();
         let misfit = self.rows.iter().map(log_ratio).map(|r| r * r).sum();
-        Solution {
+        PairSolution {
             white,
             bias,
             misfit,
@@ -509,14 +514,14 @@ fn least(low: f64, high: f64, steps: u32, f: impl Fn(f64) -> f64) -> (f64, f64) 
 /// A minimum of the Allan deviation: the bias instability B of data sheets. The coefficient of flicker noise that
 /// [IEEE 952](crate::bibliography::Ieee952) calls B is that over √(2 ln 2/π) = 0.664.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Minimum {
+pub struct AllanMinimum {
     /// Averaging time (s).
     pub tau_s: f64,
     /// Allan deviation there, the bias instability (units).
     pub deviation: f64,
 }
 
-impl Minimum {
+impl AllanMinimum {
     /// The lowest minimum of the largest Allan deviation of some axes, strictly within one sample and `range_s`; none where it
     /// still falls, or rises from the start.
     pub fn of(axes: &[&Composite], rate_hz: f64, range_s: f64) -> Option<Self> {
@@ -548,14 +553,14 @@ pub struct AxisParameters {
     /// N, sigma_b and T of the policy: white noise and a Gauss-Markov bias.
     pub markov: Pair,
     /// The lowest minimum of the Allan deviation within the range; none where it still falls, or rises from the start.
-    pub minimum: Option<Minimum>,
+    pub minimum: Option<AllanMinimum>,
 }
 
 impl AxisParameters {
     /// Parameters of the largest of some axes at each averaging time. Minima are sought up to `range_s`.
     ///
     /// # Errors
-    /// As [`Curve::largest`].
+    /// As [`AllanCurve::largest`].
     pub fn of(
         axes: &[&Composite],
         rate_hz: f64,
@@ -563,11 +568,11 @@ impl AxisParameters {
         policy: Policy,
         range_s: f64,
     ) -> Result<Self, Refused> {
-        let curve = Curve::largest(axes, rate_hz, horizon)?;
+        let curve = AllanCurve::largest(axes, rate_hz, horizon)?;
         Ok(Self {
             walk: curve.pair(policy, Bias::Walk),
             markov: curve.pair(policy, Bias::Markov),
-            minimum: Minimum::of(axes, rate_hz, range_s),
+            minimum: AllanMinimum::of(axes, rate_hz, range_s),
         })
     }
 }

@@ -16,8 +16,8 @@ fn gm(sigma: f64, t_corr_s: f64) -> Process {
     Process::gauss_markov(1.0 / t_corr_s, sigma * sigma, RATE).unwrap()
 }
 
-fn curve(processes: Vec<Process>) -> Curve {
-    Curve::largest(&[&Composite::new(processes)], RATE, Horizon::default()).unwrap()
+fn curve(processes: Vec<Process>) -> AllanCurve {
+    AllanCurve::largest(&[&Composite::new(processes)], RATE, Horizon::default()).unwrap()
 }
 
 /// No WN, a fast AR1 and slow biases: what calibrations of real recordings look like.
@@ -184,7 +184,7 @@ fn the_largest_axis_rules() {
         Composite::new(vec![wn(1e-3), rw(4e-5)]),
         Composite::new(vec![wn(2e-3), rw(1e-5)]),
     );
-    let both = Curve::largest(&[&small, &large], RATE, Horizon::default()).unwrap();
+    let both = AllanCurve::largest(&[&small, &large], RATE, Horizon::default()).unwrap();
     let strict = both.pair(Policy::Strict, Bias::Walk);
     assert!(
         (strict.density / 2e-3 - 1.0).abs() < 1e-12 && (strict.walk / 4e-5 - 1.0).abs() < 1e-12
@@ -224,11 +224,12 @@ fn horizons_that_cannot_be_are_refused() {
         (100.0, 1.0),
     ] {
         assert!(
-            Curve::largest(&[&axis], RATE, Horizon { from_s, to_s }).is_err(),
+            AllanCurve::largest(&[&axis], RATE, Horizon { from_s, to_s }).is_err(),
             "{from_s} {to_s}"
         );
     }
-    let silent = Curve::largest(&[&Composite::default()], RATE, Horizon::default()).unwrap_err();
+    let silent =
+        AllanCurve::largest(&[&Composite::default()], RATE, Horizon::default()).unwrap_err();
     assert_eq!(
         silent.to_string(),
         "the model has no noise at an averaging time of 1 s"

@@ -62,7 +62,7 @@ pub struct ParameterRef {
 }
 
 /// Row of the table of kinds.
-struct Row {
+struct KindRow {
     code: &'static str,
     /// In the order of files: the shape, if it has one, before the amplitude.
     parameters: &'static [Parameter],
@@ -73,50 +73,50 @@ struct Row {
 }
 
 /// One row a kind, in the order of [`Kind::ALL`].
-const TABLE: [Row; 8] = [
-    Row {
+const TABLE: [KindRow; 8] = [
+    KindRow {
         code: "WN",
         parameters: &[Parameter::Sigma2],
         units: "({u})², per sample",
         power: 1,
     },
-    Row {
+    KindRow {
         code: "QN",
         parameters: &[Parameter::Q2],
         units: "({u})²",
         power: 1,
     },
-    Row {
+    KindRow {
         code: "AR1",
         parameters: &[Parameter::Phi, Parameter::Sigma2],
         units: "({u})², innovation variance per sample",
         power: 1,
     },
-    Row {
+    KindRow {
         code: "GM",
         parameters: &[Parameter::Beta, Parameter::S2],
         units: "1/s, ({u})²",
         power: 1,
     },
-    Row {
+    KindRow {
         code: "MA1",
         parameters: &[Parameter::Theta, Parameter::Sigma2],
         units: "({u})², innovation variance per sample",
         power: 1,
     },
-    Row {
+    KindRow {
         code: "FN",
         parameters: &[Parameter::B2],
         units: "({u})²",
         power: 1,
     },
-    Row {
+    KindRow {
         code: "RW",
         parameters: &[Parameter::Gamma2],
         units: "({u})², increment variance per sample",
         power: 1,
     },
-    Row {
+    KindRow {
         code: "DR",
         parameters: &[Parameter::Slope],
         units: "{u} per sample",
@@ -137,7 +137,7 @@ impl Kind {
         Self::Drift,
     ];
 
-    const fn row(self) -> &'static Row {
+    const fn row(self) -> &'static KindRow {
         &TABLE[self as usize]
     }
 
@@ -313,7 +313,7 @@ pub struct Process {
     rate_hz: f64,
 }
 
-/// As in model files: its code as `type`, and its parameters.
+/// Serialises as in model files: the process code as `type`, and the parameters.
 impl Serialize for Process {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         let parameters = self.parameters();
@@ -500,8 +500,9 @@ impl Process {
         }
     }
 
-    /// As a recursion b_k = phi b_{k−1} + w_k: phi, the variance of w, and that of b at the start (units²). A random walk has no
-    /// stationary variance and starts at 0. None for other kinds.
+    /// Coefficients of the recursion b_k = phi b_{k−1} + w_k: phi, the variance of w, and the
+    /// variance of b at the start (units²). A random walk has no stationary variance and starts at
+    /// 0. None for other kinds.
     pub fn recursion(&self) -> Option<[f64; 3]> {
         let (shape, amplitude) = (self.shape, self.amplitude);
         match self.kind {
@@ -522,7 +523,8 @@ impl Process {
         }
     }
 
-    /// As a moving average of two, X_t = W_t + theta W_{t−1}: theta and the variance of W (units²). None for other kinds.
+    /// Coefficients of the moving average X_t = W_t + theta W_{t−1}: theta and the variance of W
+    /// (units²). None for other kinds.
     pub fn moving_average(&self) -> Option<[f64; 2]> {
         match self.kind {
             Kind::Quantization => Some([-1.0, self.amplitude]),

@@ -75,7 +75,7 @@ pub fn reduce(
         });
     }
     let target: Vec<f64> = levels.iter().map(|l| kept.haar_wv(*l)).collect();
-    let fit = Fit { levels, target };
+    let fit = WaveletFit { levels, target };
     let [ln_white, ln_variance, ln_kappa] = fit.solve();
     // The Gauss-Markov bias as the AR1 that it is when sampled; expm1 keeps the digits of 1 − phi² for a slow
     // one.
@@ -91,7 +91,8 @@ pub fn reduce(
     })
 }
 
-/// Whether a filter with one bias an axis carries the noise as it is: at most one of its processes is a bias.
+/// Returns true if a filter with one bias per axis represents the noise exactly: at most one
+/// process is a bias.
 #[must_use]
 pub fn is_exact(noise: &Composite) -> bool {
     let states = |p: &Process| match p.kind() {
@@ -110,12 +111,12 @@ pub fn carried(noise: &Composite) -> Composite {
 }
 
 /// Least squares of ln(reduced/model) in (ln sigma2, ln variance, ln kappa), kappa = dt/T.
-struct Fit {
+struct WaveletFit {
     levels: Vec<u32>,
     target: Vec<f64>,
 }
 
-impl Fit {
+impl WaveletFit {
     /// Best start of a grid over the correlation time, then a descent.
     fn solve(&self) -> [f64; 3] {
         let (first, last) = (
@@ -249,7 +250,7 @@ mod tests {
         let kept = Composite::new(n2()[..4].to_vec());
         let levels: Vec<u32> = (7..=16).collect();
         let target = levels.iter().map(|l| kept.haar_wv(*l)).collect();
-        let fit = Fit { levels, target };
+        let fit = WaveletFit { levels, target };
         let found = fit.cost(&fit.solve());
         for i in 0..4000 {
             let log10 = |k: i32, low: f64, high: f64| {

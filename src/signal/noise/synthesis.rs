@@ -92,7 +92,7 @@ impl<S: Streams> Synthesizer<S> {
             let is_stationary = runs.iter().any(|p| recursion(p, 2) > 0.0);
             let initial = of(&|p| recursion(p, 2).sqrt());
             let last = if is_stationary {
-                initial * first_of(&mut streams, Law::Normal)
+                initial * first_of(&mut streams, UnitDistribution::Normal)
             } else {
                 initial
             };
@@ -105,18 +105,18 @@ impl<S: Streams> Synthesizer<S> {
         }
         let zero = S::Sample::from(0.0);
         let (filter, size, last) = match runs[0].kind() {
-            Kind::White => (Filter::White, size, zero),
-            Kind::Drift => (Filter::Drift, of(&Process::amplitude), zero),
+            Kind::White => (ProcessFilter::White, size, zero),
+            Kind::Drift => (ProcessFilter::Drift, of(&Process::amplitude), zero),
             // The value before the first one is drawn too, so that the first sample has the variance 2 Q² of
             // all others.
             Kind::Quantization => {
                 let step = of(&|p| (12.0 * p.amplitude()).sqrt());
-                let last = first_of(&mut streams, Law::Uniform);
-                (Filter::Quantization, step, last)
+                let last = first_of(&mut streams, UnitDistribution::Uniform);
+                (ProcessFilter::Quantization, step, last)
             }
             _ => {
-                let last = size * first_of(&mut streams, Law::Normal);
-                (Filter::Ma1(of(&Process::shape)), size, last)
+                let last = size * first_of(&mut streams, UnitDistribution::Normal);
+                (ProcessFilter::Ma1(of(&Process::shape)), size, last)
             }
         };
         self.direct.push(Direct {
@@ -177,7 +177,7 @@ impl<S: Streams> Kernel for MakeBlock<'_, S> {
 /// A process whose samples are made of fresh numbers and at most one past one.
 #[derive(Debug, Clone)]
 struct Direct<S: Streams> {
-    filter: Filter<S::Sample>,
+    filter: ProcessFilter<S::Sample>,
     /// Standard deviation of the fresh numbers; the step of a quantizer, the slope of a drift.
     size: S::Sample,
     /// The past number (QN, MA1) or time (DR).
@@ -186,7 +186,7 @@ struct Direct<S: Streams> {
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Filter<T> {
+enum ProcessFilter<T> {
     White,
     Quantization,
     Drift,
@@ -200,25 +200,29 @@ impl<S: Streams> Direct<S> {
     fn add_to<W: Wide>(&mut self, block: &mut [S::Sample; BLOCK]) {
         let mut fresh = [S::Sample::from(0.0); BLOCK];
         match self.filter {
-            Filter::Drift => {}
-            Filter::Quantization => self.streams.fill::<W>(Law::Uniform, &mut fresh),
-            Filter::White | Filter::Ma1(_) => self.streams.fill::<W>(Law::Normal, &mut fresh),
+            ProcessFilter::Drift => {}
+            ProcessFilter::Quantization => self
+                .streams
+                .fill::<W>(UnitDistribution::Uniform, &mut fresh),
+            ProcessFilter::White | ProcessFilter::Ma1(_) => {
+                self.streams.fill::<W>(UnitDistribution::Normal, &mut fresh)
+            }
         }
         let (size, mut last) = (S::load::<W>(&self.size), S::load::<W>(&self.last));
         for (x, fresh) in block.iter_mut().zip(&fresh) {
             let fresh = S::load::<W>(fresh);
             let more = match &self.filter {
-                Filter::White => size * fresh,
-                Filter::Quantization => {
+                ProcessFilter::White => size * fresh,
+                ProcessFilter::Quantization => {
                     let step = size * (fresh - last);
                     last = fresh;
                     step
                 }
-                Filter::Drift => {
+                ProcessFilter::Drift => {
                     last = last + 1.0;
                     size * last
                 }
-                Filter::Ma1(theta) => {
+                ProcessFilter::Ma1(theta) => {
                     let w = size * fresh;
                     let sum = w + S::load::<W>(theta) * last;
                     last = w;
@@ -250,7 +254,9 @@ fn add_recursive<W: Wide, S: Streams, const N: usize>(
     let mut fresh = [[S::Sample::from(0.0); BLOCK]; N];
     let (mut phi, mut sigma, mut last) = ([zero; N], [zero; N], [zero; N]);
     for i in 0..N {
-        group[i].streams.fill::<W>(Law::Normal, &mut fresh[i]);
+        group[i]
+            .streams
+            .fill::<W>(UnitDistribution::Normal, &mut fresh[i]);
         phi[i] = S::load(&group[i].phi);
         sigma[i] = S::load(&group[i].sigma);
         last[i] = S::load(&group[i].last);
@@ -276,7 +282,7 @@ fn add_recursive<W: Wide, S: Streams, const N: usize>(
 
 /// Distribution of fresh numbers.
 #[derive(Debug, Clone, Copy)]
-pub enum Law {
+pub enum UnitDistribution {
     /// On [0, 1), multiples of 2⁻⁵².
     Uniform,
     /// Mean 0 and variance 1.
@@ -298,18 +304,22 @@ pub trait Streams: std::fmt::Debug + Clone {
     /// From a register.
     fn store<W: Wide>(register: Self::Register<W>, sample: &mut Self::Sample);
     /// The next numbers, which are even in number if normal.
-    fn fill<W: Wide>(&mut self, law: Law, out: &mut [Self::Sample]);
+    fn fill<W: Wide>(&mut self, law: UnitDistribution, out: &mut [Self::Sample]);
 }
 
 /// The first number of streams; a pair is drawn for a normal one.
-fn first_of<S: Streams>(streams: &mut S, law: Law) -> S::Sample {
-    struct First<'a, S>(&'a mut S, Law);
+fn first_of<S: Streams>(streams: &mut S, law: UnitDistribution) -> S::Sample {
+    struct First<'a, S>(&'a mut S, UnitDistribution);
     impl<S: Streams> Kernel for First<'_, S> {
         type Output = S::Sample;
         #[inline(always)]
         fn run<W: Wide>(self) -> S::Sample {
             let mut pair = [S::Sample::from(0.0); 2];
-            let n = if matches!(self.1, Law::Normal) { 2 } else { 1 };
+            let n = if matches!(self.1, UnitDistribution::Normal) {
+                2
+            } else {
+                1
+            };
             self.0.fill::<W>(self.1, &mut pair[..n]);
             pair[0]
         }
@@ -335,15 +345,15 @@ impl Streams for LaneGenerator {
         register.store(sample);
     }
     #[inline(always)]
-    fn fill<W: Wide>(&mut self, law: Law, out: &mut [Lanes]) {
+    fn fill<W: Wide>(&mut self, law: UnitDistribution, out: &mut [Lanes]) {
         let mut generators = self.load::<W::Bits>();
         match law {
-            Law::Uniform => {
+            UnitDistribution::Uniform => {
                 for x in out {
                     uniform::<W>(generators.draw()).store(x);
                 }
             }
-            Law::Normal => {
+            UnitDistribution::Normal => {
                 for [a, b] in out.as_chunks_mut::<2>().0 {
                     let [x, y] = normals::<W>(generators.draw(), generators.draw());
                     x.store(a);
@@ -374,14 +384,14 @@ impl Streams for Generator {
     }
     /// Eight numbers or eight pairs of the one stream at a time; a block's are no others.
     #[inline(always)]
-    fn fill<W: Wide>(&mut self, law: Law, out: &mut [f64]) {
+    fn fill<W: Wide>(&mut self, law: UnitDistribution, out: &mut [f64]) {
         match law {
-            Law::Uniform => {
+            UnitDistribution::Uniform => {
                 for x in out {
                     *x = uniform::<Lanes>([self.next_u64(); LANES])[0];
                 }
             }
-            Law::Normal => {
+            UnitDistribution::Normal => {
                 for pairs in out.chunks_mut(2 * LANES) {
                     let (mut radius, mut angle) = ([0; LANES], [0; LANES]);
                     for i in 0..pairs.len() / 2 {
@@ -806,7 +816,7 @@ mod normal_tests {
             fn run<W: Wide>(self) -> [Lanes; 1000] {
                 let mut out = [Lanes::ZERO; 1000];
                 let keys: Vec<_> = (0..8).map(|run| StreamKey { run, ..KEY }).collect();
-                LaneGenerator::new(&keys).fill::<W>(Law::Normal, &mut out);
+                LaneGenerator::new(&keys).fill::<W>(UnitDistribution::Normal, &mut out);
                 out
             }
         }

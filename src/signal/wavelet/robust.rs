@@ -51,14 +51,15 @@ const MOST_ZEROS: f64 = 0.1;
 const ZERO: f64 = 1e-3;
 
 impl RobustVariance {
-    /// Whether the coefficients lie on steps so coarse that the variance is not that of Gaussian ones: a tenth of them are zero,
-    /// the step (of the coefficients) a quarter of their standard deviation.
+    /// Returns true if the quantization steps of the coefficients are so coarse that a Gaussian
+    /// variance does not apply: a tenth of them are zero, and the step is a quarter of their
+    /// standard deviation.
     pub fn is_stepped(&self) -> bool {
         self.zeros > MOST_ZEROS
     }
 
-    /// Whether the steps leave it without a root, or make it another than the classical variance, whose degrees of freedom are
-    /// given. Of finer steps, or where the two agree, it is as good as ever.
+    /// Returns true if the steps leave the robust equation without a root, or move its root away
+    /// from the classical variance, which has `edof` degrees of freedom. Finer steps do no harm.
     pub(super) fn is_moved_by_steps(&self, classical: f64, edof: f64, efficiency: f64) -> bool {
         let ratio = (classical / self.value).ln();
         // (1/e − 1)·2/eta is the variance of the logarithm of the two of Gaussian coefficients.
@@ -88,7 +89,7 @@ pub fn both(
         let scale = 0.5 / pyramid.half as f64;
         let (sums, half) = (&pyramid.sums, pyramid.half);
         let count = sums.len() - half;
-        let begin = Begin::new(count, |t| (sums[t + half] - sums[t]).powi(2), tuning);
+        let begin = IterationStart::new(count, |t| (sums[t + half] - sums[t]).powi(2), tuning);
         squares.resize(count, 0.0);
         let mut first = [0.0; 3];
         // The first sums of the equation in the pass that makes the squares: of long records memory costs more than numbers.
@@ -115,21 +116,21 @@ pub fn both(
 
 /// The M-estimate of the mean of the given squares of zero-mean Gaussian numbers.
 pub(crate) fn m_scale(squares: &[f64], tuning: &Tuning) -> RobustVariance {
-    let begin = Begin::new(squares.len(), |t| squares[t], tuning);
+    let begin = IterationStart::new(squares.len(), |t| squares[t], tuning);
     let c2 = tuning.c() * tuning.c();
     let first = biweight_sums(squares, 1.0 / (c2 * begin.start));
     begin.solve(squares, first, tuning)
 }
 
-/// Where the iteration begins.
-struct Begin {
+/// Starting point of the iteration.
+struct IterationStart {
     /// At most 4096 evenly spaced squares; all of a short vector.
     sample: Vec<f64>,
     /// The M-estimate of more of them, or their squared MAD.
     start: f64,
 }
 
-impl Begin {
+impl IterationStart {
     fn new(count: usize, square: impl Fn(usize) -> f64, tuning: &Tuning) -> Self {
         const SIZE: usize = 4096;
         let spaced = |most: usize| -> Vec<f64> {
@@ -180,8 +181,8 @@ impl Begin {
 const MAD_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 /// Factor from one point of the march to the next.
 const STEP: f64 = 1.25;
-/// How far down the march goes. At efficiency 0.6 g of Gaussian coefficients is positive from 0.069 nu to nu:
-/// from a start up to sixteen times too high the march still reaches that region.
+/// Largest ratio by which the march descends. At efficiency 0.6, g of Gaussian coefficients is
+/// positive from 0.069 nu to nu: a start up to sixteen times too high still reaches that region.
 const DEPTH: f64 = 16.0;
 /// A Newton step this small leaves an error of its square.
 const LAST_STEP: f64 = 1e-7;
@@ -437,7 +438,7 @@ pub struct QuantizationResponse {
 impl QuantizationResponse {
     /// For a rejection point and the consistency constant that belongs to it.
     pub(super) fn new(c: f64, a: f64) -> Self {
-        let law = Law::new();
+        let law = MixtureLaw::new();
         let gaussian = law.solve(0.0, c, a).1;
         let mut response = Self {
             factor: [0.0; NODES],
@@ -489,12 +490,12 @@ fn departure(series: &[f64; NODES], share: f64) -> (f64, f64) {
 }
 
 /// Law of √(1 − share)·Z + √share·Y: nodes and weights of the quadratures over Z and Y.
-struct Law {
+struct MixtureLaw {
     normal: Vec<(f64, f64)>,
     second_difference: Vec<(f64, f64)>,
 }
 
-impl Law {
+impl MixtureLaw {
     fn new() -> Self {
         // The trapezoidal rule is exact to rounding for a Gaussian weight; chi's fourth derivative jumps where that is 1e-5.
         let normal = (-64..=64).map(|i| {
@@ -625,13 +626,13 @@ impl Tuning {
             && low < middle
             && middle < high
         {
-            if Moments::new(middle).efficiency() < efficiency {
+            if TruncatedMoments::new(middle).efficiency() < efficiency {
                 low = middle;
             } else {
                 high = middle;
             }
         }
-        let moments = Moments::new(high);
+        let moments = TruncatedMoments::new(high);
         let a = moments.chi();
         Ok(Self {
             efficiency: moments.efficiency(),
@@ -672,12 +673,12 @@ impl Tuning {
 }
 
 /// E\[Z^2k; |Z| ≤ c\], k = 0 … 10.
-struct Moments {
+struct TruncatedMoments {
     c: f64,
     even: [f64; 11],
 }
 
-impl Moments {
+impl TruncatedMoments {
     fn new(c: f64) -> Self {
         let mut even = [erf(c / SQRT_2); 11];
         // By parts: E[Z^2k; |Z| ≤ c] = (2k − 1) E[Z^(2k−2); |Z| ≤ c] − 2 c^(2k−1) φ(c).
@@ -811,7 +812,7 @@ mod tuning_tests {
     /// Published by the R package wv, as its source computes them.
     #[test]
     fn constants_of_the_package_wv() {
-        let its = Moments::new(4.973362);
+        let its = TruncatedMoments::new(4.973362);
         assert_relative_eq!(its.chi(), 0.636724, max_relative = 1e-6);
         assert_relative_eq!(its.efficiency(), 0.727, max_relative = 1e-3);
     }

@@ -5,7 +5,7 @@ use super::*;
 const START: &str = "[start]\nlat_deg = 46.5\nlon_deg = 6.6\nh_m = 400\nheading_deg = 90\n";
 
 fn profile(text: &str) -> Result<Trajectory, Failure> {
-    profile::build(&Source::new("p.toml", text))
+    profile::build(&TomlSource::new("p.toml", text))
 }
 
 #[test]

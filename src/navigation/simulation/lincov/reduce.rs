@@ -13,7 +13,7 @@ use crate::ekf::{Belief, FixUpdate, InitialSettings};
 use crate::imu::{Axis, Channel};
 use crate::linalg::mean;
 use crate::minimise::{Descent, MOST, Minimum};
-use crate::noise::practical::{Bias, Curve, Horizon, Pair, Policy};
+use crate::noise::practical::{AllanCurve, Bias, Horizon, Pair, Policy};
 use crate::noise::{Composite, Model, Process, reduction};
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::defects::ImuSettings;
@@ -24,7 +24,7 @@ use crate::simulation::plan::Experiment;
 use crate::simulation::{Gains, NEES_DOF, REPORTED};
 use crate::trajectory::Trajectory;
 use crate::trajectory::profile::{
-    Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
+    Acceleration, Bank, Length, Profile, ProfileStart, Segment, SegmentKind, Turning,
 };
 use crate::units::DEG;
 use rayon::prelude::*;
@@ -138,7 +138,7 @@ impl Search<'_> {
             let of_alike = known.iter().find(|(axis, _)| *axis == noise);
             let pair = match of_alike {
                 Some((_, pair)) => *pair,
-                None => Curve::largest(&[noise], rate_hz, Horizon::default())
+                None => AllanCurve::largest(&[noise], rate_hz, Horizon::default())
                     .ok()?
                     .pair(Policy::Matched, Bias::Markov),
             };
@@ -359,12 +359,12 @@ pub fn drive(
 
 /// A drive of at least that long: what a car meets in town and out of it, over and over.
 fn path(duration_s: f64) -> Option<Trajectory> {
-    let straight = |s: f64| Kind::Straight(Length::Duration(s));
-    let accelerate = |to_speed: f64, s: f64| Kind::Accelerate {
+    let straight = |s: f64| SegmentKind::Straight(Length::Duration(s));
+    let accelerate = |to_speed: f64, s: f64| SegmentKind::Accelerate {
         to_speed,
         by: Acceleration::Duration(s),
     };
-    let turn = |deg: f64, s: f64| Kind::Turn {
+    let turn = |deg: f64, s: f64| SegmentKind::Turn {
         angle: deg * DEG,
         by: Turning::Duration(s),
     };
@@ -385,7 +385,7 @@ fn path(duration_s: f64) -> Option<Trajectory> {
     ];
     // The sum of the durations above.
     let cycle_s = 158.0;
-    let segment = |kind: &Kind| Segment {
+    let segment = |kind: &SegmentKind| Segment {
         kind: kind.clone(),
         climb_m: 0.0,
         ramp_s: None,
@@ -397,7 +397,7 @@ fn path(duration_s: f64) -> Option<Trajectory> {
         .take(cycles * cycle.len())
         .map(segment)
         .collect();
-    let start = Start {
+    let start = ProfileStart {
         t_s: 0.0,
         lat: 45.0 * DEG,
         lon: 0.0,

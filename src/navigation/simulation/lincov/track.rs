@@ -1331,18 +1331,18 @@ mod outline_tests {
     use crate::noise::Model;
     use crate::scenario::Scenario;
     use crate::sensors::outage::Outage;
-    use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
+    use crate::trajectory::profile::{Bank, Length, Profile, ProfileStart, Segment, SegmentKind};
 
     /// A step covers two seconds or five, and every outage begins and ends where it did.
     #[test]
     fn an_outline_is_half_of_the_drive() {
         let outline = |duration_s: f64| {
             let north = Segment {
-                kind: Kind::Straight(Length::Duration(duration_s)),
+                kind: SegmentKind::Straight(Length::Duration(duration_s)),
                 climb_m: 0.0,
                 ramp_s: None,
             };
-            let start = Start {
+            let start = ProfileStart {
                 t_s: 0.0,
                 lat: 0.9,
                 lon: 0.2,
