@@ -499,8 +499,10 @@ impl Answer for Comparison {
         let has_table = !self.outages.is_empty() && !self.others().is_empty();
         let lines = self.cost().into_iter().chain(counts);
         let mut outages = self.candidates.iter().flat_map(|c| &c.outages);
-        let is_known = outages.any(|outage| outage.states[0].ci95_pct.is_some());
-        let lines = lines.chain(is_known.then(|| self.coverage_of_intervals()));
+        // Standard deviations of runs with shared gains do not scatter.
+        let scatter = |[low, high]: [f64; 2]| high > low;
+        let has_scatter = outages.any(|outage| outage.states[0].ci95_pct.is_some_and(scatter));
+        let lines = lines.chain(has_scatter.then(|| self.coverage_of_intervals()));
         let title = "What the filters believe, compared";
         let mut document = Document::new(title, tone(gravest), lines);
         self.doubts
