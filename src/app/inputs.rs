@@ -59,7 +59,7 @@ pub(crate) fn at_rate(
     let converted = continuous::at_rate(model, imu_hz);
     let converted = converted.refuse_within(path.display()).map_err(|e| {
         e.hint(format!(
-            "a model at {imu_hz} Hz, or rate_hz = {from_hz} in the [imu] section of a --scenario file"
+            "give a model at {imu_hz} Hz, or rate_hz = {from_hz} in [imu] of --scenario"
         ))
     })?;
     if !continuous::same_rate(from_hz, imu_hz) {
@@ -145,7 +145,7 @@ fn set_turn_on(
             *setting = Some(sigma);
             let (sigma, unit) = (readable(sigma), sensor.unit());
             context.remark(format!(
-                "{}: {who} a turn-on bias of {sigma} {unit} ({sensor}, standard deviation)",
+                "{}: {who} a turn-on bias of {sigma} {unit} ({sensor}, 1 σ)",
                 path.display()
             ));
         }
@@ -200,10 +200,7 @@ impl FromStr for OutageFlag {
 /// The windows among the values of `--outage`, of which "none" stands alone.
 pub(crate) fn windows_of(outages: &[OutageFlag]) -> Result<Vec<Outage>> {
     if outages.len() > 1 && outages.contains(&OutageFlag(None)) {
-        return refused(
-            "--outage none stands beside other outages",
-            "give the windows, or none alone",
-        );
+        return refused("--outage none with other outages", "give windows, or none");
     }
     Ok(outages.iter().filter_map(|flag| flag.0).collect())
 }

@@ -70,7 +70,7 @@ pub type ChannelSet = Vec<Channel>;
 pub(crate) fn channel_set(word: &str) -> Result<ChannelSet, &'static str> {
     let channels = Channel::named(word);
     match channels.is_empty() {
-        true => Err("not all, accel, gyro, x, y, z, or one channel such as accel.x"),
+        true => Err("expected all, accel, gyro, x, y, z, or a channel such as accel.x"),
         false => Ok(channels),
     }
 }
@@ -168,7 +168,7 @@ impl FromStr for Scales {
             let count = text.parse().ok().filter(|count| (1..=62).contains(count));
             return count
                 .map(Self::Count)
-                .ok_or_else(|| "not a number from 1 to 62, nor a range such as 1s:1000s".into());
+                .ok_or_else(|| "expected 1 to 62, or a range such as 1s:1000s".into());
         }
         let (from_s, to_s) = parse::seconds_range(text)?;
         if from_s >= to_s {
@@ -204,7 +204,7 @@ impl VarianceRequest {
 pub(crate) fn unknown_model(e: SpecError) -> Failure {
     let legal: Vec<&str> = ModelSpec::legal().chain(["auto"]).collect();
     let hint = match &e.term {
-        None => "a model is a sum such as 2*AR1+RW+WN+QN".to_owned(),
+        None => "expected a sum such as 2*AR1+RW+WN+QN".to_owned(),
         Some(term) => match suggest::nearest(term, legal.iter().copied()) {
             Some(meant) => format!("did you mean \"{meant}\"?"),
             None => format!("processes and models: {}", legal.join(", ")),
@@ -224,13 +224,13 @@ pub(crate) fn note_report(report: &Report, context: &Context<'_>) {
         false => Importance::Remark,
     };
     if count > FEW {
-        context.remark(format!("{count} recordings (--verbose: each of them)"));
+        context.remark(format!("{count} recordings (--verbose lists them)"));
     }
     for file in &report.files {
         context.note(each, file);
         if !file.ignored.is_empty() {
             let ignored = file.ignored.join(", ");
-            context.detail(format!("{}: passed over: {ignored}", file.file));
+            context.detail(format!("{}: skipped: {ignored}", file.file));
         }
     }
     let doubts = report.all_warnings();

@@ -122,13 +122,13 @@ impl FromStr for ModelSpec {
             if count > 1 && !matches!(kind, Kind::Ar1 | Kind::GaussMarkov) {
                 let code = kind.code();
                 return Err(refused(format!(
-                    "{count} {code} are one {code}: their wavelet variances are proportional"
+                    "{count} {code} equal one {code}: their wavelet variances are proportional"
                 )));
             }
         }
         match kinds.iter().filter(|k| k.shape().is_some()).count() {
             count if count > MOST_SHAPES => Err(refused(format!(
-                "{count} AR1, GM and MA1 processes; at most {MOST_SHAPES} can be told apart"
+                "{count} AR1, GM and MA1 processes: at most {MOST_SHAPES}"
             ))),
             _ => Ok(Self::of(kinds)),
         }

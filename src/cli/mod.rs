@@ -53,7 +53,7 @@ macro_rules! driven {
 with_commands!(driven);
 
 #[derive(Subcommand)]
-#[expect(clippy::large_enum_variant, reason = "there is one, once a process")]
+#[expect(clippy::large_enum_variant, reason = "one per process")]
 enum CliCommand {
     #[command(flatten)]
     Answer(AnswerCommand),
@@ -74,7 +74,7 @@ impl CliCommand {
 
     /// Advice after a signal.
     fn advice_at_signals(&self) -> Option<String> {
-        matches!(self, Self::Demo(_)).then(|| "the same command goes on where it was".to_owned())
+        matches!(self, Self::Demo(_)).then(|| "the same command continues".to_owned())
     }
 
     fn run(self, session: Session) -> Result<(), Failure> {

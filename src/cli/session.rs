@@ -175,7 +175,7 @@ impl Reporter for Session {
         };
         let bar = ProgressBar::with_draw_target(Some(steps), target);
         let template = "{bar:30} {pos}/{len} {msg}, {per_sec}, {eta} left";
-        bar.set_style(ProgressStyle::with_template(template).expect("the template is a constant"));
+        bar.set_style(ProgressStyle::with_template(template).expect("constant"));
         bar.set_message(unit.to_owned());
         *self.running() = Some(bar.with_finish(ProgressFinish::AndClear));
     }

@@ -144,7 +144,7 @@ impl Answer for SignalsFile {
         }
         let count = recordings(self).len();
         let head = format!(
-            "Allan deviation over averages, median of recordings ({count}); ratio: least robust/classical"
+            "Allan deviation, median of recordings ({count}); ratio: least robust/classical"
         );
         let mut document = Document::new(
             "Wavelet variance of static recordings",
@@ -153,7 +153,7 @@ impl Answer for SignalsFile {
         );
         document.table(digest(self));
         let charts: Vec<Chart> = channels(self).map(|channel| chart(self, channel)).collect();
-        document.charts(&charts, "Robust wavelet variance; dashed: classical, which outliers raise. τ is twice the averaging time.");
+        document.charts(&charts, "Robust wavelet variance; dashed: classical, raised by outliers. τ is twice the averaging time.");
         document
     }
 }

@@ -148,7 +148,7 @@ fn bounded(reader: impl Read, largest: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     reader.take(largest + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > largest {
-        let message = format!("more than {} MiB, or without an end", largest >> 20);
+        let message = format!("more than {} MiB, or endless", largest >> 20);
         return Err(io::Error::new(ErrorKind::FileTooLarge, message));
     }
     Ok(bytes)

@@ -23,8 +23,7 @@ pub(crate) const WIDTH: usize = 120;
 
 /// Indented JSON with a final newline; NaN is null.
 pub(crate) fn json(value: &impl serde::Serialize) -> String {
-    serde_json::to_string_pretty(value).expect("plain structs with text keys are always JSON")
-        + "\n"
+    serde_json::to_string_pretty(value).expect("serialises") + "\n"
 }
 
 /// The first of these names, and how many more there are.

@@ -113,7 +113,7 @@ impl Command for Calibrate {
     const NAME: &'static str = "calibrate";
     const OUT: Out = Out::File {
         name: "model.toml",
-        help: "The model file (default: model.toml; none for --curve)",
+        help: "Model file (default: model.toml; none for --curve)",
     };
     const PLOT: bool = false;
 
@@ -137,10 +137,7 @@ impl Command for Calibrate {
         let (.., is_unsaid) = self.curves(path, &self.settings()?)?;
         if is_unsaid {
             refused(
-                format!(
-                    "{}: the curve does not say of which sensor it is",
-                    path.display()
-                ),
+                format!("{}: the curve names no sensor", path.display()),
                 "--axes accel or --axes gyro",
             )
         } else {
@@ -155,7 +152,7 @@ impl Command for Calibrate {
                 let (curves, settings, is_unsaid) = self.curves(path, &settings)?;
                 if is_unsaid {
                     context.remark(format!(
-                        "{}: taken as of an accelerometer (--axes gyro: of a gyroscope)",
+                        "{}: taken as an accelerometer (--axes gyro: gyroscope)",
                         path.display()
                     ));
                 }
@@ -179,7 +176,7 @@ impl Command for Calibrate {
                 )?;
                 if self.pool == Some(Pool::Sensor) && settings.pool() == Pool::Axes {
                     return refused(
-                        "--pool sensor: gmwm, rgmwm and avlr take one signal at a time",
+                        "--pool sensor: gmwm, rgmwm and avlr take one signal",
                         "--pool axes",
                     );
                 }
@@ -294,8 +291,8 @@ impl Calibrate {
         let is_avlr = self.estimator == EstimatorChoice::One(Estimator::Avlr);
         if is_avlr && self.tuning.fitted().is_some() {
             return refused(
-                "--scales FROM:TO with --estimator avlr: slopes are read where they are found",
-                "--estimator gmwm fits the same curve over a range",
+                "--scales FROM:TO with --estimator avlr, which finds its own",
+                "--estimator gmwm fits a range",
             );
         }
         Ok(chosen)
@@ -342,9 +339,7 @@ impl Calibration {
             };
         }
         let page = shown.page();
-        let draws = draws.map(|draws| {
-            serde_json::to_string(&draws).expect("plain structs are always JSON") + "\n"
-        });
+        let draws = draws.map(|draws| serde_json::to_string(&draws).expect("serialises") + "\n");
         let model = crate::io::model_file::to_toml(&model);
         let texts = [
             draws,

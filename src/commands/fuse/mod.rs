@@ -282,7 +282,7 @@ pub(super) fn number(text: &str) -> Result<f64, &'static str> {
 }
 
 fn arm(text: &str) -> Result<[f64; 3], String> {
-    let arm: [f64; 3] = numbers(text).ok_or("expected 3 numbers between commas")?;
+    let arm: [f64; 3] = numbers(text).ok_or("expected 3 numbers")?;
     if arm.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
         Ok(arm)
     } else {
@@ -296,7 +296,7 @@ fn correlation(text: &str) -> Result<Correlation, &'static str> {
         "none" => Ok(Correlation::None),
         _ => positive(text)
             .map(Correlation::Seconds)
-            .map_err(|_| "expected auto, none, or a correlation time in seconds"),
+            .map_err(|_| "expected auto, none, or seconds"),
     }
 }
 
@@ -307,9 +307,7 @@ struct GateLevel(Option<f64>);
 fn gate(text: &str) -> Result<GateLevel, &'static str> {
     let level = text.parse().ok().filter(|x| (0.5..1.0).contains(x));
     match level {
-        None if text != "none" => {
-            Err("expected none, or a probability from 0.5 to below 1, such as 0.9999")
-        }
+        None if text != "none" => Err("expected none, or a probability from 0.5 to below 1"),
         level => Ok(GateLevel(level)),
     }
 }
@@ -329,7 +327,7 @@ fn gnss_sigma(text: &str) -> Result<GnssSigma, &'static str> {
 fn fix_sigma(text: &str) -> Result<FixSigma, &'static str> {
     let three = |part: &str| {
         numbers::<3>(part).or(numbers::<1>(part).map(|[all]| [all; 3])).filter(|sigma| sigma.iter().all(|x| *x > 0.0)).ok_or(
-            "expected metres above 0, one or three (north, east, down), and after a colon m/s: 2,2,4:0.1",
+            "expected metres > 0, one or three (north, east, down), then m/s after a colon: 2,2,4:0.1",
         )
     };
     let (position, velocity) = text
@@ -385,7 +383,7 @@ impl From<FusionError> for Failure {
                 Some("check t_s, lat_deg, lon_deg and pos_sigma_m of the initial state".to_owned())
             }
             FusionError::Memory { .. } => {
-                Some("a filter of fewer states, or the drive in parts".to_owned())
+                Some("use a smaller filter, or fuse the drive in parts".to_owned())
             }
             FusionError::Diverged { .. } => {
                 return Self::could_not(&e).hint("check axes, units and the initial state");
@@ -550,7 +548,7 @@ impl<'a> RecordedDrive<'a> {
         let delay_s = self.request.gnss_delay_s + origin_s.unwrap_or(0.0) + rest_s;
         if origin_s.is_some() {
             context.warn(format!(
-                "the clocks had nothing in common: fused with --gnss-delay={delay_s:.2}, from turns and innovations"
+                "clocks without overlap: fused with --gnss-delay={delay_s:.2}, from turns and innovations"
             ));
         }
         let aligned = match (&self.initial, self.request.given_heading()) {
@@ -563,10 +561,8 @@ impl<'a> RecordedDrive<'a> {
         };
         let Alignment { start, doubts } = aligned.map_err(|e| {
             Failure::input(e).hint(match self.request.given_heading() {
-                Some(_) => "give the whole start with --initial FILE",
-                None => {
-                    "give the heading with --initial DEG:SD, or the whole start with --initial FILE"
-                }
+                Some(_) => "give the state with --initial FILE",
+                None => "give the heading with --initial DEG:SD, or all with --initial FILE",
             })
         })?;
         settings.outages.retain(|outage| {
@@ -574,7 +570,7 @@ impl<'a> RecordedDrive<'a> {
             if is_early {
                 let span = window(outage.start_s, outage.end_s);
                 context.warn(format!(
-                    "outage {span} ends before the start of the solution: it is left out"
+                    "outage {span} ends before the solution starts: left out"
                 ));
             }
             !is_early
@@ -596,7 +592,7 @@ impl<'a> RecordedDrive<'a> {
         let weighed = fuse_correlated(&recorded, &belief, &start, &settings, asked)?;
         if self.reference.is_some() && weighed.solution.rows.iter().all(|row| row.error.is_none()) {
             return refused(
-                "the reference and the solution have no time in common",
+                "reference and solution have no time in common",
                 "both need one clock",
             );
         }
@@ -691,8 +687,7 @@ impl RecordedDrive<'_> {
             let weeks_s = apart.delay_s().filter(|s| s % WEEK_S == 0.0);
             let hint = weeks_s.map(|s| format!("--gnss-delay={}", given_s + s));
             let clock = || {
-                "bring both to one clock: --gnss-delay S takes S seconds off the times of the fixes"
-                    .into()
+                "use one clock: --gnss-delay S takes S seconds off the times of the fixes".into()
             };
             Failure::from(apart).or_hint(hint.unwrap_or_else(clock))
         })?;
@@ -709,7 +704,7 @@ impl RecordedDrive<'_> {
             |w: &WheelSpeed| span.is_some_and(|(a, b)| (a.t_s..=b.t_s).contains(&w.t_s));
         if !self.wheel.is_empty() && !self.wheel.iter().any(is_within) {
             return refused(
-                "the wheel and the IMU have no time in common",
+                "wheel and IMU have no time in common",
                 "both need one clock",
             );
         }
@@ -1068,10 +1063,10 @@ impl From<&Mounting> for MountingRow {
         let km = found.way_m / 1000.0;
         let widened = match found.sigma_factor {
             1.0 => String::new(),
-            factor => format!("; the fixes taken as {factor:.1} times as uncertain as they state"),
+            factor => format!("; fix sigmas × {factor:.1}"),
         };
         let how = format!(
-            "from gravity, accelerations and turns, and the attitude of the IMU beside the track over {km:.1} km; the roads taken as level across on average, the vehicle as going where it looks{widened}"
+            "from gravity, accelerations, turns and the attitude along {km:.1} km of track; assumes level roads and no side slip{widened}"
         );
         Self {
             roll_deg,

@@ -108,14 +108,14 @@ fn parse(source: &TomlSource, rate_hz: f64) -> Result<Contamination, Failure> {
                     None => is_zero(value),
                 };
                 if is_size && is_nothing {
-                    let reason = "does nothing: it must not be 0";
+                    let reason = "must not be 0";
                     return Err(source.refused(&format!("{key}.{name}"), reason));
                 }
                 let count = value.as_array().map_or(listed, Vec::len);
                 if count != listed || value.is_array() && replicates.is_none() {
                     let reason = match replicates {
                         Some(_) => format!("has {count} values for {listed} replicates"),
-                        None => "is a list, where no \"replicates\" are listed".to_owned(),
+                        None => "is a list, but no \"replicates\" are listed".to_owned(),
                     };
                     return Err(source.refused(&format!("{key}.{name}"), reason));
                 }
@@ -152,10 +152,7 @@ fn operation(
             at_s,
         } => {
             if at_share.is_some() && at_s.is_some() {
-                return Err(refused(
-                    "at_s",
-                    "says again what \"at_share\" says".to_owned(),
-                ));
+                return Err(refused("at_s", "repeats \"at_share\"".to_owned()));
             }
             let share = at_share.as_ref().map_or(0.5, |share| share.of(i));
             let samples = at_s.as_ref().map(|s| (s.of(i) * rate_hz).round() as u64);
