@@ -215,7 +215,8 @@ mod tests {
             "model \"-1*AR1\": \"-1\" is not a number of processes"
         );
         assert!(
-            message("2*WN").ends_with("2 WN are one WN: their wavelet variances are proportional")
+            message("2*WN")
+                .ends_with("2 WN equal one WN: their wavelet variances are proportional")
         );
         assert!(message("4*AR1+2*GM").contains("6 AR1, GM and MA1 processes; at most 5"));
         assert!(message("99*N2").contains("99 WN"));

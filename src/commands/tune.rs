@@ -742,7 +742,7 @@ mod tests {
             (Some(1.0), None),
             (
                 Some(2.5),
-                Some("every sigma of [aiding] × 2.50, and then of the model:"),
+                Some("every sigma of [aiding] × 2.50, then of the model:"),
             ),
             (
                 Some(f64::NAN),

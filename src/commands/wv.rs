@@ -31,9 +31,9 @@ pub struct Wv {
     /// Scales and robustness.
     #[command(flatten)]
     tuning: VarianceRequest,
-    /// Degrees of freedom of the intervals: eta3, the customary ones, conservative beyond the first
-    /// scale; large-sample, from the autocovariance of the coefficients, with the stated coverage
-    #[arg(long, value_parser = parse::one_of::<Intervals>(&Intervals::NAMES), default_value_t, help_heading = "Wavelet variance")]
+    /// Degrees of freedom of the intervals: eta3, customary and conservative; large-sample, from the
+    /// autocovariance of the coefficients, with the stated coverage
+    #[arg(long, value_name = "NAME", hide_possible_values = true, value_parser = parse::one_of::<Intervals>(&Intervals::NAMES), default_value_t, help_heading = "Wavelet variance")]
     intervals: Intervals,
 }
 

@@ -206,7 +206,7 @@ mod tests {
         let error = parse_epochs("e.csv", &damaged).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "e.csv, line 3: column \"asee_pos_e_m\": NaN is not finite"
+            "e.csv, line 3: column \"asee_pos_e_m\": NaN is not a finite number"
         );
         result.epochs[1] = EpochSums {
             t_s: result.epochs[1].t_s,

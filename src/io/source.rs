@@ -172,7 +172,7 @@ mod tests {
     #[test]
     fn what_has_no_end_is_refused() {
         let e = text(Path::new("/dev/zero")).unwrap_err();
-        assert_eq!(e.to_string(), "more than 256 MiB, or without an end");
+        assert_eq!(e.to_string(), "more than 256 MiB, or endless");
         assert!(is_damage(e.kind()));
     }
 

@@ -761,7 +761,7 @@ fn nested(path: &str, value: Value) -> Table {
 fn named_request(run: &Table) -> Result<Map<String, serde_json::Value>> {
     // in JSON it would be null: not given
     if let Some((key, value)) = run.iter().find(|(_, value)| !is_finite(value)) {
-        let message = format!("\"run.{key}\" = {value} is not finite");
+        let message = format!("\"run.{key}\" = {value} is not a finite number");
         return Err(Failure::input(message));
     }
     if let Some((path, _)) = leaves(run, "").iter().find(|(_, value)| value.is_table()) {

@@ -48,29 +48,26 @@ pub struct Choose {
     /// Outages, receiver, start, what filters expect.
     #[command(flatten)]
     settings: SettingsArgs,
-    /// Estimators to compare, as `calibrate --estimator` describes them [default: awv, sr-awv, dr-awv and, for comparison,
-    /// gmwm and avlr of single recordings]
-    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = parse::one_of::<Estimator>(EACH))]
+    /// Estimators to compare, those of `calibrate` [default: awv, sr-awv, dr-awv; gmwm and avlr for comparison]
+    #[arg(long, value_name = "NAMES", hide_possible_values = true, value_delimiter = ',', value_parser = parse::one_of::<Estimator>(EACH))]
     estimator: Vec<Estimator>,
     /// Models to compare, such as N2,N1,WN+RW,auto [default: N2, and WN+RW with awv]
     #[arg(long, value_name = "MODELS", value_delimiter = ',')]
     model: Vec<String>,
-    /// Filters to compare: 15 (one bias per axis), 21 (and a scale factor per axis), full (a bias state for each process)
-    /// [default: 15, and full with awv]
+    /// Filters to compare: 15, 21, full, as in `run` [default: 15, and full with awv]
     #[arg(long, value_name = "STATES", value_delimiter = ',')]
     filter: Vec<FilterStates>,
-    /// Inflation of models: none, x10 (ten times the standard deviations) [default: none, and both
-    /// with awv]
+    /// Inflation of standard deviations: none, x10 [default: none, and both with awv]
     #[arg(long, value_name = "HOW", value_delimiter = ',')]
     inflate: Vec<Inflation>,
     /// Runs on each recording
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     runs: u64,
-    /// Replicates that DR-AWV drops at each end of each scale: a number, or a share such as 30%
-    #[arg(long, value_name = "A", default_value_t)]
+    /// Replicates that dr-awv drops at each end of each scale: a number, or a share
+    #[arg(long, value_name = "A", default_value_t, hide_short_help = true)]
     trim: Trim,
-    /// Handling of gaps and repeated times: refuse the file, split it there, or ignore them
-    #[arg(long, value_parser = parse::one_of::<Gaps>(WHOLE), default_value_t)]
+    /// Gaps and repeated times: refuse, split (into recordings) or ignore
+    #[arg(long, value_name = "HOW", hide_possible_values = true, hide_short_help = true, value_parser = parse::one_of::<Gaps>(WHOLE), default_value_t)]
     gaps: Gaps,
     /// Options for reading recordings.
     #[command(flatten)]

@@ -101,8 +101,7 @@ const ROWS_HZ: f64 = 10.0;
 /// sd_d_m, and v_n_m_s … sd_vd_m_s where velocity is measured. Either may be a text file of KF-GINS (7 or 8
 /// columns of increments; 7 of position, 13 with velocity). GNSS may also be a solution of RTKLIB (.pos, GPST)
 /// or NMEA sentences (GGA, RMC, GST), in seconds of the day or in Unix time, as the IMU is. A log (MCAP, bag,
-/// ULog, UBX) may be either, or both. Gaps of up to 5 s are bridged, with the uncertainty that the recording shows over such times elsewhere. Writes solution.csv,
-/// innovations.csv, errors.csv (with a reference), solution.kml, summary.json, report.html, manifest.json; with
+/// ULog, UBX) may be either, or both. Gaps of up to 5 s are bridged. Writes solution.csv, innovations.csv, errors.csv (with a reference), solution.kml, summary.json, report.html, manifest.json; with
 /// --smooth also smoothed.csv, errors_smoothed.csv, smoothed.kml. Exit code 3: the solution is overconfident.
 #[derive(clap::Args, Debug, Clone)]
 pub struct Fuse {
@@ -115,11 +114,11 @@ pub struct Fuse {
     /// Noise model that the filter believes
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// Initial state: a file (TOML); the heading and its standard deviation (degrees), where the course does not show it;
-    /// auto: level from the IMU, heading from the GNSS course
+    /// Initial state: a file (TOML), auto (level from the IMU, heading from the GNSS course), or only the heading,
+    /// DEG:SD
     #[arg(
         long,
-        value_name = "FILE|DEG:SD|auto",
+        value_name = "START",
         default_value = "auto",
         allow_hyphen_values = true
     )]
@@ -128,66 +127,69 @@ pub struct Fuse {
     #[arg(long = "lever-arm", value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
         hide_default_value = true, allow_hyphen_values = true)]
     lever_arm_m: [f64; 3],
-    /// Attitude of the IMU in the vehicle (degrees) if its axes are not front, right, down; after a colon the standard
-    /// deviations about the vehicle's front, right, down (1 where not given); flu or rfu: axes of that name; auto:
-    /// estimated from the drive of a road vehicle
-    #[arg(
-        long,
-        value_name = "ROLL,PITCH,YAW[:SD,SD,SD]|flu|rfu|auto",
-        allow_hyphen_values = true
-    )]
+    /// Attitude of the IMU in the vehicle: ROLL,PITCH,YAW[:SD,SD,SD] (degrees), flu, rfu, or auto: estimated from
+    /// the drive of a road vehicle
+    #[arg(long, value_name = "ANGLES", allow_hyphen_values = true)]
     mounting: Option<MountingChoice>,
-    /// Reference trajectory to compare with; stretches where it jumps are left out
+    /// Reference trajectory to compare with
     #[arg(long, value_name = "TRAJECTORY")]
     reference: Option<PathBuf>,
-    /// Window in which fixes are withheld, on the clock of the data in seconds (repeatable)
+    /// Window without fixes, in seconds on the clock of the data (repeatable)
     #[arg(long = "outage", value_name = "START:END")]
     outages: Vec<Outage>,
-    /// States of the filter: 15 (one bias an axis, to which the model is reduced), 21 (and a scale factor an axis) or
-    /// full (a bias state for each process)
+    /// States of the filter: 15 (one bias per axis), 21 (and a scale factor per axis) or full (each process)
     #[arg(long, value_name = "STATES", default_value = "15")]
     filter: FilterStates,
-    /// Constant biases that the filter expects beside the model: standard deviations, accelerometer in m/s²,
-    /// gyroscope in rad/s
-    #[arg(long, value_name = "ACCEL,GYRO", value_parser = pair)]
+    /// Turn-on biases that the filter expects: standard deviations (m/s², rad/s)
+    #[arg(long, value_name = "ACCEL,GYRO", value_parser = pair, hide_short_help = true)]
     turn_on_bias: Option<[f64; 2]>,
-    /// Standard deviations where the GNSS file states none: of the position in m, and after a colon of the velocity in
-    /// m/s; each one number or north,east,down. x3 or x3:2: times what it states
-    #[arg(long, value_name = "POS[:VEL]|xPOS[:VEL]", value_parser = gnss_sigma)]
+    /// Standard deviations of fixes that state none: POS[:VEL] (m, m/s), each one number or north,east,down; x3:2
+    /// multiplies the stated ones
+    #[arg(long, value_name = "SIGMAS", value_parser = gnss_sigma)]
     gnss_sigma: Option<GnssSigma>,
-    /// Time by which receiver or logger stamp the fixes late (s)
+    /// Time by which the fixes are stamped late (s)
     #[arg(long = "gnss-delay", value_name = "S", value_parser = number, default_value = "0", allow_hyphen_values = true)]
     gnss_delay_s: f64,
     /// Correlation time of the fixes' errors: auto (from the innovations), none, or seconds (of
     /// positions)
-    #[arg(long, value_name = "auto|none|SECONDS", value_parser = correlation, default_value = "auto")]
+    #[arg(long, value_name = "S", value_parser = correlation, default_value = "auto", hide_short_help = true)]
     gnss_correlation: Correlation,
-    /// Fixes are left out as outliers whose normalised innovation a right filter exceeds less often than 1 - LEVEL
-    #[arg(long, value_name = "LEVEL|none", value_parser = gate, default_value = "0.9999")]
+    /// Reject fixes whose NIS exceeds this level of its chi-square distribution, or none
+    #[arg(long, value_name = "LEVEL", value_parser = gate, default_value = "0.9999", hide_short_help = true)]
     gate: GateLevel,
-    /// Windows of fixes that a second run withholds, to learn from their ends whether the filter is right; none with --outage
-    #[arg(long, value_name = "auto|none", value_parser = ["auto", "none"], default_value = "auto")]
+    /// Fixes that a second run withholds, to test the filter without a reference: auto or none
+    #[arg(long, value_name = "WHICH", value_parser = ["auto", "none"], default_value = "auto", hide_short_help = true, hide_possible_values = true)]
     withhold: String,
-    /// Road vehicle: its rear axle moves neither sideways nor up; needs the mounting of the IMU
+    /// Non-holonomic constraint: the rear axle moves neither sideways nor up; needs --mounting
     #[arg(long)]
     nhc: bool,
-    /// The velocity is zero where IMU and fixes show that the vehicle stands
+    /// Zero-velocity updates at standstill
     #[arg(long)]
     zupt: bool,
-    /// Speed of a wheel: a table of t_s and wheel_m_s (or _km_h), negative in reverse; its scale is estimated
+    /// Wheel speed: a table of t_s and wheel_m_s (or _km_h), negative in reverse
     #[arg(long, value_name = "FILE")]
     odometer: Option<PathBuf>,
     /// Middle of the rear axle from the IMU: front, right, down (m)
-    #[arg(long = "rear-axle", value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
+    #[arg(long = "rear-axle", hide_short_help = true, value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
         hide_default_value = true, allow_hyphen_values = true)]
     rear_axle_m: [f64; 3],
     /// Names of the IMU's columns, for a file without a header or instead of it
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(
+        long,
+        value_name = "NAMES",
+        value_delimiter = ',',
+        hide_short_help = true
+    )]
     columns: Option<Vec<String>>,
-    /// Topic of the IMU in a log that has several; after a comma that of the fixes
-    #[arg(long, value_name = "IMU[,FIXES]", value_delimiter = ',')]
+    /// Topic of the IMU in a log that has several, and of the fixes
+    #[arg(
+        long,
+        value_name = "IMU[,FIXES]",
+        value_delimiter = ',',
+        hide_short_help = true
+    )]
     topic: Vec<String>,
-    /// Also smooth the solution: every row is then estimated from all fixes, later ones included
+    /// Also smooth the solution (RTS)
     #[arg(long)]
     smooth: bool,
 }

@@ -52,14 +52,14 @@ pub struct Run {
     /// Noise model that makes the INS errors (default: MODEL itself)
     #[arg(long, value_name = "MODEL2", conflicts_with = "static")]
     pub truth: Option<PathBuf>,
-    /// Draw the parameters that make the errors of each run from the spread that their model states
+    /// Draw the true parameters of each run from the [spread] of their model
     #[arg(long, conflicts_with = "static")]
     spread: bool,
     /// Static recording whose windows make the INS errors (repeatable)
     #[arg(id = "static", long = "static", value_name = "FILE")]
     pub recordings: Vec<PathBuf>,
     /// Sample rate of static recordings without a time column
-    #[arg(long, value_name = "HZ", value_parser = parse::rate_hz, requires = "static")]
+    #[arg(long, value_name = "HZ", value_parser = parse::rate_hz, requires = "static", hide_short_help = true)]
     rate_hz: Option<f64>,
     /// Outages and other settings of the run.
     #[command(flatten)]
@@ -70,16 +70,15 @@ pub struct Run {
     /// States of the filter, and what it expects beside the model.
     #[command(flatten)]
     filter: FilterArgs,
-    /// Source of the statistics: monte-carlo (sampled runs), lincov (linear covariance analysis) or
-    /// both (runs, compared with their expected values)
-    #[arg(long, value_name = "METHOD", value_parser = parse::one_of::<Method>(&Method::NAMES))]
+    /// monte-carlo (sampled runs), lincov (linear covariance analysis) or both
+    #[arg(long, value_name = "METHOD", hide_possible_values = true, value_parser = parse::one_of::<Method>(&Method::NAMES))]
     method: Option<Method>,
-    /// Gains of sampled runs: own (of each run), shared (those along the reference) or auto (shared where runs 0 to 7,
-    /// made both ways, agree within 3 %) [default: auto]
-    #[arg(long, value_name = "GAINS", value_parser = parse::one_of::<Gains>(&Gains::NAMES))]
+    /// Filter gains: own (of each run), shared (along the reference) or auto (shared where eight runs agree
+    /// within 3 %) [default: auto]
+    #[arg(long, value_name = "GAINS", hide_possible_values = true, hide_short_help = true, value_parser = parse::one_of::<Gains>(&Gains::NAMES))]
     gains: Option<Gains>,
-    /// Limit on an error at the end of every outage, as NAME<=LIMIT (repeatable): p50_m, p95_m (horizontal),
-    /// rmse_pos_e_m, yaw_deg and the other states; or "consistent"; exit code 3 if it is not met
+    /// Limit at the end of every outage (repeatable): p50_m, p95_m, rmse_pos_e_m, yaw_deg, …; or "consistent"; exit
+    /// code 3 if not met
     #[arg(long, value_name = "NAME<=LIMIT")]
     require: Vec<Requirement>,
 }

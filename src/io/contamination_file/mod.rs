@@ -371,7 +371,7 @@ mod tests {
         );
         assert_eq!(
             step("at_s = 1\nat_share = 0.5\namplitude = 1"),
-            "c.toml, line 3: \"accel[1].at_s\" = 1 says again what \"at_share\" says | "
+            "c.toml, line 3: \"accel[1].at_s\" = 1 repeats \"at_share\" | "
         );
         assert_eq!(
             step("amplitude = [1, 2]\nreplicates = [1, 2, 3]"),
@@ -379,7 +379,7 @@ mod tests {
         );
         assert_eq!(
             step("amplitude = [1.0]"),
-            "c.toml, line 3: \"accel[1].amplitude\" = [1.0] is a list, where no \"replicates\" are listed | "
+            "c.toml, line 3: \"accel[1].amplitude\" = [1.0] is a list, but no \"replicates\" are listed | "
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"bursts\"\namplitude = 1\ncount = 0\n"),
@@ -413,7 +413,7 @@ mod tests {
         );
         assert_eq!(
             step("amplitude = 0"),
-            "c.toml, line 3: \"accel[1].amplitude\" = 0 does nothing: it must not be 0 | "
+            "c.toml, line 3: \"accel[1].amplitude\" = 0 must not be 0 | "
         );
         for (name, rest) in [
             ("share", "operation = \"replace\"\nsigma = 1"),

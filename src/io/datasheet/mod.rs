@@ -513,10 +513,7 @@ mod unit_tests {
             refused("10 ug"),
             format!("has the unit ug, which does not fit; {fitting}")
         );
-        assert_eq!(
-            refused("1e300 deg/s"),
-            "is more than 1e12 in SI units, which no sensor has"
-        );
+        assert_eq!(refused("1e300 deg/s"), "is more than 1e12 in SI units");
         for text in [
             "",
             "deg/h",
@@ -778,9 +775,8 @@ pub fn measured(path: &Path, rate_hz: Option<f64>) -> Result<(Datasheet, Option<
             .map_err(|e| refused(&e))?;
         if is_of_sample {
             let Some(rate_hz) = rate_hz else {
-                return Err(
-                    refused("is of a sample: the rate is needed").hint("give the rate with --rate-hz")
-                );
+                return Err(refused("is of a sample: the rate is needed")
+                    .hint("give the rate with --rate-hz"));
             };
             quantity.value /= rate_hz.sqrt();
             quantity.given = format!(

@@ -496,7 +496,7 @@ mod fix_tests {
                 .ends_with("line 1: columns \"h_m\" and \"altitude\" both give h_m"),
             "{e}"
         );
-        assert_eq!(e.advice().unwrap(), "remove one of them");
+        assert_eq!(e.advice().unwrap(), "give one of them");
     }
 
     /// Text of Inertial Explorer: units in a line of their own, week and second, velocities up. The IMU ran in seconds of the

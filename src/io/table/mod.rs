@@ -379,7 +379,7 @@ impl Table {
             |cell| shown(&String::from_utf8_lossy(cell.trim_ascii()), 40),
         );
         let (text, reason) = match outside {
-            _ if !value.is_finite() => (format!("\"{text}\""), "is not finite"),
+            _ if !value.is_finite() => (format!("\"{text}\""), "is not a finite number"),
             Some((.., reason)) if is_measured => (text, reason),
             _ => (text, BEYOND),
         };

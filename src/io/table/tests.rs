@@ -91,7 +91,7 @@ fn an_unknown_unit_is_not_passed_over() {
         "dtheta_y_mrad",
     ] {
         let error = with_header(&["t_s", "gyro_x_rad_s", name], &[]).unwrap_err();
-        let expected = format!("a.csv, line 1: column \"{name}\" is in a unit that is not known");
+        let expected = format!("a.csv, line 1: column \"{name}\" is in an unknown unit");
         assert_eq!(error.to_string(), expected);
     }
     let is_there = ["accel_x_m_s2", "accel_x_sigma"];

@@ -955,7 +955,7 @@ mod import_tests {
         let e = nav("2016 1 2 3\n").unwrap_err();
         assert_eq!(
             e.to_string(),
-            "truth.nav, line 1: a header that names the columns is missing, found \"2016 1 2 3\""
+            "truth.nav, line 1: no header with column names, found \"2016 1 2 3\""
         );
     }
 
@@ -989,7 +989,7 @@ mod import_tests {
             .to_string();
         assert_eq!(
             e,
-            "a.tum, line 1: column \"qw\": 2 does not make a unit quaternion with the others"
+            "a.tum, line 1: column \"qw\": 2 makes no unit quaternion with the others"
         );
     }
 }

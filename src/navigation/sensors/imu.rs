@@ -378,13 +378,13 @@ mod tests {
         );
         assert_eq!(
             refused(recording(50.0, 600)),
-            "r.csv was sampled at 50 Hz, the simulated IMU runs at 100 Hz"
+            "r.csv was sampled at 50 Hz, the simulated IMU at 100 Hz"
         );
         let mut partial = recording(100.0, 600);
         partial.signals.remove(4);
         assert_eq!(
             refused(partial),
-            "r.csv: channel gyro.y is missing; all six are needed, in one file"
+            "r.csv: no channel gyro.y; all six are needed, in one file"
         );
         assert!(Truth::Static(&[]).check(100.0, 1).is_err());
     }
