@@ -721,7 +721,7 @@ mod tests {
             tuned
                 .fault()
                 .unwrap()
-                .starts_with("the model has no accel noise to multiply")
+                .starts_with("the model has no accel noise to scale")
         );
         tuned.after.nees = 9.0;
         assert_eq!(tuned.fault(), None);
@@ -730,7 +730,7 @@ mod tests {
             tuned
                 .fault()
                 .unwrap()
-                .starts_with("the model has no accel noise to multiply")
+                .starts_with("the model has no accel noise to scale")
         );
     }
 

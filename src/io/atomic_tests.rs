@@ -89,7 +89,7 @@ fn links_are_followed_and_devices_written_directly() {
 fn a_full_disk_is_an_error_that_names_the_output() {
     let e = write(Path::new("/dev/full"), vec![0; 1 << 20]).unwrap_err();
     assert!(
-        e.to_string().starts_with("/dev/full: no space is left"),
+        e.to_string().starts_with("/dev/full: the disk is full"),
         "{e}"
     );
     assert!(e.code() == 1);

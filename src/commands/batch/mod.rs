@@ -1231,7 +1231,7 @@ mod tests {
                 && parse_shard("-1/2").is_err()
         );
         let error = |r: Result<(u64, u64), String>| r.unwrap_err();
-        assert!(error(found(None, None, &[("HQ_TASK_ID", "7")])).contains("not of how many"));
+        assert!(error(found(None, None, &[("HQ_TASK_ID", "7")])).contains("but not their number"));
         assert!(
             error(found(None, Some(7), &[("HQ_TASK_ID", "7")])).contains("is not one of 7 shards")
         );

@@ -422,7 +422,7 @@ mod tests {
             ("amplitude", "operation = \"drift\""),
         ] {
             let said = refusal(&format!("[[gyro]]\n{rest}\n{name} = 0.0\n"));
-            assert!(said.contains("0.0 does nothing"), "{said}");
+            assert!(said.contains("0.0 must not be 0"), "{said}");
         }
         // some of the replicates alone; outliers of one value
         for text in [

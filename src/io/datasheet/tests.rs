@@ -94,8 +94,7 @@ fn what_is_assumed_is_said() {
     // 0.3 °/√h is above 10 °/h until (0.3·60/10)² = 3.24 s: a floor that ends at 1.89·1 s is below that
     let doubts = doubts_with(&[(Sensor::Gyro, Figure::CorrelationTime, "1 s")]);
     assert!(
-        doubts[0]
-            .starts_with("gyro: at 1.89 s the white noise alone is above the bias instability"),
+        doubts[0].starts_with("gyro: at 1.89 s the white noise hides the bias instability"),
         "{doubts:?}"
     );
     // 3.24 s / 1.8926

@@ -1300,7 +1300,7 @@ mod wheel_tests {
             (
                 "t_s,wheel_m_s,speed_m_s\n0,1,1\n",
                 "columns \"wheel_m_s\" and \"speed_m_s\" both give speed",
-                "remove one",
+                "give one",
             ),
             ("t_s,gear\n0,1\n", "column speed is missing", "wheel_m_s"),
             ("wheel_m_s\n1\n", "column t_s is missing", "t_s"),

@@ -780,7 +780,7 @@ fn plausible(
     let is_gravity = (rate / STANDARD_GRAVITY - 1.0).abs() < 0.1;
     if accel.len() == 3 && gyro.len() == 3 && f < NO_GRAVITY && is_gravity {
         let message = format!(
-            "accelerometers and gyroscopes exchanged? |f| is {f:.4} m/s², the mean rate {rate:.4} rad/s"
+            "accelerometers and gyroscopes are exchanged: |f| is {f:.4} m/s², the mean rate {rate:.4} rad/s"
         );
         return Err(Failure::contents(&report.file, Place::Within, message)
             .or_hint("without names the first three columns are accelerometers")

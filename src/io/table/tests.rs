@@ -156,7 +156,7 @@ fn columns_beyond_the_memory_are_refused_with_both_figures() {
     let table = with_header(&["t_s"], &[]).unwrap();
     let text = table.fits(u64::MAX / 16).unwrap_err().to_string();
     assert!(
-        text.starts_with("a.csv: its samples need 8796093022208 MiB of memory, and ")
+        text.starts_with("a.csv: its samples need 8796093022208 MiB of memory, ")
             && text.ends_with(" MiB are free"),
         "{text}"
     );

@@ -980,10 +980,7 @@ mod import_tests {
             "{rpy:?}"
         );
         let e = tum("a.tum", &text, None).unwrap_err();
-        assert!(
-            e.to_string().contains("needs an origin on the Earth"),
-            "{e}"
-        );
+        assert!(e.to_string().contains("need an origin on the Earth"), "{e}");
         let e = tum("a.tum", "0 0 0 0 0 0 0 2\n", options)
             .unwrap_err()
             .to_string();

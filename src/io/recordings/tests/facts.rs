@@ -381,7 +381,7 @@ fn a_knock_a_dead_band_and_a_misspelt_column_are_told() {
     }
     let said = kept(&at(100.0, &dead), None).1;
     assert!(
-        said[0].contains("of gyro.z is exactly 0, which its step does not explain"),
+        said[0].contains("of gyro.z is exactly 0, more than its step explains"),
         "{said:?}"
     );
     let slip = at(100.0, &rows(9, 600)).replace("gyro_y", "gryo_y");
