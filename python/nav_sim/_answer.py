@@ -1,4 +1,4 @@
-"""What a request comes to."""
+"""Answers of commands."""
 
 from __future__ import annotations
 

@@ -202,9 +202,9 @@ class Model:
     def practical(
         self, policy: str = "matched", horizon_s: tuple[float, float] = (1.0, 100.0)
     ) -> dict[str, dict[str, float | None]]:
-        """The figures that data sheets and other filters have, of the noisiest axis of each sensor.
+        """Data-sheet figures of the noisiest axis of each sensor.
 
-        Noise density and random walk stand for the model over averages of `horizon_s`: "matched" (its Allan deviation
+        Noise density and random walk over `horizon_s`: "matched" (its Allan deviation
         at 1 s and the closest bias), "envelope" (nowhere below it) or "strict" (WN and RW as they are). What a model
         does not have is None.
         """
