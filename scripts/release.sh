@@ -9,7 +9,7 @@
 #                                 and macOS are built there by the workflow: maturin 1.16 exports a wrong name for a
 #                                 module within a package where another linker than Microsoft's is used
 #
-# Needs Rust with rustup, Python with pip, git, tar, binutils. What else it uses comes from the package index into
+# Needs Rust with rustup, Python with pip, git, tar, binutils. What else it uses comes from the package indices into
 # target/release-tools: zig compiles the C parts for all of them. Under the root that it makes, chroot needs root or
 # namespaces of users; a program of another processor starts where qemu or wine are.
 set -euo pipefail
@@ -30,12 +30,29 @@ git diff --quiet HEAD || { echo "error: there are changes that no commit has" >&
 [ -x "$tools/bin/python" ] || python3 -m venv "$tools"
 "$tools/bin/python" -m pip install --quiet --disable-pip-version-check \
     maturin==1.16.0 cargo-zigbuild==0.24.1 ziglang==0.17.1 abi3audit==0.0.26
+# A program then tells `cargo audit bin` which crates it is made of.
+[ -x "$tools/bin/cargo-auditable" ] || cargo install --quiet --locked --root "$tools" cargo-auditable@0.7.7
 export PATH=$tools/bin:$PATH
 
 # program TARGET: builds it, and tells where it is.
 program() {
     rustup --quiet target add "$1"
-    cargo zigbuild --quiet --locked --profile dist --features "$features" --bin nav-sim --target "$1"
+    cargo auditable zigbuild --quiet --locked --profile dist --features "$features" --bin nav-sim --target "$1"
+}
+
+# extras DIRECTORY: manual pages and shell completions, written by a program for this machine.
+extras() {
+    local own=$target/debug/nav-sim command
+    cargo build --quiet --locked --bin nav-sim
+    mkdir -p "$1/man" "$1/completions"
+    "$own" man >"$1/man/nav-sim.1"
+    for command in $("$own" --help | sed -n '/^Commands:/,/^$/s/^  \([a-z]*\) .*/\1/p' | grep --invert-match help); do
+        "$own" man "$command" >"$1/man/nav-sim-$command.1"
+    done
+    "$own" completions bash >"$1/completions/nav-sim.bash"
+    "$own" completions zsh >"$1/completions/_nav-sim"
+    "$own" completions fish >"$1/completions/nav-sim.fish"
+    "$own" completions powershell >"$1/completions/nav-sim.ps1"
 }
 
 # pack NAME TARGET PROGRAM: one directory in one archive with licences and bill of materials; the same bytes for the same
@@ -47,6 +64,7 @@ pack() {
     python3 scripts/licences.py <<<"$metadata" >"$into/LICENCES-THIRD-PARTY.txt"
     python3 scripts/sbom.py <<<"$metadata" >"$into/nav-sim.cdx.json"
     cp "$3" README.md CHANGELOG.md LICENSE-APACHE LICENSE-MIT "$into"
+    extras "$into"
     tar --create --directory "$root/pack" --sort=name --owner=0 --group=0 --numeric-owner --mode=u+rw,go=rX \
         --mtime="@$(git log -1 --format=%ct)" "${into##*/}" | gzip --no-name --best >"$out/${into##*/}.tar.gz"
     cp "$into/nav-sim.cdx.json" "$out/${into##*/}.cdx.json"

@@ -41,12 +41,11 @@ pub(crate) mod help {
     pub(crate) const CHANNELS: (&str, &str) = ("axes", "leave the axis out with --axes");
     pub(crate) const GAPS: (&str, &str) = (
         "gaps",
-        "--gaps split takes the stretches between as recordings of their own; --gaps ignore takes the samples as evenly \
-         spaced (stamped late, none lost)",
+        "--gaps split takes the stretches between as recordings; --gaps ignore takes the samples as evenly spaced",
     );
     pub(crate) const GAPS_LOST: (&str, &str) = (
         "gaps",
-        "--gaps split takes the stretches between as recordings of their own",
+        "--gaps split takes the stretches between as recordings",
     );
     pub(crate) const GAPS_KEEP: (&str, &str) = ("gaps", "--gaps keep leaves out what is missing");
     pub(crate) const GAPS_ELSEWHERE: (&str, &str) = (
@@ -200,7 +199,7 @@ impl Failure {
             line,
             format!("{found} values, but {expected} columns"),
         )
-        .or_hint("every row needs one value a column; was the file cut off?")
+        .or_hint("was the file cut off?")
     }
 
     /// Error of the system on reading a file, with a hint: a wrong path is wrong input.
@@ -210,7 +209,7 @@ impl Failure {
         let advice = match kind {
             K::NotFound => "check the path",
             K::UnexpectedEof => "the file is cut off: copy or pack it again",
-            K::FileTooLarge => "write what comes through a pipe to a file first",
+            K::FileTooLarge => "write the pipe to a file first",
             K::Unsupported if e.get_ref().is_some() => "fetch it: git lfs pull",
             K::PermissionDenied | K::ReadOnlyFilesystem => {
                 "change the permissions of the file or its directory, or name another path"
@@ -235,7 +234,7 @@ impl Failure {
         let failure = match e.kind() {
             // its directory is there or was made: where files are the system's own, it makes none
             ErrorKind::NotFound => {
-                let message = "the system makes no file or directory there";
+                let message = "no file or directory can be made there";
                 Self::io(path, io::Error::other(message))
             }
             _ => Self::io(path, e),
@@ -409,8 +408,8 @@ pub(crate) fn system_words(error: &io::Error) -> Cow<'static, str> {
         K::ReadOnlyFilesystem => "the disk is read-only",
         K::IsADirectory => "it is a directory, not a file",
         K::NotADirectory | K::AlreadyExists => "a file is where a directory is needed",
-        K::StorageFull => "no space is left on the disk",
-        K::QuotaExceeded => "no space is left within the quota",
+        K::StorageFull => "the disk is full",
+        K::QuotaExceeded => "the quota is used up",
         _ => {
             let text = error.to_string();
             let words = text.split(" (os error").next().unwrap_or_default();
@@ -430,15 +429,15 @@ impl From<ExperimentError> for Failure {
     fn from(e: ExperimentError) -> Self {
         let hint = match &e {
             ExperimentError::BetweenSamples(_) => Some(
-                "the IMU has the rate of the recordings: another [gnss] rate_hz in --scenario"
+                "another [gnss] rate_hz in --scenario: the IMU has the rate of the recordings"
                     .to_owned(),
             ),
             ExperimentError::Truth(TruthError::TooShort { .. }) => Some(
-                "each run takes a window as long as the trajectory: record for longer".to_owned(),
+                "record for longer: each run takes a window as long as the trajectory".to_owned(),
             ),
-            ExperimentError::Truth(TruthError::Rate { rate_hz, .. }) => Some(format!(
-                "set rate_hz = {rate_hz} in the [imu] section of a --scenario file"
-            )),
+            ExperimentError::Truth(TruthError::Rate { rate_hz, .. }) => {
+                Some(format!("set rate_hz = {rate_hz} in [imu] of --scenario"))
+            }
             _ => None,
         };
         Self::input(e).or_hint_if(hint)
@@ -453,11 +452,11 @@ impl From<CalibrationError> for Failure {
                 "record for longer, or a --model with fewer processes"
             }
             CalibrationFault::NotPositive => {
-                "the signal is quantised so coarsely that scales are silent: --estimator awv, or another range"
+                "quantization is too coarse for these scales: --estimator awv, or another range"
             }
             CalibrationFault::Trim => "a smaller --trim, or --estimator sr-awv",
             CalibrationFault::NoSlope => {
-                "--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm"
+                "--model WN+RW, a sum of WN, RW and DR (and QN with its slope at the start); or --estimator gmwm"
             }
             CalibrationFault::Other => return Self::input(e),
         };

@@ -74,7 +74,7 @@ thread_local! {
 pub fn read(target: &str, bytes: &[u8]) {
     let mut targets = TARGETS.into_iter();
     let found = targets.find(|(name, ..)| *name == target);
-    let (_, name, read) = found.expect("a target of that name");
+    let (_, name, read) = found.expect("target");
     PLACE.with(|place| {
         let in_memory = || tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir());
         let place = place.get_or_init(|| in_memory().expect("a directory"));

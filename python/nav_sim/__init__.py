@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from nav_sim._answer import Answer as Answer
+    from nav_sim._answer import show_versions as show_versions
     from nav_sim._calibration import Calibration as Calibration
     from nav_sim._calibration import calibrate as calibrate
     from nav_sim._decisions import Choice as Choice
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
 
 # A module is read when a name of it is first used: the command needs none of them, and starts at once.
 _HOMES = {
-    "_answer": ["Answer"],
+    "_answer": ["Answer", "show_versions"],
     "_calibration": ["Calibration", "calibrate"],
     "_decisions": ["Choice", "choose", "compare", "design", "require", "tune"],
     "_errors": ["NavSimError", "NavSimWarning"],

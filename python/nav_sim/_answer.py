@@ -1,11 +1,11 @@
-"""What a request comes to."""
+"""Answers of commands."""
 
 from __future__ import annotations
 
 import json
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -231,6 +231,17 @@ def _column(values: list[Any]) -> npt.NDArray[Any]:
         return np.asarray(["" if value is None else str(value) for value in values])
     # None is NaN
     return np.asarray(values, dtype=np.float64)
+
+
+def show_versions() -> None:
+    """Prints the versions of nav-sim, Python and packages, for a bug report."""
+    import platform
+    from importlib import metadata
+
+    print("python", platform.python_version(), platform.platform())
+    for name in ("nav-sim", "numpy", "matplotlib", "pandas", "polars", "tqdm"):
+        with suppress(metadata.PackageNotFoundError):
+            print(name, metadata.version(name))
 
 
 def axes_or_new(ax: Axes | None) -> Axes:

@@ -155,15 +155,15 @@ def calibrate(
     trim
         Replicates that dr-awv drops at each end of each scale: a number, or a share such as "30%".
     weighting
-        Weight of a scale in the fit: "model" (inverse variance by the fitted model) or "edof".
+        Weight of a scale: "model" or "edof".
     efficiency
-        That of the robust variances at the Gaussian model, 0.3 to 0.99.
+        Efficiency of the robust variances, 0.3 to 0.99.
     scales
         How many, or those that are fitted: "1s:1000s".
     skip_s
         Seconds to leave out at the beginning.
     gaps
-        Recordings with samples missing: "keep" (NaN in their place), "refuse", "split", "ignore".
+        Missing samples: "keep", "refuse", "split", "ignore".
     bootstrap
         Draws behind the intervals; 0: no intervals.
     seed

@@ -1,4 +1,4 @@
-"""What to do: tune a model, find an IMU, plan recordings, choose a model, compare runs."""
+"""Decisions: tune, require, design, choose, compare."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ def tune(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Choice:
-    """The smallest factors on a model that make its filter consistent with other truths: `nav-sim tune`.
+    """Smallest factors on a model that make its filter consistent with other truths: `nav-sim tune`.
 
-    `truth` are models that may make the errors, such as those of single recordings, by default the model with the
-    errors in the scenario. `aim` is "worst" or "mean" (the option --for). Without a `trajectory` it is a drive of the program's own;
+    `truth` are models of the true IMU, such as those of single recordings; by default the model with the errors of the
+    scenario. `aim` is "worst" or "mean" (--for). Without a `trajectory` a built-in drive is used;
     `outages`, `filter`, `scenario`, `seed`, `threads` and `progress` as of `run`. `.model` is the tuned one.
     """
     truths = truth or [] if isinstance(truth, (list, tuple, type(None))) else [truth]
@@ -78,10 +78,9 @@ def require(
 ) -> Choice:
     """The IMU that keeps the errors at the end of an outage of a trajectory within limits: `nav-sim require`.
 
-    With a `model` it is judged, without one `.model` is what is needed. `outage` is a length (s), a pair of start and
-    end, or "longest", `start` where a length begins (s); `limits` such as "p95_m<=5"; `catalogue=True` ranks the catalogued IMUs, a path those of a directory. `vehicle="car"`
-    has it know that it moves neither sideways nor up. `gnss`, `scenario`,
-    `threads` and `progress` as of `run`.
+    A given `model` is judged; else `.model` is the required one. `outage` is a length (s), a pair of start and end, or
+    "longest"; `start` the earliest start (s); `limits` such as "p95_m<=5"; `catalogue=True` ranks the catalogued IMUs, a path those of a
+    directory; `vehicle="car"` adds its motion constraints. `gnss`, `scenario`, `threads`, `progress` as of `run`.
     """
     asked = outage if isinstance(outage, str) else _window(outage)
     with Staging() as staging:
@@ -126,10 +125,10 @@ def design(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Answer:
-    """How well recordings that are not made yet would determine a model: `nav-sim design`.
+    """Expected intervals of a planned calibration: `nav-sim design`.
 
-    Without `recordings` (how many) or `hours` (each) several are tried. `estimator` as of `calibrate`, `draws` of
-    simulated calibrations; with a `trajectory` what the spread costs there, with `outages` as of `run`; `seed`, `threads`, `progress`.
+    Without `recordings` (number) or `hours` (each) several are tried. `estimator` as of `calibrate`; `draws` of
+    simulated calibrations; with a `trajectory` their effect there, `outages` as of `run`.
     """
     with Staging() as staging:
         return ask(
@@ -168,10 +167,10 @@ def choose(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Choice:
-    """Which estimator and model navigate best on one's own recordings, three or more: `nav-sim choose`.
+    """Ranks estimators and models by navigation with three or more recordings: `nav-sim choose`.
 
-    Each recording makes the errors of runs along the trajectory whose filters were calibrated on the others. `.model` is the winner's.
-    `estimator`, `model`, `filter` and `inflate` ("none", "x10") list what is tried; `rate_hz`, `trim`, `skip_s`
+    Each recording is the truth of runs whose filters were calibrated on the others. `.model` is the winner's.
+    `estimator`, `model`, `filter` and `inflate` ("none", "x10") list the candidates; `rate_hz`, `trim`, `skip_s`
     and `gaps` are as of `calibrate`, `outages`, `runs`, `scenario`, `seed`, `threads` and `progress` as of `run`.
     """
     with Staging() as staging:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
+import numpy as np
+import numpy.typing as npt
 
 from nav_sim import _native
 from nav_sim._answer import Answer, Columns, ask, axes_or_new, flattened
 from nav_sim._errors import NavSimError
-from nav_sim._inputs import FloatArray, Staging, StrPath, as_json, as_toml, number, numbers, path, whole, word
-from nav_sim._wavelet import Curve, scales_s
+from nav_sim._inputs import FloatArray, Staging, StrPath, as_json, as_toml, number, numbers, path, vector, whole, word
+from nav_sim._wavelet import scales_s
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,7 +54,7 @@ class Model:
 
     @classmethod
     def from_toml(cls, text: str) -> Model:
-        """The model of a text as model files have it."""
+        """Parses the text of a model file."""
         return cls._of(text, None)
 
     @classmethod
@@ -90,13 +92,13 @@ class Model:
         accel_turn_on: str | None = None,
         gyro_turn_on: str | None = None,
     ) -> Model:
-        """A model from the figures of a data sheet: an assumption, not a calibration (`nav-sim datasheet`).
+        """A model from data-sheet figures, not calibrated (`nav-sim datasheet`).
 
         `unit` is a name of `nav_sim.catalogue()`, `entry` one's own (TOML, or its tables as a dict), `measured` a file of Kalibr,
-        allan_variance_ros or imu_utils (YAML). Figures are texts with their units and go over these: `vrw` and `arw` (noise
-        densities, "0.15 deg/sqrt(h)"), `accel_bias` and `gyro_bias` (instabilities, "0.5 deg/h"), `accel_rrw` and `gyro_rrw`
-        (rate random walks, "2 deg/h/sqrt(h)"), `corr_time` (correlation time of the instabilities, "100 s"), `accel_turn_on` and
-        `gyro_turn_on` (standard deviations, "2 mg"). `rate_hz` is that of the model: that of the file, else 100 Hz.
+        allan_variance_ros or imu_utils (YAML). Figures with units override these: `vrw`, `arw` (noise densities,
+        "0.15 deg/sqrt(h)"), `accel_bias`, `gyro_bias` (instabilities, "0.5 deg/h"), `corr_time` (of these, "100 s"), `accel_rrw`,
+        `gyro_rrw` (rate random walks, "2 deg/h/sqrt(h)"), `accel_turn_on`, `gyro_turn_on` (standard deviations, "2 mg"). `rate_hz`:
+        of the file, else 100 Hz.
         """
         figures: dict[str, Any] = {"vrw": vrw, "arw": arw, "corr_time": corr_time}
         figures |= {"accel_bias": accel_bias, "gyro_bias": gyro_bias}
@@ -108,7 +110,7 @@ class Model:
         return cls._of(made.text("model.toml"), None)
 
     def write(self, path: StrPath) -> Path:
-        """Writes it as a model file; of a calibration the draws behind its intervals too (`….draws.json`)."""
+        """Writes a model file, and after a calibration its draws (`….draws.json`)."""
         place = Path(path)
         place.write_text(self._text, encoding="utf-8", newline="\n")
         if self._draws is not None:
@@ -116,7 +118,7 @@ class Model:
         return place
 
     def to_toml(self) -> str:
-        """Its text as model files have it, with intervals and provenance."""
+        """Text of its model file, with intervals and provenance."""
         return self._text
 
     @property
@@ -135,7 +137,7 @@ class Model:
         return list(self._contents["channels"])
 
     def __add__(self, other: Model) -> Model:
-        """The model whose noise is the sum of the two, at one and the same rate."""
+        """Sum of two noises of one rate."""
         if not isinstance(other, Model):
             return NotImplemented
         if other.rate_hz != self.rate_hz:
@@ -182,17 +184,27 @@ class Model:
         corrupts = None if contaminate is None else path(contaminate, "contaminate")
         return _native.model_recording(self._text, count, own, drawn, bool(spread), corrupts)
 
-    def wavelet_variance(self, channel: str, scales: int = 20) -> Curve:
-        """The wavelet variance that a channel implies at the scales 2, 4, 8, … samples: `tau_s` and `wv`."""
-        wv = _native.model_wavelet(self._text, word(channel, "channel"), whole(scales, "scales", 1))
-        return Curve(tau_s=scales_s(scales, self.rate_hz), wv=wv)
+    def wavelet_variance(self, tau_s: npt.ArrayLike) -> Columns:
+        """Wavelet variance of each channel at the scales `tau_s` (s), rounded to 2, 4, 6, … samples."""
+        return self._implied(tau_s, 2, lambda allan: allan / 2.0)
+
+    def allan_deviation(self, tau_s: npt.ArrayLike) -> Columns:
+        """Allan deviation of each channel at the averaging times `tau_s` (s), rounded to whole samples."""
+        return self._implied(tau_s, 1, np.sqrt)
+
+    def _implied(self, tau_s: npt.ArrayLike, per_average: int, of: Callable[[FloatArray], FloatArray]) -> Columns:
+        averaged = np.rint(vector(tau_s, "tau_s") * self.rate_hz / per_average)
+        if not ((averaged >= 1) & (averaged < 2**31)).all():
+            raise NavSimError(f"tau_s: expected {per_average / self.rate_hz} s or more")
+        found = _native.model_allan(self._text, averaged.astype(int).tolist())
+        return {"tau_s": averaged * per_average / self.rate_hz, **{name: of(v) for name, v in found.items()}}
 
     def practical(
         self, policy: str = "matched", horizon_s: tuple[float, float] = (1.0, 100.0)
     ) -> dict[str, dict[str, float | None]]:
-        """The figures that data sheets and other filters have, of the noisiest axis of each sensor.
+        """Data-sheet figures of the noisiest axis of each sensor.
 
-        Noise density and random walk stand for the model over averages of `horizon_s`: "matched" (its Allan deviation
+        Noise density and random walk over `horizon_s`: "matched" (its Allan deviation
         at 1 s and the closest bias), "envelope" (nowhere below it) or "strict" (WN and RW as they are). What a model
         does not have is None.
         """
@@ -225,8 +237,8 @@ class Model:
     def plot(self, channel: str, ax: Axes | None = None, scales: int = 20, **line: Any) -> Axes:
         """Draws the wavelet variance that a channel implies."""
         ax = axes_or_new(ax)
-        curve = self.wavelet_variance(channel, scales)
-        ax.loglog(curve["tau_s"], curve["wv"], label=channel, **line)
+        curve = self.wavelet_variance(scales_s(scales, self.rate_hz))
+        ax.loglog(curve["tau_s"], curve[word(channel, "channel")], label=channel, **line)
         ax.set(xlabel="scale (s)", ylabel="wavelet variance")
         return ax
 

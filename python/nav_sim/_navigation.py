@@ -32,7 +32,7 @@ Settings = Union[StrPath, Mapping[str, Any]]
 class Run(Answer):
     """Errors of a navigation, by Monte Carlo or covariance analysis: `nav-sim run`.
 
-    ASEE (averaged standard estimation error) is what the filter believes of its error, RMSE how wrong it is.
+    RMSE is the true error, ASEE (averaged standard estimation error) the filter's own standard deviation.
     """
 
     @cached_property
@@ -54,9 +54,9 @@ class Run(Answer):
         return _with_horizontal(flattened(self.data["outages"]), "end_")
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws the horizontal error over time, true and believed; outages are grey."""
+        """Draws the horizontal RMSE and ASEE over time; outages are grey."""
         ax = axes_or_new(ax)
-        for name, label in (("rmse", "true (RMSE)"), ("asee", "believed (ASEE)")):
+        for name, label in (("rmse", "true (RMSE)"), ("asee", "stated (ASEE)")):
             ax.semilogy(self.epochs["t_s"], self.epochs[f"{name}_horizontal_m"], label=label)
         _shade(ax, self.outages)
         ax.set(xlabel="time (s)", ylabel="horizontal error (m)")
@@ -104,11 +104,11 @@ def run(
     trajectory
         A file, columns (`t_s`, `lat_deg`, `lon_deg`, `h_m`, …) or a `Trajectory`.
     model
-        What the filter believes of the IMU.
+        Noise model of the filter.
     truth
-        What makes the errors of the IMU, if not the same model.
+        Noise model of the true IMU, if another.
     static
-        Recordings whose windows make them, as to `calibrate`; `rate_hz` (Hz) where there is no time in them.
+        Recordings whose windows are the errors, as in `calibrate`; `rate_hz` where they have no time.
     outages
         Windows without fixes: pairs of start and end (s); [] or "none"; by default 300 to 390 s and 700 to 790 s.
     runs
@@ -118,10 +118,9 @@ def run(
     filter
         States: 15, 21 (and scale factors) or "full" (one for each process).
     turn_on_bias, scale_ppm
-        Constant biases (m/s², rad/s) and scale factors (ppm) that the filter expects: standard deviations,
-        accelerometer first.
+        Standard deviations that the filter expects: (accel, gyro) in (m/s², rad/s), ppm.
     require
-        Limits such as "p95_m<=5" or "consistent"; `.unmet` says whether they are missed.
+        Limits such as "p95_m<=5" or "consistent"; see `.unmet`.
     gnss, scenario
         All other settings, by a file or as a dict: `scenario={"gnss": {"rate_hz": 5.0}}`; of `gnss` the section of
         that name.
@@ -130,7 +129,7 @@ def run(
     threads
         Threads that compute; by default one a core.
     progress
-        True shows a bar; a function is told how many runs are done, of how many.
+        True shows a bar; a function gets the runs done and all runs.
     """
     with Staging() as staging:
         recordings = None if static is None else staging.recordings(static, "static", None)
@@ -173,10 +172,10 @@ def lincov(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Run:
-    """The errors to expect of a navigation, by covariance analysis, without sampling: `nav-sim run --method lincov`.
+    """Expected errors by covariance analysis: `nav-sim run --method lincov`.
 
     `trajectory`, `model`, `truth`, `outages`, `filter`, `turn_on_bias`, `scale_ppm`, `require`, `gnss`, `scenario`,
-    `threads` and `progress` as of `run`. RMSE is the error that the truth makes in the mean; `.runs` is empty.
+    `threads` and `progress` as of `run`. RMSE is the expected true error; `.runs` is empty.
     """
     return run(
         trajectory,
@@ -210,7 +209,7 @@ class Fusion(Answer):
 
     @cached_property
     def innovations(self) -> Columns:
-        """Every fix: innovation, its standard deviation, whether it was used."""
+        """Each fix: innovation, standard deviation, used or not."""
         return self.table("innovations.csv")
 
     @cached_property
@@ -263,16 +262,15 @@ def fuse(
         A file, or columns: `t_s`, `lat_deg`, `lon_deg`, `h_m`, `sd_n_m`, `sd_e_m`, `sd_d_m`, and velocities `v_n_m_s`
         … with `sd_vn_m_s` ….
     model
-        What the filter believes of the IMU.
+        Noise model of the filter.
     initial
-        The state at the start, by a file or as a dict; "auto": level from the IMU, heading from the course.
+        Initial state: a file, a dict or "auto" (level from the IMU, heading from the course).
     lever_arm_m
         The antenna from the IMU: front, right, down (m).
     heading_deg
-        Heading at the start and its standard deviation (°), where the course does not show it.
+        Initial heading and its standard deviation (°).
     mounting
-        "flu" or "rfu" (axes of that name), "auto" (found from the drive), or roll, pitch, yaw (°), with standard
-        deviations ((roll, pitch, yaw), (sd, sd, sd)).
+        "flu", "rfu", "auto" (from the drive), angles (roll, pitch, yaw) (°), or a pair of angles and standard deviations.
     reference
         A trajectory to compare with.
     outages
@@ -280,15 +278,15 @@ def fuse(
     gnss_sigma
         A factor on the stated standard deviations, or {"pos_m": [n, e, d], "vel_m_s": [n, e, d]} where none are stated.
     gnss_delay_s
-        How late fixes are stamped (s).
+        Delay of the fixes (s).
     gnss_correlation
-        How long errors of fixes last: "auto", "none", or seconds (of positions).
+        Correlation time of the fixes' errors: "auto", "none", or seconds.
     gate
-        Probability that the normalised innovation of a right fix is below the gate, or "none": every fix is used.
+        Level of the chi-square test of fixes, or "none".
     nhc
         Road vehicle: its rear axle moves neither sideways nor up.
     zupt
-        The velocity is zero where IMU and fixes show that the vehicle stands.
+        Zero-velocity updates at standstill.
     odometer
         Speed of a wheel: a file, or columns `t_s` and `wheel_m_s`.
     rear_axle_m
@@ -353,7 +351,7 @@ def judge(
     origin: tuple[float, float, float] | None = None,
     threads: int | None = None,
 ) -> Judgement:
-    """Says whether the errors of a solution, of any filter, are as large as it states: `nav-sim judge`.
+    """Tests the consistency of any filter's solution: `nav-sim judge`.
 
     Parameters
     ----------
@@ -367,7 +365,7 @@ def judge(
     outages
         Windows in which the solution had no fixes (s).
     reference_delay_s, reference_arm_m
-        How late the stamps of the reference are (s), and its point from that of the solution: front, right, down (m).
+        Delay of the reference (s); its point from that of the solution: front, right, down (m).
     origin
         Latitude, longitude (°) and height (m) of local coordinates.
     threads

@@ -1,4 +1,4 @@
-"""Studies: runs whose values may be lists, in cells that survive, resume and spread over machines."""
+"""Studies: grids of runs that resume."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ class WaveletVariances(Answer):
 def reading(
     rate_hz: float | None, skip_s: float | None, gaps: str | None, axes: str | Sequence[str] | None
 ) -> dict[str, Any]:
-    """How recordings are read, as a request has it."""
+    """Options for reading recordings."""
     return {"rate_hz": rate_hz, "skip_s": skip_s, "gaps": gaps, "axes": axes}
 
 

@@ -9,7 +9,7 @@ mod work;
 #[pyo3::pymodule(name = "_native", gil_used = false)]
 mod native {
     #[pymodule_export]
-    use crate::model::{model_contents, model_practical, model_recording, model_wavelet};
+    use crate::model::{model_allan, model_contents, model_practical, model_recording};
     #[pymodule_export]
     use crate::request::{Answer, answer, columns, main, study_run, toml};
     #[pymodule_export]

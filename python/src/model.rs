@@ -77,23 +77,22 @@ pub(crate) fn model_recording<'py>(
     Ok(columns)
 }
 
-/// The wavelet variance that a channel of the model implies at the first scales (units²).
+/// Allan variance that each channel of the model implies for averages over these numbers of samples (units²).
 #[pyfunction]
-#[pyo3(signature = (text, channel, scales))]
-pub(crate) fn model_wavelet<'py>(
+#[pyo3(signature = (text, samples))]
+pub(crate) fn model_allan<'py>(
     py: Python<'py>,
     text: &str,
-    channel: &str,
-    scales: u32,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    samples: Vec<u32>,
+) -> PyResult<Bound<'py, PyDict>> {
     let file = read(py, text, None)?;
-    let [channel] = Channel::named(channel)[..] else {
-        let message = format!("channel: \"{channel}\" is not one, such as \"gyro.x\"");
-        return Err(error::refused(py, &message));
-    };
-    let noise = file.model.axis(channel);
-    let wv = (1..=scales).map(|level| noise.processes.iter().map(|p| p.haar_wv(level)).sum());
-    Ok(PyArray1::from_vec(py, wv.collect()))
+    let columns = PyDict::new(py);
+    for channel in file.present() {
+        let noise = file.model.axis(channel);
+        let variances = samples.iter().map(|m| noise.allan_variance(*m)).collect();
+        columns.set_item(channel.to_string(), PyArray1::from_vec(py, variances))?;
+    }
+    Ok(columns)
 }
 
 /// The pairs that stand for the sensors of a model over averages from `from_s` to `to_s`, as JSON, SI units in the names.

@@ -26,7 +26,7 @@ pub(crate) fn wavelet<'py>(
     let signal = without_mean(x.as_array().to_vec());
     let largest = signal.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     if largest.is_finite() && largest > 0.0 && !(1e-100..=1e100).contains(&largest) {
-        let message = format!("x: {largest:e} is no measurement: 1e-100 to 1e100");
+        let message = format!("x: {largest:e} is out of range: 1e-100 to 1e100");
         return Err(error::refused(py, &message));
     }
     let doubts = doubts("x", x.as_array().to_vec().as_slice());

@@ -143,10 +143,7 @@ fn defect(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
     let text = text
         .or_else(|| panic.downcast_ref::<&str>().copied())
         .unwrap_or("no message");
-    error::refused(
-        py,
-        &format!("a defect of nav-sim, please report it: {text}"),
-    )
+    error::refused(py, &format!("internal error, please report it: {text}"))
 }
 
 /// Refuses to work in a fork: the threads that work stayed with the parent, and a job would wait for them for ever.
@@ -155,7 +152,7 @@ fn in_this_process(py: Python<'_>) -> PyResult<()> {
     if *FIRST.get_or_init(std::process::id) == std::process::id() {
         return Ok(());
     }
-    let hint = "start workers with multiprocessing.get_context(\"spawn\"), or import nav_sim in the workers alone";
-    let message = "this process is a fork of one in which nav_sim has worked";
+    let hint = "use multiprocessing.get_context(\"spawn\"), or import nav_sim only in the workers";
+    let message = "nav_sim cannot run in a fork of a process that used it";
     Err(error::raise(py, message, None, None, Some(hint)))
 }

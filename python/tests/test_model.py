@@ -61,12 +61,16 @@ def test_the_length_of_a_recording() -> None:
         refused("", white_and_walk().synthesize, **arguments)
 
 
-def test_the_wavelet_variance_of_white_noise_and_a_walk() -> None:
-    # white noise sigma²/2^j; random walk gamma² (4^j + 2)/(12·2^j) with 2^j samples (the Haar filter's variance)
-    curve = white_and_walk().wavelet_variance("gyro.x", 6)
-    tau = 2.0 ** np.arange(1, 7)
-    np.testing.assert_allclose(curve["wv"], 1e-6 / tau + 1e-12 * (tau**2 + 2.0) / (12.0 * tau), rtol=1e-12)
+def test_the_curves_of_white_noise_and_a_walk() -> None:
+    # white noise sigma²/tau; random walk gamma² (tau² + 2)/(12 tau) with tau samples (the Haar filter's variance)
+    tau = 2.0 * np.arange(1, 7)
+    wv = 1e-6 / tau + 1e-12 * (tau**2 + 2.0) / (12.0 * tau)
+    curve = white_and_walk().wavelet_variance(tau / 100.0)
+    np.testing.assert_allclose(curve["gyro.x"], wv, rtol=1e-12)
     np.testing.assert_allclose(curve["tau_s"], tau / 100.0)
+    adev = white_and_walk().allan_deviation(tau / 200.0)
+    np.testing.assert_allclose(adev["gyro.z"], np.sqrt(2.0 * wv), rtol=1e-12)
+    refused("tau_s", white_and_walk().allan_deviation, tau_s=[0.001])
 
 
 def test_practical_figures_are_those_of_the_processes() -> None:

@@ -262,7 +262,7 @@ impl<C: Command> clap::Args for Invocation<C> {
                 .action(ArgAction::Append);
             let plot = plot.value_parser(ValueParser::path_buf());
             command = command.arg(plot.help(
-                "Also write the page (.html) or its figures (.svg; .png with the feature `pictures`) (repeatable)",
+                "Also write a page (.html) or its figures (.svg; .png with feature `pictures`) (repeatable)",
             ));
         }
         command
@@ -536,7 +536,7 @@ fn beside(path: &Path, ending: &str) -> PathBuf {
 
 /// Claims on all outputs of a command. Directories that were made for them and are empty go when this is dropped.
 #[derive(Default)]
-#[must_use = "another command may write there as soon as this is dropped"]
+#[must_use = "released when dropped"]
 pub(crate) struct OutputClaims {
     own: Vec<OutputClaim>,
     missing: Vec<PathBuf>,
@@ -554,9 +554,7 @@ impl OutputClaims {
     /// A warning where nothing keeps another nav-sim from writing the same.
     pub(crate) fn warning(&self) -> Option<&'static str> {
         let is_shared = self.own.iter().any(OutputClaim::is_shared);
-        is_shared.then_some(
-            "the disk has no locks: let no other nav-sim write the same output meanwhile",
-        )
+        is_shared.then_some("this disk has no locks: run no other nav-sim on this output")
     }
 }
 
@@ -645,8 +643,8 @@ impl<C: Command> Invocation<C> {
             let (kind, form) = (path.to_string_lossy().to_lowercase(), ending(path));
             if form != PAGE_ENDING && !FORMS.contains(&form.as_str()) {
                 return refused(
-                    format!("{}: not a page or picture", path.display()),
-                    "name a file that ends in .html or .svg (.png with the feature `pictures`)",
+                    format!("{}: neither page nor picture", path.display()),
+                    "end the name in .html or .svg (.png with feature `pictures`)",
                 );
             }
             claims.own.push(claim_file(path, &kind, inputs())?);
@@ -813,7 +811,7 @@ impl Manifest {
             contents(&manifest.inputs),
             NUMERICS,
         );
-        let text = serde_json::to_string(&decides).expect("texts and numbers are always JSON");
+        let text = serde_json::to_string(&decides).expect("serialises");
         manifest.key = input::hash_of(text.as_bytes());
         manifest
     }

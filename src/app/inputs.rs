@@ -59,7 +59,7 @@ pub(crate) fn at_rate(
     let converted = continuous::at_rate(model, imu_hz);
     let converted = converted.refuse_within(path.display()).map_err(|e| {
         e.hint(format!(
-            "a model at {imu_hz} Hz, or rate_hz = {from_hz} in the [imu] section of a --scenario file"
+            "give a model at {imu_hz} Hz, or rate_hz = {from_hz} in [imu] of --scenario"
         ))
     })?;
     if !continuous::same_rate(from_hz, imu_hz) {
@@ -145,7 +145,7 @@ fn set_turn_on(
             *setting = Some(sigma);
             let (sigma, unit) = (readable(sigma), sensor.unit());
             context.remark(format!(
-                "{}: {who} a turn-on bias of {sigma} {unit} ({sensor}, standard deviation)",
+                "{}: {who} a turn-on bias of {sigma} {unit} ({sensor}, 1 σ)",
                 path.display()
             ));
         }
@@ -155,17 +155,16 @@ fn set_turn_on(
 /// States of the filter.
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct FilterArgs {
-    /// States of the filter: 15 (one bias per axis, to which the model is reduced), 21 (and a scale factor per axis)
-    /// or full (a bias state for each process) [default: 15]
+    /// States of the filter: 15 (one bias per axis), 21 (and a scale factor per axis) or full (each process)
+    /// [default: 15]
     #[arg(long = "filter", value_name = "STATES")]
     pub states: Option<FilterStates>,
-    /// Constant biases that the filter expects in addition to the model (a calibration would remove them): standard
-    /// deviations, accelerometer in m/s², gyroscope in rad/s; 3 states each
-    #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair)]
+    /// Turn-on biases that the filter expects beside the model: standard deviations (m/s², rad/s); 3 states each
+    #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair, hide_short_help = true)]
     pub turn_on_bias: Option<[f64; 2]>,
-    /// Scale-factor errors that the filter expects: standard deviations in parts per million; 3 states each
-    /// [default: 300,300 with --filter 21, else none]
-    #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair)]
+    /// Scale-factor errors that the filter expects: standard deviations (ppm); 3 states each [default: 300,300 with
+    /// --filter 21, else none]
+    #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair, hide_short_help = true)]
     pub scale_ppm: Option<[f64; 2]>,
 }
 
@@ -200,10 +199,7 @@ impl FromStr for OutageFlag {
 /// The windows among the values of `--outage`, of which "none" stands alone.
 pub(crate) fn windows_of(outages: &[OutageFlag]) -> Result<Vec<Outage>> {
     if outages.len() > 1 && outages.contains(&OutageFlag(None)) {
-        return refused(
-            "--outage none stands beside other outages",
-            "give the windows, or none alone",
-        );
+        return refused("--outage none with other outages", "give windows, or none");
     }
     Ok(outages.iter().filter_map(|flag| flag.0).collect())
 }

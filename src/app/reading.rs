@@ -21,14 +21,19 @@ pub struct ReadingRequest {
     /// Sample rate (Hz) of files without a time column
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
     pub rate_hz: Option<f64>,
-    /// Seconds to leave out at the beginning of each file (warm-up)
+    /// Seconds to skip at the start of each file (warm-up)
     #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = parse::non_negative)]
     pub skip_s: f64,
     /// Names of the columns, for files without a header or instead of it
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(
+        long,
+        value_name = "NAMES",
+        value_delimiter = ',',
+        hide_short_help = true
+    )]
     pub columns: Vec<String>,
     /// Topic of the IMU in a log that has several
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", hide_short_help = true)]
     pub topic: Option<String>,
     #[command(flatten)]
     /// The part of a log that is read.
@@ -39,7 +44,7 @@ pub struct ReadingRequest {
 #[derive(clap::Args, Debug, Clone)]
 pub struct LogRequest {
     /// Stamps of a log: header, of the measurement; log, of its arrival
-    #[arg(long, value_name = "WHICH", value_parser = parse::one_of::<Stamp>(&["header", "log"]), default_value = "header")]
+    #[arg(long, value_name = "WHICH", hide_possible_values = true, hide_short_help = true, value_parser = parse::one_of::<Stamp>(&["header", "log"]), default_value = "header")]
     pub stamp: Stamp,
 }
 
@@ -50,13 +55,11 @@ pub struct RecordingRequest {
     #[command(flatten)]
     /// Options for reading them.
     pub reading: ReadingRequest,
-    /// Handling of gaps and repeated times: keep leaves out the missing samples if they are less
-    /// than a tenth, else refuses the file; refuse; split makes each stretch between gaps a
-    /// recording (unless it is 16 times shorter than the longest); ignore takes the samples as
-    /// evenly spaced
-    #[arg(long, value_parser = parse::one_of::<Gaps>(&Gaps::NAMES), default_value_t = Gaps::Keep)]
+    /// Gaps and repeated times: keep (as missing samples, less than a tenth), refuse, split (into recordings) or
+    /// ignore (evenly spaced samples)
+    #[arg(long, value_name = "HOW", hide_possible_values = true, value_parser = parse::one_of::<Gaps>(&Gaps::NAMES), default_value_t = Gaps::Keep)]
     pub gaps: Gaps,
-    /// Signals to use: all, accel, gyro, x, accel.x, … (repeatable or comma-separated; default: all)
+    /// Signals to use: all, accel, gyro, x, accel.x, … (comma-separated; default: all)
     #[arg(long, value_name = "AXES", value_delimiter = ',', value_parser = channel_set)]
     pub axes: Vec<ChannelSet>,
 }
@@ -70,7 +73,7 @@ pub type ChannelSet = Vec<Channel>;
 pub(crate) fn channel_set(word: &str) -> Result<ChannelSet, &'static str> {
     let channels = Channel::named(word);
     match channels.is_empty() {
-        true => Err("not all, accel, gyro, x, y, z, or one channel such as accel.x"),
+        true => Err("expected all, accel, gyro, x, y, z, or a channel such as accel.x"),
         false => Ok(channels),
     }
 }
@@ -168,7 +171,7 @@ impl FromStr for Scales {
             let count = text.parse().ok().filter(|count| (1..=62).contains(count));
             return count
                 .map(Self::Count)
-                .ok_or_else(|| "not a number from 1 to 62, nor a range such as 1s:1000s".into());
+                .ok_or_else(|| "expected 1 to 62, or a range such as 1s:1000s".into());
         }
         let (from_s, to_s) = parse::seconds_range(text)?;
         if from_s >= to_s {
@@ -204,7 +207,7 @@ impl VarianceRequest {
 pub(crate) fn unknown_model(e: SpecError) -> Failure {
     let legal: Vec<&str> = ModelSpec::legal().chain(["auto"]).collect();
     let hint = match &e.term {
-        None => "a model is a sum such as 2*AR1+RW+WN+QN".to_owned(),
+        None => "expected a sum such as 2*AR1+RW+WN+QN".to_owned(),
         Some(term) => match suggest::nearest(term, legal.iter().copied()) {
             Some(meant) => format!("did you mean \"{meant}\"?"),
             None => format!("processes and models: {}", legal.join(", ")),
@@ -224,13 +227,13 @@ pub(crate) fn note_report(report: &Report, context: &Context<'_>) {
         false => Importance::Remark,
     };
     if count > FEW {
-        context.remark(format!("{count} recordings (--verbose: each of them)"));
+        context.remark(format!("{count} recordings (--verbose lists them)"));
     }
     for file in &report.files {
         context.note(each, file);
         if !file.ignored.is_empty() {
             let ignored = file.ignored.join(", ");
-            context.detail(format!("{}: passed over: {ignored}", file.file));
+            context.detail(format!("{}: skipped: {ignored}", file.file));
         }
     }
     let doubts = report.all_warnings();

@@ -122,13 +122,13 @@ impl FromStr for ModelSpec {
             if count > 1 && !matches!(kind, Kind::Ar1 | Kind::GaussMarkov) {
                 let code = kind.code();
                 return Err(refused(format!(
-                    "{count} {code} are one {code}: their wavelet variances are proportional"
+                    "{count} {code} equal one {code}: their wavelet variances are proportional"
                 )));
             }
         }
         match kinds.iter().filter(|k| k.shape().is_some()).count() {
             count if count > MOST_SHAPES => Err(refused(format!(
-                "{count} AR1, GM and MA1 processes; at most {MOST_SHAPES} can be told apart"
+                "{count} AR1, GM and MA1 processes: at most {MOST_SHAPES}"
             ))),
             _ => Ok(Self::of(kinds)),
         }
@@ -215,7 +215,8 @@ mod tests {
             "model \"-1*AR1\": \"-1\" is not a number of processes"
         );
         assert!(
-            message("2*WN").ends_with("2 WN are one WN: their wavelet variances are proportional")
+            message("2*WN")
+                .ends_with("2 WN equal one WN: their wavelet variances are proportional")
         );
         assert!(message("4*AR1+2*GM").contains("6 AR1, GM and MA1 processes; at most 5"));
         assert!(message("99*N2").contains("99 WN"));

@@ -49,8 +49,7 @@ pub(crate) fn run(args: &BatchArgs, mut session: Session) -> Result<(), Failure>
         *is_resumable |= signal == SIGTERM;
     }
     if matches!(outcome, Err(_) | Ok(BatchOutcome::Stopped { .. })) && signal == SIGINT {
-        return Err(Failure::interrupted("interrupted")
-            .hint("the same command goes on where this one stopped"));
+        return Err(Failure::interrupted("interrupted").hint("the same command continues"));
     }
     let outcome = outcome?;
     match &outcome {

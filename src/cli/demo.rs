@@ -59,9 +59,8 @@ pub(crate) fn run(args: &DemoArgs, session: &Session) -> Result<(), Failure> {
     let _page = atomic::claim_file(&page, ".html", [])?;
     let there = std::fs::read_to_string(&study).unwrap_or_else(|_| text.clone());
     if there != text && !(force && there.starts_with(HEAD)) {
-        let message = format!("{} is of another demo, or of others", study.display());
-        let hint =
-            "name another directory with --out, or replace that of another demo with --force";
+        let message = format!("{} belongs to another demo", study.display());
+        let hint = "name another --out, or replace it with --force";
         return Err(Failure::input(message).hint(hint));
     }
     atomic::write(&study, text)?;
@@ -91,8 +90,8 @@ pub(crate) fn run(args: &DemoArgs, session: &Session) -> Result<(), Failure> {
         ..BatchRequest::default()
     };
     let BatchOutcome::Merged(found) = request.run(&|_| None, &session.context())? else {
-        return Err(Failure::stopped("cells are in work elsewhere")
-            .hint("the same command goes on where it was"));
+        return Err(Failure::stopped("cells are being computed elsewhere")
+            .hint("the same command continues"));
     };
     if let Some(found) = found.comparisons.first() {
         session.show(found, &found.document(), None);

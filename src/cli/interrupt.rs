@@ -12,7 +12,7 @@ pub(super) fn watch(session: Session, advice: Option<String>) {
     system::on_signal(move |signal| {
         INTERRUPTED.store(true, Ordering::SeqCst);
         atomic::remove_unfinished();
-        let failure = Failure::interrupted("interrupted; what was being written is removed");
+        let failure = Failure::interrupted("interrupted; unfinished files are removed");
         session.failure(&failure.or_hint_if(advice.clone()));
         std::process::exit(128 + signal);
     });

@@ -6,6 +6,7 @@ use crate::commands::batch::Study;
 use crate::commands::trajectory::{TrajectoryArgs, TrajectoryCommand};
 use crate::commands::with_commands;
 use crate::io::{contamination_file, file_kind, fusion_files, model_file, trajectory_file};
+use clap::builder::Resettable;
 use clap::error::{ContextKind, ErrorKind};
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use nav_sim_navigation::scenario::Scenario;
@@ -53,7 +54,7 @@ macro_rules! driven {
 with_commands!(driven);
 
 #[derive(Subcommand)]
-#[expect(clippy::large_enum_variant, reason = "there is one, once a process")]
+#[expect(clippy::large_enum_variant, reason = "one per process")]
 enum CliCommand {
     #[command(flatten)]
     Answer(AnswerCommand),
@@ -74,7 +75,7 @@ impl CliCommand {
 
     /// Advice after a signal.
     fn advice_at_signals(&self) -> Option<String> {
-        matches!(self, Self::Demo(_)).then(|| "the same command goes on where it was".to_owned())
+        matches!(self, Self::Demo(_)).then(|| "the same command continues".to_owned())
     }
 
     fn run(self, session: Session) -> Result<(), Failure> {
@@ -109,6 +110,73 @@ const EXAMPLES: &str = include_str!("examples.txt");
 /// The whole command line as clap knows it.
 fn command() -> clap::Command {
     with_examples(Cli::command(), "")
+}
+
+/// The same for help: each command with the common options that mean something for it; `--help` (`is_long`) has the whole
+/// description and every option, in the layout of `-h`.
+fn documented(is_long: bool) -> clap::Command {
+    let mut command = if is_long {
+        in_full(command())
+    } else {
+        command()
+    };
+    command.build(); // hands the common options down
+    of_use(command, "")
+}
+
+/// Puts the whole description and every option into the short help; clap then writes no other.
+fn in_full(command: clap::Command) -> clap::Command {
+    let command = match command.get_long_about().cloned() {
+        Some(about) => command.about(about).long_about(Resettable::Reset),
+        None => command,
+    };
+    let command = command.mut_args(|arg| arg.hide_short_help(false));
+    command.mut_subcommands(in_full)
+}
+
+/// Hides the common options without a use.
+fn of_use(command: clap::Command, names: &str) -> clap::Command {
+    let shown = |arg: clap::Arg| {
+        let is_of_use = means_something(arg.get_id().as_str(), names);
+        if is_of_use { arg } else { arg.hide(true) }
+    };
+    command.mut_args(shown).mut_subcommands(|inner| {
+        let names = format!("{names} {}", inner.get_name());
+        of_use(inner, names.trim_start())
+    })
+}
+
+/// True if a command, by its names below nav-sim, has a use for one of the common options.
+fn means_something(option: &str, names: &str) -> bool {
+    let is_shell = matches!(names, "init" | "schema" | "completions" | "man" | "help");
+    let is_reader = matches!(names, "check" | "inspect" | "trajectory check");
+    match option {
+        "seed" => matches!(
+            names,
+            "" | "calibrate"
+                | "choose"
+                | "demo"
+                | "design"
+                | "run"
+                | "synthesize"
+                | "tune"
+                | "trajectory"
+                | "trajectory record"
+        ),
+        "no_progress" => matches!(
+            names,
+            "" | "batch" | "calibrate" | "choose" | "demo" | "run"
+        ),
+        "threads" => {
+            !is_shell
+                && !is_reader
+                && !names.starts_with("trajectory")
+                && !matches!(names, "datasheet" | "export")
+        }
+        "force" => !is_shell && !is_reader,
+        "format" => !is_shell,
+        _ => true,
+    }
 }
 
 /// Adds the examples of a command, by its names below nav-sim, and of those under it.
@@ -202,7 +270,18 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
         return 2;
     }
     let words = words(given.iter().cloned());
-    let known = command().long_version(&*version().leak());
+    let has = |flags: &[&str]| {
+        words
+            .iter()
+            .any(|word| flags.iter().any(|flag| word == flag))
+    };
+    let is_long = has(&["--help"]) || words.get(1).is_some_and(|word| word == "help");
+    let known = if is_long || has(&["-h"]) {
+        documented(is_long)
+    } else {
+        command()
+    };
+    let known = known.long_version(&*version().leak());
     let matches = known
         .try_get_matches_from(&words)
         .unwrap_or_else(|e| end(&e));
@@ -295,9 +374,7 @@ struct ManArgs {
 
 fn man(args: &ManArgs) -> Result<String, Failure> {
     let mut page = Vec::new();
-    let mut root = command();
-    // hands the common flags down
-    root.build();
+    let root = documented(true);
     let of_command = match &args.command {
         None => root,
         Some(name) => {

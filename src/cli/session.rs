@@ -23,20 +23,27 @@ pub(crate) struct Common {
     /// Worker threads, at most 1024 (default: one per core)
     #[arg(long, short = 'j', global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
-    /// Print verdict, table and warnings only, no remarks or progress
+    /// Print verdict, table and warnings only
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
     /// Print more
     #[arg(long, short, global = true, conflicts_with = "quiet")]
     pub(crate) verbose: bool,
-    /// Show no progress, neither bars nor lines
-    #[arg(long, global = true)]
+    /// Show no progress
+    #[arg(long, global = true, hide_short_help = true)]
     pub(crate) no_progress: bool,
     /// Replace results of another configuration, other inputs or another seed
-    #[arg(long, global = true)]
+    #[arg(long, global = true, hide_short_help = true)]
     pub(crate) force: bool,
     /// When to use colour
-    #[arg(long, global = true, value_name = "WHEN", value_enum, default_value_t)]
+    #[arg(
+        long,
+        global = true,
+        value_name = "WHEN",
+        value_enum,
+        default_value_t,
+        hide_short_help = true
+    )]
     pub(crate) color: Color,
     /// Format of what goes to stdout
     #[arg(long, global = true, value_enum, default_value_t)]
@@ -175,7 +182,7 @@ impl Reporter for Session {
         };
         let bar = ProgressBar::with_draw_target(Some(steps), target);
         let template = "{bar:30} {pos}/{len} {msg}, {per_sec}, {eta} left";
-        bar.set_style(ProgressStyle::with_template(template).expect("the template is a constant"));
+        bar.set_style(ProgressStyle::with_template(template).expect("constant"));
         bar.set_message(unit.to_owned());
         *self.running() = Some(bar.with_finish(ProgressFinish::AndClear));
     }

@@ -93,7 +93,7 @@ fn report_notes(notes: &[Note], context: &Context<'_>) {
 fn drive(imu: &ImuFile, context: &Context<'_>) -> String {
     report_notes(&imu.remarks, context);
     let (samples, rate_hz) = (imu.samples.len(), imu.rate_hz);
-    format!("an IMU recording of {samples} samples at {rate_hz:.2} Hz, for fuse")
+    format!("an IMU recording, {samples} samples at {rate_hz:.2} Hz, for fuse")
 }
 
 /// Reads a file as what it is, and says what was found.
@@ -101,7 +101,7 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
     let beside = path.parent().unwrap_or(Path::new(""));
     let found = match file_kind::of(path)? {
         FileKind::Scenario => match TomlSource::read(path)?.table()?.is_empty() {
-            true => "an empty file; as a scenario, all defaults",
+            true => "an empty file; a scenario of defaults",
             false => scenario_file::read(path).map(|_| "a scenario")?,
         },
         FileKind::Study => {
@@ -116,7 +116,7 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
                 return Err(Failure::contents(path.display(), Place::Within, why)
                     .or_hint("copy it again from the recorder"));
             }
-            "a log (nav-sim inspect lists its channels)"
+            "a log: nav-sim inspect lists its channels"
         }
         FileKind::CatalogueEntry => {
             let name = datasheet::read(path)?.name.unwrap_or_default();
@@ -128,9 +128,7 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
             found.map(|_| "a contamination")?
         }
         FileKind::Curve => curve_file::read(path).map(|_| "wavelet-variance curves")?,
-        FileKind::Record => {
-            "a record that nav-sim wrote beside a result: nothing in it to be checked"
-        }
+        FileKind::Record => "a record beside a result: nothing to check",
         FileKind::Trajectory => inputs::trajectory(path, context).map(|_| "a trajectory")?,
         FileKind::Initial => read_initial(path).map(|_| "an initial state")?,
         FileKind::Gnss => {

@@ -103,8 +103,8 @@ impl Command for Compare {
                 Ok(PlainAnswer::new(json!(found), found.document()).with_page(found.text()))
             }
             (_, 0, None) => refused(
-                "no run to compare with",
-                "name one of them with --reference DIR; two model files need none",
+                "no run to compare",
+                "name one with --reference DIR; model files need none",
             ),
             _ => {
                 for path in &all {
@@ -179,17 +179,15 @@ pub(crate) fn between<'a>(
         if candidate.manifest.hashes("trajectory") != directory.manifest.hashes("trajectory") {
             return refused(
                 format!("{run}: not the trajectory of the reference"),
-                "compare runs along one and the same trajectory file",
+                "compare runs along the same trajectory file",
             );
         }
         let [own, other] = [candidate, directory].map(|side| &side.experiment);
         let [runs, of_reference] = [own, other].map(|side| side.runs.len());
         if is_paired && runs != of_reference {
             return refused(
-                format!(
-                    "{run}: {runs} runs against {of_reference} of the reference, of the same seed"
-                ),
-                "make both with one number of --runs",
+                format!("{run}: {runs} runs, {of_reference} in the reference, of one seed"),
+                "give both the same --runs",
             );
         }
         let mut outages = metrics::compare(own, other, is_paired).refuse_within(run)?;
@@ -283,7 +281,7 @@ fn differences(candidate: &RunDirectory, reference: &RunDirectory) -> Vec<&'stat
             is_expected == [false, false] && candidate.seed != reference.seed,
         ),
         (
-            "what makes the errors is",
+            "the source of errors is",
             truth(candidate) != truth(reference),
         ),
         ("[imu] is", c.imu != r.imu),
@@ -408,7 +406,7 @@ impl Comparison {
         let covered = match &short_names(&runs)[..] {
             [] => "the runs and the calibrations".to_owned(),
             all if all.len() == self.others().len() => {
-                "the runs alone: no model has draws of its calibration beside it".to_owned()
+                "the runs alone: no model has draws beside it".to_owned()
             }
             names => format!(
                 "the runs and the calibrations, of {} of the runs alone",
@@ -503,7 +501,7 @@ impl Answer for Comparison {
         let scatter = |[low, high]: [f64; 2]| high > low;
         let has_scatter = outages.any(|outage| outage.states[0].ci95_pct.is_some_and(scatter));
         let lines = lines.chain(has_scatter.then(|| self.coverage_of_intervals()));
-        let title = "What the filters believe, compared";
+        let title = "Stated standard deviations compared";
         let mut document = Document::new(title, tone(gravest), lines);
         self.doubts
             .iter()
@@ -518,14 +516,14 @@ impl Answer for Comparison {
         document.chart(&self.chart(), CAPTION);
         if !self.outages.is_empty() {
             document.section("Consistency and errors");
-            document.text("NEES (9 if right) and coverage over the outage; RMSE at its end against the reference, (ratio − 1)·100.");
+            document.text("NEES (9 if right) and coverage over the outage; RMSE at its end, (ratio − 1)·100 to the reference.");
             document.table(self.consistency_table());
         }
         document
     }
 }
 
-const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's own standard deviation: 0 % is as the reference believes.";
+const CAPTION: &str = "ASEE (averaged standard estimation error): the filter's own standard deviation; 0 % is the reference's.";
 
 // The layout of the paper's Table I: scenario by outage, state by estimator.
 

@@ -45,7 +45,7 @@ impl Command for DatasheetArgs {
     const NAME: &'static str = "datasheet";
     const OUT: Out = Out::File {
         name: "model.toml",
-        help: "Model file to write (default: to stdout)",
+        help: "Model file (default: stdout)",
     };
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
@@ -73,10 +73,8 @@ impl Command for DatasheetArgs {
         let rate_hz = self.rate_hz.or(rate_hz).unwrap_or(100.0);
         let made = sheet.model_file(rate_hz).map_err(Failure::input)?;
         if made.file.missing.len() == made.file.model.axes.len() {
-            return Err(
-                Failure::input("no figure is given that makes a noise model")
-                    .hint("give --vrw and --arw, or --unit NAME (nav-sim datasheet --list)"),
-            );
+            return Err(Failure::input("no figure gives a noise model")
+                .hint("give --vrw and --arw, or --unit NAME (nav-sim datasheet --list)"));
         }
         Sensor::ALL
             .into_iter()
@@ -168,10 +166,10 @@ fn named(name: &str) -> Result<Datasheet> {
         return sheet;
     }
     Err(
-        Failure::input(format!("--unit {name}: the catalogue has no such unit")).hint(
+        Failure::input(format!("--unit {name} is not in the catalogue")).hint(
             match nearest(name, CATALOGUE.iter().map(|(known, _)| *known)) {
-                Some(meant) => format!("did you mean {meant}?"),
-                None => "nav-sim datasheet --list shows what there is".to_owned(),
+                Some(meant) => format!("did you mean \"{meant}\"?"),
+                None => "nav-sim datasheet --list shows all".to_owned(),
             },
         ),
     )
@@ -188,9 +186,11 @@ fn lacking(sheet: &Datasheet, sensor: Sensor) -> impl Iterator<Item = String> {
         match entry {
             Some(entry) => {
                 let given = &entry.quantity.given;
-                format!("{sensor}: {name} {given} by grade, the data sheet states none (--{flag})")
+                format!(
+                    "{sensor}: {name} {given} by grade, not stated by the data sheet (--{flag})"
+                )
             }
-            None => format!("{sensor}: no {name} is given (--{flag})"),
+            None => format!("{sensor}: no {name} (--{flag})"),
         }
     })
 }

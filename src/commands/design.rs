@@ -69,7 +69,7 @@ impl Command for Design {
 
     fn run(&self, context: &Context<'_>) -> Result<Designs> {
         if self.hours.is_some_and(|hours| hours > LONGEST_H) {
-            return Err(Failure::input("--hours: longer than a year"));
+            return Err(Failure::input("--hours: over a year"));
         }
         let file = inputs::model(&self.model, context)?;
         let mut scenario = self.scenario()?;
@@ -313,7 +313,7 @@ struct DesignedQuantile {
 /// to 0.95, and 32 to 33 % were wider (AWV and DR-AWV); for white noise 0.93 to 0.98. All of them
 /// held the truth in 96 to 98.5 % of the cases: a scatter estimated from twelve signals is more
 /// often too small than too large, for which Student's quantile compensates.
-const STATED: &str = "where ± 100 % are expected, half of the calibrations state below 0.85 of it, one in three more";
+const STATED: &str = "where ± 100 % are expected, half of the calibrations state under 0.85 of it, one in three more";
 
 /// A part of an interval this large is nearly all of it.
 const NEARLY_ALL: f64 = 0.8;
@@ -350,7 +350,7 @@ impl Designs {
         let (all, open) = (largest.parameters.len(), largest.undetermined);
         let plan = format!("{} recordings of {} h", largest.recordings, largest.hours);
         let first = format!(
-            "{plan} would determine {} of {all} parameters; known least: {}",
+            "{plan} would determine {} of {all} parameters; least certain: {}",
             all - open,
             largest.known_least
         );
@@ -387,7 +387,7 @@ impl Designs {
         let columns = [
             ("recordings", "recordings"),
             ("hours", "hours"),
-            ("parameter known least", "known_least"),
+            ("least certain", "known_least"),
             ("not determined", "undetermined"),
             (
                 "p95 at the end of {start_s}–{end_s} s (± %)",
@@ -402,18 +402,18 @@ impl Answer for Designs {
     fn document(&self) -> Document {
         let designs = &self.designs;
         let (tone, lines) = self.verdict();
-        let mut document = Document::new("What recordings would tell", tone, lines);
+        let mut document = Document::new("Expected intervals", tone, lines);
         let floor = designs.last().map_or(0, DesignOutcome::lengths_do_not_help);
         if floor > 0 {
             let text = format!(
-                "more hours will not help {floor} parameters: recordings differ among themselves; more recordings will"
+                "more hours will not help {floor} parameters, which differ between recordings; more recordings will"
             );
             document.note(Importance::Remark, text);
         }
         document.note(Importance::Remark, STATED);
         document.table(self.lead());
         if designs.iter().any(|d| !d.horizontal_p95.is_empty()) {
-            document.section("What that is in navigation");
+            document.section("Effect on navigation");
             document.table(Table::of(
                 self,
                 "/designs/*/horizontal_p95/*",

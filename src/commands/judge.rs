@@ -60,11 +60,11 @@ pub struct Judge {
 }
 
 fn arm(text: &str) -> Result<[f64; 3], &'static str> {
-    numbers(text).ok_or("expected 3 numbers between commas")
+    numbers(text).ok_or("expected 3 numbers")
 }
 
 fn origin(text: &str) -> Result<[f64; 3], &'static str> {
-    parse_origin(text).ok_or("expected latitude and longitude in degrees and a height in m")
+    parse_origin(text).ok_or("expected latitude, longitude (degrees) and height (m)")
 }
 
 impl Command for Judge {
@@ -98,7 +98,7 @@ impl Command for Judge {
                 ends.1
             );
             let hint = match rough_delay_s(&rows, &reference, given) {
-                Some(delay_s) => format!("--reference-delay={delay_s} brings them together"),
+                Some(delay_s) => format!("--reference-delay={delay_s} aligns them"),
                 None => "give both on one clock, or --reference-delay S".to_owned(),
             };
             Failure::input(message).hint(hint)
@@ -108,7 +108,7 @@ impl Command for Judge {
         for outage in &self.outages {
             if outage.end_s < span.0 || outage.start_s > span.1 {
                 let asked = window(outage.start_s, outage.end_s);
-                let message = format!("--outage: {asked} is not within the solution");
+                let message = format!("--outage: {asked} is outside the solution");
                 let hint = format!("it goes from {:.2} to {:.2} s", span.0, span.1);
                 return refused(message, hint);
             }
@@ -127,9 +127,8 @@ impl Command for Judge {
         }
         let is_overconfident = judgement.kind == VerdictKind::Overconfident;
         let unmet = is_overconfident.then(|| {
-            Failure::bound("the solution is overconfident").hint(
-                "larger process noise or measurement noise in the filter: errors.csv shows where",
-            )
+            Failure::bound("the solution is overconfident")
+                .hint("larger process or measurement noise in the filter: errors.csv shows where")
         });
         let summary = summary(&judgement, &outages);
         let document = page(&judgement, &outages);
@@ -182,21 +181,21 @@ fn summary(judgement: &Judgement, outages: &[(f64, f64)]) -> serde_json::Value {
 fn doubt(doubt: &SetupFault) -> String {
     match doubt {
         SetupFault::Apart { metres } => format!(
-            "solution and reference are {} m apart: another origin, latitude and longitude exchanged, or another drive",
+            "solution and reference are {} m apart: another origin, swapped latitude and longitude, or another drive",
             readable(*metres)
         ),
         SetupFault::Height { metres } => format!(
-            "heights of the solution are {} m above the reference's all the time: one above sea level, one above the ellipsoid?",
+            "heights of the solution are {} m above the reference's: sea level against ellipsoid?",
             readable(*metres)
         ),
         SetupFault::Axes {
             axes,
             angles_deg: [roll, pitch, yaw],
         } => format!(
-            "the axes of {axes} are turned by roll {roll:.0}°, pitch {pitch:.0}°, yaw {yaw:.0}° in those of the reference: write both as front, right, down in north, east, down"
+            "the axes of {axes} are turned by roll {roll:.0}°, pitch {pitch:.0}°, yaw {yaw:.0}°: write both as front, right, down in north, east, down"
         ),
         SetupFault::Transformed { cause, times, left } => format!(
-            "{cause}? Errors are {} times their standard deviations as it is, {} times after that",
+            "{cause}? Errors are {} times their standard deviations, {} times after that",
             readable(*times),
             readable(*left)
         ),
@@ -223,7 +222,7 @@ fn doubt(doubt: &SetupFault) -> String {
 fn lines(judgement: &Judgement, outages: &[(f64, f64)]) -> Vec<String> {
     let own = match &judgement.stated {
         Some(stated) => drive_line(&stated.verdict, stated.nees_dof, outages),
-        None => "undecided: the solution states no standard deviations; errors only".to_owned(),
+        None => "undecided: no standard deviations in the solution; errors only".to_owned(),
     };
     if judgement.doubts.is_empty() {
         return vec![own];
@@ -255,7 +254,7 @@ fn page(judgement: &Judgement, outages: &[(f64, f64)]) -> Document {
             first.t_s,
             last.t_s,
             match judgement.is_at_epochs {
-                true => ", those at the reference's own epochs: it is coarser than the solution",
+                true => ", at the reference's epochs, which are coarser",
                 false => "",
             }
         ));
@@ -316,7 +315,7 @@ fn page(judgement: &Judgement, outages: &[(f64, f64)]) -> Document {
             &[(rows.collect(), names, [Colour::BELIEVED, Colour::REAL])],
             outages,
         ),
-        "Lines: solution less reference. Bands: ± 3 σ as stated.",
+        "Lines: solution minus reference. Bands: ± 3 σ as stated.",
     );
     document
 }

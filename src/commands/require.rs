@@ -87,7 +87,7 @@ impl Command for Require {
     const NAME: &'static str = "require";
     const OUT: Out = Out::File {
         name: "needed.toml",
-        help: "Model file to write, of the required IMU",
+        help: "Model file of the required IMU",
     };
 
     fn check_out(&self) -> Result<()> {
@@ -95,7 +95,7 @@ impl Command for Require {
             return Ok(());
         }
         refused(
-            "--out is for the required IMU: it cannot be used with MODEL or --catalogue",
+            "--out is for the required IMU, not for MODEL or --catalogue",
             "--plot FILE.html writes the page",
         )
     }
@@ -108,7 +108,7 @@ impl Command for Require {
             } = outage;
             return refused(
                 format!("--start {start_s} beside --outage {from}:{to}"),
-                "an outage of a length alone has an earliest start",
+                "only an outage given by its length has an earliest start",
             );
         }
         if self.model.is_none() && self.outage == OutageRequest::Longest {
@@ -141,22 +141,19 @@ impl Command for Require {
 }
 
 /// Verdict on units of which none keeps the limits.
-const NONE: &str = "no unit keeps the limits by figures that are all stated";
+const NONE: &str = "no unit keeps the limits with all figures stated";
 
 impl Require {
     /// Reads the files and assembles the requirements.
     fn requirements(&self, context: &Context<'_>) -> Result<Requirements> {
         if self.limits.is_empty() {
-            return refused(
-                "no limit is given",
-                "give one, such as --require 'p95_m<=5' or --require 'yaw_deg<=1'",
-            );
+            return refused("no limit given", "give --require 'p95_m<=5', or another");
         }
         let mut scenario = self.settings.read()?;
         if self.vehicle.is_some() {
             if !scenario.aiding.is_none() {
                 return refused(
-                    "--vehicle car beside [aiding] of --scenario",
+                    "--vehicle car with [aiding] of --scenario",
                     "give one of them",
                 );
             }
@@ -189,7 +186,7 @@ impl Requirements {
         let missing = missing(&file.not_stated());
         if !missing.is_empty() {
             context.warn(format!(
-                "{}: what is not stated counts as none, unless by grade: {missing}",
+                "{}: figures not stated count as zero, unless by grade: {missing}",
                 path.display()
             ));
         }
@@ -218,7 +215,7 @@ impl Requirements {
         ]);
         if has_vehicle {
             json["aidings"] = self.aidings(&scenario, &model).map_err(unusable)?;
-            document.section("What the car knows of its own motion");
+            document.section("Motion constraints of the car");
             let columns = [
                 ("aiding", "aiding"),
                 ("error after the outage", "value"),
@@ -228,7 +225,7 @@ impl Requirements {
             ];
             document.table(Table::of(&json, "/aidings/*", &columns));
         }
-        document.section("Error against the length of an outage");
+        document.section("Error against outage length");
         let columns = [("limit on", "quantity"), ("{outage_s} s", "points/*/value")];
         document.table(Table::of(&json, "/curves/*", &columns));
         let unmet = margins.filter(|margins| !margins.met).map(|margins| {
@@ -274,7 +271,7 @@ impl Requirements {
         let unit = |(name, _): &(&str, &str)| {
             self.of_sheet(
                 (*name).to_owned(),
-                &datasheet::catalogued(name).expect("a name of the catalogue")?,
+                &datasheet::catalogued(name).expect("catalogue")?,
             )
         };
         CATALOGUE.iter().map(unit).collect()
@@ -284,11 +281,8 @@ impl Requirements {
     fn units_of(&self, directory: &Path, context: &Context<'_>) -> Result<Vec<CatalogueUnit>> {
         if !directory.exists() {
             return refused(
-                format!(
-                    "--catalogue {}: there is no such directory",
-                    directory.display()
-                ),
-                "without a directory, --catalogue ranks the catalogued IMUs",
+                format!("--catalogue {}: no such directory", directory.display()),
+                "--catalogue alone ranks the built-in IMUs",
             );
         }
         let mut paths = listed(&[directory.to_owned()])?;
@@ -296,7 +290,7 @@ impl Requirements {
         if paths.is_empty() {
             return refused(
                 format!("{}: no model file (.toml)", directory.display()),
-                "make them with `nav-sim calibrate` or `nav-sim datasheet`",
+                "make one with `nav-sim calibrate` or `nav-sim datasheet`",
             );
         }
         let unit = |path: &PathBuf| {
@@ -347,7 +341,7 @@ fn starts(outages: &[Outage]) -> String {
     let [first, last] = [&outages[0], &outages[count - 1]].map(|o| seconds(o.start_s));
     match count {
         1 => format!("from {first} s on"),
-        _ => format!("{count} starts tried, {first} to {last} s"),
+        _ => format!("{count} starts, {first} to {last} s"),
     }
 }
 
@@ -479,7 +473,7 @@ impl Requirements {
         if begins_s < span_s.0 || begins_s + length_s > span_s.1 {
             return refused(
                 format!(
-                    "an outage of {length_s} s from {begins_s} s on is not on the trajectory, which lasts from {} to {} s",
+                    "an outage of {length_s} s from {begins_s} s is not on the trajectory, which lasts from {} to {} s",
                     span_s.0, span_s.1
                 ),
                 format!("a shorter --outage{earlier}"),
@@ -510,8 +504,8 @@ impl Requirements {
         };
         let imu = need.allocated()?;
         let model = imu.model(self.scenario.imu.rate_hz);
-        let worst = HardestLimit::of(&self.limits, &course.drifts(scenario, &model)?)
-            .expect("at least one limit and one place");
+        let worst =
+            HardestLimit::of(&self.limits, &course.drifts(scenario, &model)?).expect("limits");
         let turn_on = |sensor| scenario.imu.turn_on_bias(sensor).unwrap_or(0.0);
         let [accel, gyro] = Sensor::ALL.map(turn_on);
         let biases = match [accel, gyro] {
@@ -528,7 +522,7 @@ impl Requirements {
             format!("an IMU {biases}"),
             format!("hardest: {}", in_words(&worst, &outages)),
         ];
-        let mut document = Document::new("The IMU that a limit needs", Tone::Good, lines);
+        let mut document = Document::new("The required IMU", Tone::Good, lines);
         if let Some(Outage { start_s, end_s }) = beyond_linear {
             note_beyond(
                 &format!("in outage {}", window(start_s, end_s)),
@@ -539,7 +533,7 @@ impl Requirements {
         let mut provenance = known(json!({
             "program": PROGRAM,
             "made_by": "require",
-            "label": "what a limit needs: not a calibration",
+            "label": "a requirement, not a calibration",
             "question": question,
             "turn_on_bias": biases,
         }));
@@ -568,7 +562,7 @@ impl Requirements {
             json!(worst),
         ]);
         document.section("Figures, at most");
-        document.text("If alone: without any other error of the IMU. Others 10 × better: every other figure ten times smaller.");
+        document.text("If alone: no other error of the IMU. Others 10 × better: every other figure ten times smaller.");
         let columns = [
             ("figure", "figure"),
             ("at most, equal shares", "allocated"),
@@ -749,7 +743,7 @@ impl Requirements {
         let mut lines = vec![answer, format!("asked: {}", self.in_words(&outages))];
         if open > 0 {
             lines.push(format!(
-                "{open} units are not ranked: their data sheets leave figures out (--verbose lists them)"
+                "{open} units are not ranked: their data sheets lack figures (--verbose lists them)"
             ));
         }
         let tone = Tone::from(!met.is_empty());
@@ -761,7 +755,7 @@ impl Requirements {
         let unmet = met.is_empty().then(|| Failure::bound(NONE));
         let quantity = quantity_in_words(self.limits[0].quantity);
         let columns = format!(
-            "1 s … 300 s: {quantity} after such an outage, of starts that allow all; bridges: longest outage within the limits"
+            "1 s … 300 s: {quantity} after such an outage, at starts that allow all; bridges: longest outage within the limits"
         );
         document.note(Importance::Remark, columns);
         let question = self.question(&outages);
@@ -799,7 +793,7 @@ impl Requirements {
             let rest = if at_least_s < LONGEST_S {
                 "to the end of the trajectory"
             } else {
-                "longer ones are not looked at"
+                "longer ones are not tried"
             };
             format!("≥ {} s, {rest}", seconds(at_least_s))
         };
@@ -944,7 +938,7 @@ struct LimitResult {
 // Units of a catalogue against a limit.
 
 /// Assumptions of a ranking.
-const RULE: &str = "A figure that is missing counts as none: open means that the limit would be kept then. Turn-on bias is the repeatability from one switching-on to the next, or that of the grade; an initial tolerance of the zero offset counts as removed before use. Figures named without a sensor are missing for both.";
+const RULE: &str = "Missing figures count as zero: open means that the limit would be kept then. Turn-on bias is the repeatability between power-ons, or that of the grade; an initial zero offset counts as removed. Figures without a sensor are missing for both.";
 
 /// `bias, accel turn-on`: figures that both sensors lack are named once.
 fn missing(not_stated: &[String]) -> String {

@@ -76,7 +76,7 @@ fn a_question_says_how_many_starts_were_tried() {
     let words = "p95_m ≤ 5.00 after an outage of 60 s";
     assert_eq!(
         question(180.0),
-        format!("{words} (the worst of 61 starts tried, 1060 to 1120 s)")
+        format!("{words} (the worst of 61 starts, 1060 to 1120 s)")
     );
     assert_eq!(question(60.0), format!("{words} (from 1000 s on)"));
 }

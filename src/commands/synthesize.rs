@@ -109,8 +109,8 @@ impl Command for Synthesize {
         let (shown, rate_hz) = (self.model.display(), file.model.rate_hz);
         if self.spread && file.spread.is_none() {
             return refused(
-                format!("{shown}: no [spread] to draw parameters from"),
-                "see the head of calib_data/consumer_mems.toml, or leave --spread out",
+                format!("{shown}: no [spread] to draw from"),
+                "see calib_data/consumer_mems.toml, or leave --spread out",
             );
         }
         let contamination = self
@@ -126,7 +126,7 @@ impl Command for Synthesize {
         };
         if !(2.0..=MOST).contains(&samples) {
             return Err(Failure::input(format!(
-                "a recording has 2 to {MOST:e} samples; these are {samples}"
+                "{samples} samples: a recording has 2 to {MOST:e}"
             )));
         }
         let mut synthesis = Synthesis {
@@ -173,12 +173,12 @@ impl Synthesize {
         let shown = self.model.display();
         if present.is_empty() {
             return Err(Failure::input(format!(
-                "{shown} has no noise model for the axes asked for"
+                "{shown} has no noise model for these axes"
             )));
         }
         for channel in missing {
             context.warn(format!(
-                "{shown} has no noise model for {channel}; no signal is written for that axis"
+                "{shown} has no noise model for {channel}: not written"
             ));
         }
         Ok(present)
@@ -226,7 +226,7 @@ impl Synthesis {
                 *channel,
                 self.imu()
                     .signal(model, replicate, *channel, self.drawn.samples)
-                    .expect("its contamination was tried"),
+                    .expect("tried"),
             )
         };
         let signals: Vec<_> = self.channels.par_iter().map(signal).collect();
@@ -276,8 +276,8 @@ fn reaches(
     let Contamination { name, rules } = contamination;
     if !(1..=replicates).any(|replicate| contamination.touches(replicate)) {
         return refused(
-            format!("--contaminate {name}: it touches none of the replicates 1 to {replicates}"),
-            "replicates are counted from 1; more of them with --replicates",
+            format!("--contaminate {name}: affects none of the replicates 1 to {replicates}"),
+            "give more --replicates (counted from 1)",
         );
     }
     // the named ones are of as many recordings as in the paper
@@ -291,8 +291,8 @@ fn reaches(
         && !is_named
     {
         return refused(
-            format!("{place}: corrupts replicate {k}, of which only {replicates} are made"),
-            "more of them with --replicates, or leave it out of the list",
+            format!("{place}: corrupts replicate {k} of {replicates}"),
+            "give more --replicates, or leave it out of the list",
         );
     }
     let made = |rule: &Rule| channels.iter().any(|c| c.sensor == rule.sensor);

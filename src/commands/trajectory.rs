@@ -56,7 +56,7 @@ struct TrajectorySource {
 /// Latitude, longitude (rad), height (m).
 fn origin(text: &str) -> Result<[f64; 3], String> {
     parse_origin(text)
-        .ok_or_else(|| "not LAT_DEG,LON_DEG,H_M with a latitude within ±89.9".to_owned())
+        .ok_or_else(|| "expected LAT_DEG,LON_DEG,H_M, latitude within ±89.9".to_owned())
 }
 
 impl TrajectorySource {
@@ -227,7 +227,7 @@ impl Command for CheckTrajectory {
                 b.velocity_m_s,
                 b.attitude_rad
             ));
-            hints.push("a higher --rate-hz closes better; rough motion may deserve a wider bound");
+            hints.push("a higher --rate-hz closes better; rough motion may need a wider bound");
         }
         if !beyond.is_empty() {
             let stretches = match beyond.len() {
@@ -235,7 +235,7 @@ impl Command for CheckTrajectory {
                 n => format!("{n} stretches"),
             };
             missed.push(format!("the motion is beyond a limit in {stretches}"));
-            hints.push("a vehicle that does move so deserves a larger --limit-speed");
+            hints.push("a vehicle that moves so needs a larger --limit-speed");
         }
         let message = format!("{name}: {}", missed.join("; "));
         let unmet = (!missed.is_empty()).then(|| Failure::bound(message).hint(hints.join("; ")));

@@ -49,7 +49,7 @@ pub struct Tune {
 
 /// Help where fixes are too rare to reduce a model.
 const RARE_FIXES: &str =
-    "raise it: the verdict is of the filter of 15 states too, whatever --filter tunes";
+    "raise it: the verdict includes the 15-state filter, whatever --filter tunes";
 
 /// Longest schedule of outages that is looked at where no trajectory says how long (s).
 const DAY_S: f64 = 86_400.0;
@@ -70,8 +70,8 @@ impl Command for Tune {
         let mut scenario = self.settings.checked()?;
         if self.truths.is_empty() && scenario.has_no_errors() {
             return refused(
-                "no truth to be consistent with: --truth is not given, and the scenario has no errors",
-                "give models (--truth OTHER.toml, one a recording), or a scenario with errors",
+                "no truth: neither --truth nor errors in the scenario",
+                "give models (--truth OTHER.toml, one per recording), or a scenario with errors",
             );
         }
         let file = inputs::model(&self.model, context)?;
@@ -111,7 +111,7 @@ impl Tune {
             None => Ok(()),
             Some(path) => refused(
                 format!("--truth {}: recordings, not a model", path.display()),
-                "make a model of each: nav-sim calibrate FILE --estimator gmwm -o FILE.toml",
+                "calibrate each: nav-sim calibrate FILE --estimator gmwm -o FILE.toml",
             ),
         }
     }
@@ -169,8 +169,8 @@ impl Tune {
                 || scenario.imu.temperature.is_some()
             {
                 return refused(
-                    "aiding, a barometer and a temperature profile belong to a trajectory",
-                    "give it with --trajectory",
+                    "aiding, barometer and temperature profile need a trajectory",
+                    "give a trajectory with --trajectory",
                 );
             }
             let outages = scenario.outages_on((0.0, DAY_S), seed)?.windows;
@@ -390,10 +390,10 @@ impl TuneResult {
     fn of_aiding(&self) -> Option<String> {
         let factor = self.aiding_sigmas.filter(|factor| *factor != 1.0)?;
         Some(if factor.is_nan() {
-            "no sigma of the aiding covers its errors: give the filter states of them".to_owned()
+            "no sigma of the aiding covers its errors: give the filter states for them".to_owned()
         } else {
             format!(
-                "every sigma of [aiding] × {}, and then of the model:",
+                "every sigma of [aiding] × {}, then of the model:",
                 readable(factor)
             )
         })
@@ -415,11 +415,11 @@ impl TuneResult {
         {
             let names = names.join(" and ");
             return Some(format!(
-                "the model has no {names} noise to multiply, where the truth has some"
+                "the model has no {names} noise to scale, the truth has some"
             ));
         }
         let limit = if is_at_limit {
-            ": a factor is the largest that is tried"
+            ": a factor is at its limit"
         } else {
             ""
         };
@@ -434,11 +434,9 @@ impl TuneResult {
                 "give it the noise of its data sheet (nav-sim datasheet) or of the truth, and tune again"
             }
             Aim::Mean => {
-                "--for worst, other processes, or the turn-on bias and scale factors that the truth has"
+                "--for worst, other processes, or the turn-on bias and scale factors of the truth"
             }
-            Aim::Worst => {
-                "a model of other processes, or with the turn-on bias and scale factors that the truth has"
-            }
+            Aim::Worst => "other processes, or the turn-on bias and scale factors of the truth",
         }
     }
 
@@ -563,7 +561,7 @@ impl TuneResult {
             ("RMSE {after_s} s (m)", "outage_end/*/horizontal_rmse_m"),
         ];
         document.table(Table::of(&json, "/filters/*", &columns));
-        document.text("RMSE/sigma: largest error over what the filter states. RMSE: horizontal, at the end of an outage.");
+        document.text("RMSE/sigma: largest error over the stated one. RMSE: horizontal, at the end of an outage.");
         document.section("Factors");
         let columns = [
             ("sensor", "sensor"),
@@ -723,7 +721,7 @@ mod tests {
             tuned
                 .fault()
                 .unwrap()
-                .starts_with("the model has no accel noise to multiply")
+                .starts_with("the model has no accel noise to scale")
         );
         tuned.after.nees = 9.0;
         assert_eq!(tuned.fault(), None);
@@ -732,7 +730,7 @@ mod tests {
             tuned
                 .fault()
                 .unwrap()
-                .starts_with("the model has no accel noise to multiply")
+                .starts_with("the model has no accel noise to scale")
         );
     }
 
@@ -744,11 +742,11 @@ mod tests {
             (Some(1.0), None),
             (
                 Some(2.5),
-                Some("every sigma of [aiding] × 2.50, and then of the model:"),
+                Some("every sigma of [aiding] × 2.50, then of the model:"),
             ),
             (
                 Some(f64::NAN),
-                Some("no sigma of the aiding covers its errors: give the filter states of them"),
+                Some("no sigma of the aiding covers its errors: give the filter states for them"),
             ),
         ] {
             tuned.aiding_sigmas = factor;

@@ -31,9 +31,9 @@ pub struct Wv {
     /// Scales and robustness.
     #[command(flatten)]
     tuning: VarianceRequest,
-    /// Degrees of freedom of the intervals: eta3, the customary ones, conservative beyond the first
-    /// scale; large-sample, from the autocovariance of the coefficients, with the stated coverage
-    #[arg(long, value_parser = parse::one_of::<Intervals>(&Intervals::NAMES), default_value_t, help_heading = "Wavelet variance")]
+    /// Degrees of freedom of the intervals: eta3, customary and conservative; large-sample, from the
+    /// autocovariance of the coefficients, with the stated coverage
+    #[arg(long, value_name = "NAME", hide_possible_values = true, value_parser = parse::one_of::<Intervals>(&Intervals::NAMES), default_value_t, help_heading = "Wavelet variance")]
     intervals: Intervals,
 }
 
@@ -144,7 +144,7 @@ impl Answer for SignalsFile {
         }
         let count = recordings(self).len();
         let head = format!(
-            "Allan deviation over averages, median of recordings ({count}); ratio: least robust/classical"
+            "Allan deviation, median of recordings ({count}); ratio: least robust/classical"
         );
         let mut document = Document::new(
             "Wavelet variance of static recordings",
@@ -153,7 +153,7 @@ impl Answer for SignalsFile {
         );
         document.table(digest(self));
         let charts: Vec<Chart> = channels(self).map(|channel| chart(self, channel)).collect();
-        document.charts(&charts, "Robust wavelet variance; dashed: classical, which outliers raise. τ is twice the averaging time.");
+        document.charts(&charts, "Robust wavelet variance; dashed: classical, raised by outliers. τ is twice the averaging time.");
         document
     }
 }

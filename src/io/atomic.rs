@@ -332,7 +332,7 @@ impl AtomicDir {
 
 /// Outputs that are this command's own until this is dropped.
 #[derive(Debug)]
-#[must_use = "another command may write there as soon as this is dropped"]
+#[must_use = "released when dropped"]
 pub(crate) struct OutputClaim {
     outputs: Vec<PathBuf>,
     marker: Option<Temporary>,
@@ -355,14 +355,14 @@ impl OutputClaim {
     fn new(shown: &Path, marker: &Path, outputs: Vec<PathBuf>) -> Result<Self, Failure> {
         let mut claimed = locked(&CLAIMED);
         if outputs.iter().any(|output| claimed.contains(output)) {
-            let why = "is another output of the same command";
+            let why = "is another output of this command";
             return Err(refused(shown, why).or_hint(help::OUTPUT));
         }
         let marked = fs::create_dir_all(parent_of(marker)).and_then(|()| Temporary::marker(marker));
         let Some((marker, is_left)) = marked.map_err(|e| Failure::unwritable(shown, e))? else {
             return Err(refused(shown, "is being written by another nav-sim")
                 .or_hint(help::OUTPUT)
-                .or_hint("wait until that is done"));
+                .or_hint("wait until it is done"));
         };
         claimed.extend(outputs.iter().cloned());
         Ok(Self {
@@ -453,7 +453,7 @@ pub(crate) fn guard_others(output: &Path, kind: &str) -> Result<(), Failure> {
 }
 
 fn foreign(path: &Path) -> Failure {
-    let error = refused(path, "is not of this command: it is not replaced");
+    let error = refused(path, "is not of this command: not replaced");
     error.or_hint(help::OUTPUT).or_hint("move it away")
 }
 
@@ -467,7 +467,7 @@ fn guard_inputs<'a>(
     match inputs.into_iter().any(is_it) {
         false => Ok(()),
         true => {
-            let why = "is an input of this command and would be overwritten";
+            let why = "is an input and would be overwritten";
             Err(refused(output, why).or_hint(help::OUTPUT))
         }
     }
@@ -505,9 +505,8 @@ pub(crate) fn claim_directory<'a>(
     match found {
         DirectoryState::Foreign => Err(foreign(directory)),
         DirectoryState::Other if !force => {
-            let why = "holds the result of another configuration, other inputs or another seed";
-            Err(refused(directory, why)
-                .or_hint("name another place for it, or replace it with --force"))
+            let why = "holds another result: other configuration, inputs or seed";
+            Err(refused(directory, why).or_hint("name another place, or replace it with --force"))
         }
         DirectoryState::Other | DirectoryState::Same => Ok(claim),
     }

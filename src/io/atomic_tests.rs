@@ -89,7 +89,7 @@ fn links_are_followed_and_devices_written_directly() {
 fn a_full_disk_is_an_error_that_names_the_output() {
     let e = write(Path::new("/dev/full"), vec![0; 1 << 20]).unwrap_err();
     assert!(
-        e.to_string().starts_with("/dev/full: no space is left"),
+        e.to_string().starts_with("/dev/full: the disk is full"),
         "{e}"
     );
     assert!(e.code() == 1);
@@ -118,7 +118,7 @@ fn inputs_are_not_overwritten_under_any_name() {
     let e = guard_inputs(&alias, [input.as_path()]).unwrap_err();
     assert!(
         e.to_string()
-            .ends_with("is an input of this command and would be overwritten")
+            .ends_with("is an input and would be overwritten")
     );
     assert!(e.code() == 2 && e.advice().is_some());
     guard_inputs(&dir.path().join("out.csv"), [input.as_path()]).unwrap();
@@ -206,7 +206,7 @@ fn a_claim_ends_with_its_holder() {
     assert!(
         again
             .to_string()
-            .ends_with("model.toml is another output of the same command"),
+            .ends_with("model.toml is another output of this command"),
         "{again}"
     );
     drop(claim);
@@ -226,7 +226,7 @@ fn where_nothing_can_be_made_another_path_is_the_remedy() {
             let shown = path.display();
             assert_eq!(
                 e.to_string(),
-                format!("{shown}: the system makes no file or directory there")
+                format!("{shown}: no file or directory can be made there")
             );
             assert_eq!(e.advice().unwrap(), "name another path");
             assert!(e.code() == 1);

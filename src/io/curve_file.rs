@@ -26,8 +26,7 @@ pub(crate) struct NamedCurve {
 }
 
 /// Layouts of a curve file, in words.
-const LAYOUT: &str = "a curve is a CSV with the columns tau_samples,wv,edof (tau_samples = 2, 4, 8, …), or a .wv.json \
-                      written by calibrate or wv";
+const LAYOUT: &str = "a curve is a CSV with the columns tau_samples,wv,edof (tau_samples = 2, 4, 8, …), or a .wv.json of calibrate or wv";
 
 /// Reads the curves of a file.
 ///
@@ -102,7 +101,7 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
     };
     let (version, rate_hz) = (file.schema_version, file.rate_hz);
     if version != 1 {
-        let message = format!("schema_version = {version} is not 1, which this version reads");
+        let message = format!("schema_version = {version} is not 1");
         return Err(of_head(message));
     }
     if !(rate_hz.is_finite() && rate_hz > 0.0) {
@@ -167,9 +166,7 @@ fn tuning(efficiency: f64) -> Result<Tuning, String> {
     // The efficiency in a file is the true one, which the other convention puts a little beyond the range.
     match Tuning::new(efficiency.clamp(0.3, 0.99)) {
         Ok(tuning) if efficiency > 0.0 && efficiency <= 1.0 => Ok(tuning),
-        _ => Err(format!(
-            "efficiency = {efficiency} is not a number above 0, up to 1"
-        )),
+        _ => Err(format!("efficiency = {efficiency} is not above 0, up to 1")),
     }
 }
 
@@ -283,7 +280,7 @@ mod tests {
         );
         assert_eq!(
             message(&format!("{head}2,NaN,1\n")),
-            "c.csv, line 2: column \"wv\": \"NaN\" is not finite"
+            "c.csv, line 2: column \"wv\": \"NaN\" is not a finite number"
         );
         assert_eq!(
             message(&format!("{head}2,1,0\n")),
@@ -302,7 +299,7 @@ mod tests {
         });
         assert_eq!(
             json("c.json", &later).unwrap_err().to_string(),
-            "c.json, head: schema_version = 9 is not 1, which this version reads"
+            "c.json, head: schema_version = 9 is not 1"
         );
         let json_error = json("c.json", "{\"rate_hz\": 1}").unwrap_err().to_string();
         assert!(

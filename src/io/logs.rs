@@ -42,13 +42,13 @@ pub(crate) fn refused(path: &Path, error: LogError) -> Failure {
     let refusal = |place| Failure::contents(path.display(), place, &error);
     match error.fault {
         LogFault::Topic => {
-            refusal(Place::Within).or_hint("--topic NAME names one (nav-sim inspect lists them)")
+            refusal(Place::Within).or_hint("--topic NAME selects one (nav-sim inspect lists them)")
         }
         LogFault::NoTopic => {
-            refusal(Place::Within).or_hint("nav-sim inspect lists what it has: name another file")
+            refusal(Place::Within).or_hint("name another file: nav-sim inspect lists its contents")
         }
         LogFault::TimeBack => {
-            refusal(Place::Within).or_option(("stamp", "--stamp log takes the times of arrival"))
+            refusal(Place::Within).or_option(("stamp", "--stamp log uses the times of arrival"))
         }
         LogFault::NotRead(_) => {
             Failure::contents(path.display(), Place::Itself, format!("is {error}"))

@@ -5,7 +5,7 @@ use nav_sim_navigation::metrics::EpochRow;
 use nav_sim_navigation::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunRecord};
 
 /// Hint for a damaged table, which the program itself wrote.
-pub(crate) const REPEAT: &str = "repeat the run, or put back its files";
+pub(crate) const REPEAT: &str = "repeat the run, or restore its files";
 
 /// Gives the cell of a column in a row; an empty one is NaN.
 type Cell<'a> = &'a dyn Fn(&str) -> Result<f64, Failure>;
@@ -76,7 +76,7 @@ pub(crate) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, Fail
         let lost = cells.clone().find(|(_, value)| !value.is_finite());
         match lost.filter(|_| cells.any(|(_, value)| value.is_finite())) {
             Some((name, value)) => {
-                Err(Failure::cell(path, line, name, value, "is not finite").hint(REPEAT))
+                Err(Failure::cell(path, line, name, value, "is not a finite number").hint(REPEAT))
             }
             None => Ok(row),
         }
@@ -206,7 +206,7 @@ mod tests {
         let error = parse_epochs("e.csv", &damaged).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "e.csv, line 3: column \"asee_pos_e_m\": NaN is not finite"
+            "e.csv, line 3: column \"asee_pos_e_m\": NaN is not a finite number"
         );
         result.epochs[1] = EpochSums {
             t_s: result.epochs[1].t_s,

@@ -47,7 +47,7 @@ mod tests {
         let hint = |text: &str| refused(text).1.unwrap();
         assert_eq!(
             hint("[outage]\nstart_s = 1\nend_s = 2\n"),
-            "there may be several: write [[outage]], in double brackets"
+            "write [[outage]], in double brackets"
         );
     }
 

@@ -148,7 +148,7 @@ fn bounded(reader: impl Read, largest: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     reader.take(largest + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > largest {
-        let message = format!("more than {} MiB, or without an end", largest >> 20);
+        let message = format!("more than {} MiB, or endless", largest >> 20);
         return Err(io::Error::new(ErrorKind::FileTooLarge, message));
     }
     Ok(bytes)
@@ -172,7 +172,7 @@ mod tests {
     #[test]
     fn what_has_no_end_is_refused() {
         let e = text(Path::new("/dev/zero")).unwrap_err();
-        assert_eq!(e.to_string(), "more than 256 MiB, or without an end");
+        assert_eq!(e.to_string(), "more than 256 MiB, or endless");
         assert!(is_damage(e.kind()));
     }
 

@@ -59,7 +59,7 @@ fn walk(
         }
     }
     if records.end == 0 || records.end > input.length() {
-        let message = "the end is missing: still being written, or its writer was stopped";
+        let message = "the end is missing: still being written, or interrupted";
         return Err(LogError::at(input.offset(), LogFault::Cut, message));
     }
     Ok(())

@@ -295,8 +295,7 @@ const MATLAB: &str =
     "in MATLAB: writematrix(imu, 'imu.csv'), and read it with --columns, which names its columns";
 const NOVATEL: LogFormat = LogFormat::Other(
     "a NovAtel log",
-    "fixes to the logs GPGGA, GPRMC and GPGST; counts of the IMU, times its scale factors, to a table t_s, accel_x_m_s2 … \
-     gyro_z_rad_s",
+    "GPGGA, GPRMC and GPGST as fixes; IMU counts times their scale factors as a table t_s, accel_x_m_s2 … gyro_z_rad_s",
 );
 const HDF5: LogFormat = LogFormat::Other("an HDF5 file, as MATLAB 7.3 writes", MATLAB);
 /// First bytes of the formats that have such.
@@ -307,14 +306,14 @@ const MAGIC: [(&[u8], LogFormat); 14] = [
         b"$IMURAW\0",
         LogFormat::Other(
             "an Inertial Explorer .imr",
-            "in Inertial Explorer: Tools > View Raw IMU Data, and save it as text with a header that names the units",
+            "in Inertial Explorer: Tools > View Raw IMU Data, saved as text with units in the header",
         ),
     ),
     (
         b"\xff\x5a",
         LogFormat::Other(
             "an SBG log",
-            "in sbgCenter or with sbgBasicLogger: export it as CSV or text, with the units in its header",
+            "in sbgCenter or with sbgBasicLogger: export as CSV or text, with units in the header",
         ),
     ),
     (b"\x89MCAP0\r\n", LogFormat::Mcap),

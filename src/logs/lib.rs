@@ -20,11 +20,7 @@
         feature = "ubx",
         feature = "npz"
     )),
-    allow(
-        dead_code,
-        unused_variables,
-        reason = "what formats share, where some are left out"
-    )
+    allow(dead_code, unused_variables, reason = "shared by formats")
 )]
 
 // L0: bytes and errors

@@ -75,7 +75,7 @@ fn header_text(from: &mut impl Read) -> io::Result<(String, u64)> {
     let mut start = [0; 10];
     from.read_exact(&mut start)?;
     if !start.starts_with(b"\x93NUMPY") {
-        return Err(io::Error::other("it does not begin with \\x93NUMPY"));
+        return Err(io::Error::other("does not begin with \\x93NUMPY"));
     }
     let mut length = usize::from(u16::from_le_bytes([start[8], start[9]]));
     let mut before = 10;

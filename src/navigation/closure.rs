@@ -76,14 +76,14 @@ impl Closure {
             if dtheta.length() > strapdown::MAX_ROTATION {
                 let angle_deg = dtheta.length() / crate::units::DEG;
                 return Err(Refused(format!(
-                    "the vehicle turns {angle_deg:.0}° within one sample at {t_s} s: too slow a rate for it"
+                    "the vehicle turns {angle_deg:.0}° within one sample at {t_s} s: the rate is too low"
                 )));
             }
             ins.step(Vec3::splat(dtheta), Vec3::splat(sample.f_ib_b * dt), dt);
             let truth = trajectory.state(t_s);
             if truth.lat.abs() > MAX_LATITUDE {
                 return Err(Refused(format!(
-                    "the trajectory comes nearer than 0.1° to a pole at {t_s} s"
+                    "the trajectory comes within 0.1° of a pole at {t_s} s"
                 )));
             }
             closure.widen(&truth, &ins.lane(0));

@@ -143,7 +143,7 @@ impl HardestLimit {
 #[derive(Debug, thiserror::Error)]
 pub enum RequireError {
     /// Not even an IMU without errors keeps a limit.
-    #[error("no IMU keeps {} ≤ {}: without any noise of it, the error is {}, from GNSS, the start and what else the scenario has", limit.quantity.name(), limit.quantity.shown(limit.most), limit.quantity.shown(*value))]
+    #[error("no IMU keeps {} ≤ {}: without IMU noise the error is {}, from GNSS, start and the rest of the scenario", limit.quantity.name(), limit.quantity.shown(limit.most), limit.quantity.shown(*value))]
     Floor {
         /// The limit.
         limit: Limit,
@@ -151,7 +151,7 @@ pub enum RequireError {
         value: f64,
     },
     /// The poorest IMU that is sought keeps every limit.
-    #[error("no IMU is too poor for {} ≤ {}: any that is sought keeps it; with the poorest of the search the error is {}", limit.quantity.name(), limit.quantity.shown(limit.most), limit.quantity.shown(*value))]
+    #[error("every IMU keeps {} ≤ {}: with the poorest of the search the error is {}", limit.quantity.name(), limit.quantity.shown(limit.most), limit.quantity.shown(*value))]
     Loose {
         /// The hardest limit.
         limit: Limit,
@@ -363,7 +363,7 @@ impl<'a> OutagePlacements<'a> {
         let ends = errors_in_outages(&self.track, belief, truth, outages, Moments::End);
         let drift = |(instants, outage): (Vec<Instant>, &Outage)| {
             Drift::of(
-                instants.last().expect("every outage has an end"),
+                instants.last().expect("ends"),
                 outage.end_s - outage.start_s,
             )
         };
@@ -387,7 +387,7 @@ impl<'a> OutagePlacements<'a> {
 }
 
 fn hardest(limits: &[Limit], drifts: &[Drift]) -> HardestLimit {
-    HardestLimit::of(limits, drifts).expect("at least one limit and one place")
+    HardestLimit::of(limits, drifts).expect("limits")
 }
 
 /// Outages of one length at `places` times, the first at `first_s`, evenly to the end of the trajectory.
@@ -467,8 +467,8 @@ impl ImuParameters {
                 t_corr_s: self.t_corr_s,
             }
             .processes(rate_hz);
-            let mut processes = vec![white.expect("a finite variance")];
-            processes.extend(bias.expect("finite variances"));
+            let mut processes = vec![white.expect("finite")];
+            processes.extend(bias.expect("finite"));
             Composite::new(processes)
         };
         Model::pooled(

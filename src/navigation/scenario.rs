@@ -316,7 +316,7 @@ impl Scenario {
                 // of half of what is there, errors may be twice as large as stated
                 if expected < 0.5 * is {
                     found.push(format!(
-                        "the true {sensor} has a {what} of {is} {unit}, the filter expects {expected}: {remedy} gives it states"
+                        "the true {sensor} has a {what} of {is} {unit}, the filter expects {expected}: {remedy} adds states"
                     ));
                 }
             }
@@ -325,7 +325,7 @@ impl Scenario {
             // By gravity, by steady vibration, by what a warming ends with: most of what one sensor has is a bias.
             let remedy = sensor.map_or("calibrate the IMU for it".to_owned(), |sensor| {
                 let key = InitialSettings::bias_key(sensor);
-                format!("initial.{key} gives what is constant of it states")
+                format!("initial.{key} adds states")
             });
             found.push(format!(
                 "imu.{key} = {sigma} {unit} is in no filter: {remedy}"
@@ -344,18 +344,17 @@ impl Scenario {
         if (0..3).any(|i| sigma_m[i] > 0.5 * pos_sigma_m[i] / fixes.sqrt()) {
             let [n, e, d] = sigma_m;
             found.push(format!(
-                "the true receiver errs by {n}, {e}, {d} m over {correlation_time_s} s, the filter expects white errors: a \
-                 larger gnss.pos_sigma_m"
+                "the true receiver errs by {n}, {e}, {d} m over {correlation_time_s} s, the filter expects white errors: a larger gnss.pos_sigma_m"
             ));
         }
         for (source, key) in self.aiding.unexpected() {
             let remedy = if key.ends_with("sigma_m_s") || key == "aiding.heading.sigma_deg" {
-                format!("a larger {key} (nav-sim tune --scenario FILE finds how much)")
+                format!("a larger {key} (nav-sim tune --scenario FILE finds it)")
             } else {
-                format!("{key} gives it states")
+                format!("{key} adds states")
             };
             found.push(format!(
-                "the truth has {source}, of which the filter expects less: {remedy}"
+                "the truth has more {source} than the filter expects: {remedy}"
             ));
         }
         found

@@ -69,8 +69,7 @@ pub(crate) fn csv(rows: &[Map<String, Value>]) -> String {
         .map(|row| columns.keys().map(|key| cell(row.get(key))).collect());
     let head: Vec<String> = columns.keys().cloned().collect();
     for line in std::iter::once(head).chain(lines) {
-        to.write_record(line)
-            .expect("all rows have the same columns");
+        to.write_record(line).expect("columns");
     }
     String::from_utf8(to.into_inner().unwrap_or_default()).unwrap_or_default()
 }

@@ -26,8 +26,7 @@ pub(crate) const WIDTH: usize = 120;
 
 /// Indented JSON with a final newline; NaN is null.
 pub(crate) fn json(value: &impl serde::Serialize) -> String {
-    serde_json::to_string_pretty(value).expect("plain structs with text keys are always JSON")
-        + "\n"
+    serde_json::to_string_pretty(value).expect("serialises") + "\n"
 }
 
 /// A small chart of each reported state: lines of errors, and bands of ± 3 σ that a filter states. Each set of rows has names

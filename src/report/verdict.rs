@@ -22,7 +22,7 @@ pub(crate) fn verdict_lines(summary: &Summary) -> Vec<String> {
     };
     if summary.is_contradicted {
         let line = format!(
-            "{} in the runs, {analysed} by covariance analysis: errors are no longer small",
+            "{} in the runs, {analysed} by covariance analysis: errors beyond linear theory",
             verdict.kind
         );
         lines.insert(0, line);
@@ -311,7 +311,7 @@ pub(crate) fn integration_line(rate_hz: f64, over_sigma: f64) -> Option<String> 
     let errs = readable(over_sigma);
     (over_sigma > 0.1).then(|| {
         format!(
-            "at {rate_hz} Hz the strapdown alone errs by {errs} sigma on this motion: a larger imu.rate_hz"
+            "at {rate_hz} Hz the strapdown alone errs by {errs} sigma on this motion: raise imu.rate_hz"
         )
     })
 }

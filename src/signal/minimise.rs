@@ -59,7 +59,7 @@ impl Descent<'_> {
             .configure(|state: Iterate| state.param(start.to_vec()).max_iters(MOST_ITERATIONS))
             .timer(false)
             .run()
-            .expect("no step fails");
+            .expect("steps");
         let reason = run.state.get_termination_reason();
         Minimum {
             at: run.solver.at,
@@ -183,7 +183,7 @@ pub fn line_minimum(low: f64, high: f64, tolerance: f64, f: impl Fn(f64) -> f64)
     .configure(|state| state.max_iters(MOST_ITERATIONS))
     .timer(false)
     .run()
-    .expect("no step fails");
+    .expect("steps");
     let best = run.state.get_best_param();
     best.copied().unwrap_or(0.5 * (low + high))
 }

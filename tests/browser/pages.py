@@ -4,10 +4,8 @@
     python3 tests/browser/pages.py target/debug/nav-sim          makes results with that program and opens their pages
     python3 tests/browser/pages.py --page page.html [results.json]   opens one page
 
-Held of each page: the browser has nothing to say of it, nothing is asked of the network, the page is no wider than the
-window, no text of a figure is smaller than 11 pixels, every number of a table that says where it stands in the results
-stands there, no table is wider than its place on a desk, and the figures answer to the mouse. Without a browser (chromium, google-chrome) the test is skipped; then
-the exit code is 0 and the last line says so.
+Checks: no console message, no network, no page wider than the window, no text under 11 pixels, table numbers equal to the
+JSON, tables that fit a desk, figures that answer to the mouse. Without a browser the test is skipped, as the last line says.
 """
 
 import json

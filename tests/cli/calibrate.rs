@@ -286,7 +286,7 @@ fn the_curves_of_wv_give_the_fits_of_their_recording() {
         2,
     );
     assert!(
-        stderr.contains("two.wv.json: there are two curves of gyro.x for gmwm"),
+        stderr.contains("two.wv.json: two curves of gyro.x for gmwm"),
         "{stderr}"
     );
 }
@@ -312,7 +312,7 @@ fn a_table_of_exact_values_gives_back_its_parameters() {
         2,
     );
     assert!(
-        stderr.contains("curve.csv: the curve does not say its sample rate"),
+        stderr.contains("curve.csv: the curve states no sample rate"),
         "{stderr}"
     );
     assert!(
@@ -355,7 +355,7 @@ fn a_table_of_exact_values_gives_back_its_parameters() {
         2,
     );
     assert!(
-        stderr.contains("curve.csv: the curve does not say of which sensor it is"),
+        stderr.contains("curve.csv: the curve names no sensor"),
         "{stderr}"
     );
     json(

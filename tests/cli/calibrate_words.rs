@@ -466,8 +466,5 @@ fn wv_names_the_abnormal_recording() {
         "1 of 6 recordings are abnormal: replicate_3 (gyro noise)"
     );
     let two = first("made/replicate_1.csv made/replicate_3.csv");
-    assert_eq!(
-        two,
-        "2 recordings: too few to name an abnormal one (4 are needed)"
-    );
+    assert_eq!(two, "2 recordings: 4 are needed to find abnormal ones");
 }

@@ -318,7 +318,7 @@ fn an_abnormal_recording_judges_no_candidate() {
     assert_eq!(folds.len(), 5, "{folds:?} {said}");
     assert!(
         said.contains(
-            "abnormal, and no judge of candidates (nav-sim calibrate says how): r/replicate_4.csv"
+            "abnormal, ranks no candidate (nav-sim calibrate says how): r/replicate_4.csv"
         ),
         "{said}"
     );

@@ -101,7 +101,7 @@ fn a_full_disk_exits_with_1() {
     assert_eq!(output.status.code(), Some(1));
     assert!(
         String::from_utf8_lossy(&output.stderr)
-            .starts_with("error: standard output: no space is left on the disk")
+            .starts_with("error: standard output: the disk is full")
     );
 }
 

@@ -136,8 +136,7 @@ fn ratios_are_those_that_were_made() {
         &["I_awv", "II_awv", "II_sr-awv", "--reference", "I_awv"],
     );
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    let covered =
-        "95 % intervals (±) of the runs alone: no model has draws of its calibration beside it";
+    let covered = "95 % intervals (±) of the runs alone: no model has draws beside it";
     for cell in [
         "+75.0",
         "-10.00",
@@ -294,9 +293,8 @@ fn a_file_that_is_no_comparison_is_left_alone() {
     let ran = compare(directory.path(), &["a", "--reference", "a"]);
     assert_eq!(ran.code, 2);
     assert!(
-        ran.stderr.starts_with(
-            "error: comparison.json is not of this command: it is not replaced\n\nhint: "
-        ),
+        ran.stderr
+            .starts_with("error: comparison.json is not of this command: not replaced\n\nhint: "),
         "{}",
         ran.stderr
     );
@@ -415,7 +413,7 @@ fn another_seed_or_truth_is_said_and_unpaired() {
     );
     assert!(
         ran.stderr
-            .contains("warning: b: what makes the errors is not"),
+            .contains("warning: b: the source of errors is not"),
         "{}",
         ran.stderr
     );
@@ -471,7 +469,7 @@ fn a_table_that_was_changed_is_refused() {
         assert!(!directory.path().join("comparison.json").exists());
     };
     std::fs::write(&epochs, changed("nan")).unwrap();
-    refused("error: a/epochs.csv, line 7: column \"asee_pos_e_m\": NaN is not finite");
+    refused("error: a/epochs.csv, line 7: column \"asee_pos_e_m\": NaN is not a finite number");
     std::fs::write(&epochs, changed("2.5")).unwrap();
     refused("error: a/epochs.csv: is not what its manifest.json says");
 }

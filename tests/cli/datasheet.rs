@@ -81,7 +81,7 @@ fn a_unit_that_is_missing_or_wrong_is_refused_with_those_that_fit() {
         &[
             "--gyro-bias",
             "'10'",
-            "has no unit; units that fit: deg/h, deg/s, mdeg/s, rad/s",
+            "has no unit; expected deg/h, deg/s, mdeg/s, rad/s",
         ],
     );
     refused(
@@ -104,17 +104,14 @@ fn a_unit_that_is_missing_or_wrong_is_refused_with_those_that_fit() {
         "--vrw=1e300m/s/sqrt(h)",
         &["--vrw", "is more than 1e12 in SI units"],
     );
-    refused(
-        "",
-        &["no figure is given that makes a noise model", "--unit NAME"],
-    );
-    refused(
-        "--accel-turn-on 2mg",
-        &["no figure is given that makes a noise model"],
-    );
+    refused("", &["no figure gives a noise model", "--unit NAME"]);
+    refused("--accel-turn-on 2mg", &["no figure gives a noise model"]);
     refused(
         "--unit stim30",
-        &["the catalogue has no such unit", "did you mean stim300?"],
+        &[
+            "the catalogue has no such unit",
+            "did you mean \"stim300\"?",
+        ],
     );
 }
 
@@ -176,15 +173,11 @@ fn a_run_takes_the_turn_on_bias_of_the_model_file() {
     };
     let (said, used) = configuration("");
     assert!(
-        said.contains(
-            "imu.toml: the filter expects a turn-on bias of 0.0200 m/s² (accel, standard deviation)"
-        ),
+        said.contains("imu.toml: the filter expects a turn-on bias of 0.0200 m/s² (accel, 1 σ)"),
         "{said}"
     );
     assert!(
-        said.contains(
-            "imu.toml: the true IMU has a turn-on bias of 1.00e-4 rad/s (gyro, standard deviation)"
-        ),
+        said.contains("imu.toml: the true IMU has a turn-on bias of 1.00e-4 rad/s (gyro, 1 σ)"),
         "{said}"
     );
     assert_eq!(used["initial"]["accel_bias_sigma_m_s2"], 0.02);
@@ -223,7 +216,7 @@ fn figures_of_kalibr_come_back_from_an_export() {
     let ran = done(place.path(), "datasheet --from imu.yaml -o a.toml");
     assert!(
         ran.stderr
-            .contains("gyro: no turn-on bias is given (--gyro-turn-on)"),
+            .contains("gyro: no turn-on bias (--gyro-turn-on)"),
         "{}",
         ran.stderr
     );

@@ -261,7 +261,7 @@ fn what_nav_sim_did_not_write_is_never_replaced() {
         fs::write(at(file), own).unwrap();
         for force in ["", " --force"] {
             let ran = plain(place.path(), &format!("{command}{force}"));
-            let told = format!("{file} is not of this command: it is not replaced");
+            let told = format!("{file} is not of this command: not replaced");
             assert!(
                 ran.code == 2 && ran.stderr.contains(&told),
                 "{command}: {}",
@@ -306,7 +306,7 @@ fn results_of_another_kind_are_not_replaced() {
     ] {
         let before = fs::read(dir.join(file)).unwrap();
         let ran = plain(dir, &format!("{command} --force"));
-        let told = format!("{file} is not of this command: it is not replaced");
+        let told = format!("{file} is not of this command: not replaced");
         assert_eq!(ran.code, 2, "{command}: {}", ran.stderr);
         assert!(ran.stderr.contains(&told), "{command}: {}", ran.stderr);
         assert!(fs::read(dir.join(file)).unwrap() == before, "{command}");
@@ -387,7 +387,7 @@ fn two_outputs_of_one_name_are_refused_at_once() {
         ("calibrate rec --model WN --bootstrap 0 -o a.html", "a.html"),
     ] {
         let ran = plain(place.path(), command);
-        let told = format!("error: {output} is another output of the same command\n");
+        let told = format!("error: {output} is another output of this command\n");
         assert!(
             ran.code == 2 && ran.stderr.contains(&told),
             "{}",
@@ -432,7 +432,7 @@ fn an_empty_file_in_a_directory_is_passed_over() {
     let ran = plain(place.path(), "wv rec");
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(
-        ran.stderr.contains("all.txt: passed over, it is empty"),
+        ran.stderr.contains("all.txt: skipped, it is empty"),
         "{}",
         ran.stderr
     );

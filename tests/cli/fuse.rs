@@ -315,7 +315,7 @@ fn bad_fixes_are_refused_by_line_and_value() {
         gnss,
         cell(9, 3, "NaN"),
         "",
-        &["line 9: column \"h_m\": \"NaN\" is not finite"],
+        &["line 9: column \"h_m\": \"NaN\" is not a finite number"],
     );
     refused(
         gnss,
@@ -335,7 +335,7 @@ fn bad_imu_data_and_flags_are_refused() {
         imu,
         cell(50, 2, "inf"),
         "",
-        &["imu.csv, line 50: column \"gyro_y_rad_s\": \"inf\" is not finite"],
+        &["imu.csv, line 50: column \"gyro_y_rad_s\": \"inf\" is not a finite number"],
     );
     refused(
         imu,
@@ -381,7 +381,7 @@ fn bad_imu_data_and_flags_are_refused() {
         imu,
         gap,
         "",
-        &["line 101: no samples from 0.99 s to 13.5 s: 5 s can be bridged"],
+        &["line 101: no samples from 0.99 s to 13.5 s: at most 5 s"],
     );
     refused(
         imu,

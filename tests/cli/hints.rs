@@ -221,7 +221,7 @@ fn hints_on_recordings_work() {
         "a.csv",
         &sound("t_s,gyro_x_rad_s,gx_dps", 2),
         &[|hint, text, _| {
-            assert!(hint.contains("remove one of them"), "{hint}");
+            assert!(hint.contains("give one of them"), "{hint}");
             rename(text, "gx_dps", "other");
         }],
     );
@@ -310,7 +310,7 @@ fn commands_say_the_same_of_one_recording() {
             .filter(|line| line.starts_with("warning: a.csv"));
         warnings.map(str::to_owned).collect()
     };
-    let text = "warning: a.csv: gyro.y has the samples of gyro.x: one axis was written twice";
+    let text = "warning: a.csv: gyro.y repeats gyro.x: one axis was written twice";
     for command in [
         "wv a.csv",
         "check a.csv",
@@ -352,7 +352,7 @@ fn files_of_another_kind_are_named() {
             "synthesize drive.toml --samples 99 -o s",
             "a trajectory: run",
         ),
-        ("wv g.csv", "GNSS fixes: fuse takes them as its second file"),
+        ("wv g.csv", "GNSS fixes: second file of fuse"),
         ("fuse g.csv a.csv imu.toml -o f", "GNSS fixes"),
         ("batch imu.toml -o b", "a noise model"),
         (

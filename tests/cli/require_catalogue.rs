@@ -230,7 +230,7 @@ fn a_unit_whose_turn_on_bias_is_not_stated_is_open() {
     let said = String::from_utf8(alone.get_output().stderr.clone()).unwrap();
     assert!(
         said.contains(
-            "units/made.toml: what is not stated counts as none, unless by grade: turn-on by grade"
+            "units/made.toml: figures not stated count as zero, unless by grade: turn-on by grade"
         ),
         "{said}"
     );

@@ -323,7 +323,7 @@ fn refusals_name_what_is_wrong_and_leave_nothing() {
     refused(
         &format!("{base} --outage none --outage 30:40"),
         2,
-        "--outage none stands beside other outages",
+        "--outage none with other outages",
     );
     refused(&format!("{base} --outage 40:30"), 2, "--outage='40:30'");
     refused(&format!("{base} --outage soon"), 2, "--outage='soon'");
@@ -516,7 +516,7 @@ fn doubtful_requests_are_said() {
     );
     assert!(
         ran.stderr
-            .contains("warning: outages that overlap or touch are made one"),
+            .contains("warning: overlapping outages are merged"),
         "{}",
         ran.stderr
     );

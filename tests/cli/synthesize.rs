@@ -208,7 +208,7 @@ fn mistakes_are_refused_and_leave_nothing() {
             "--contaminate",
             "plain.toml",
         ],
-        "--contaminate plain.toml: it touches none of the replicates 1 to 8",
+        "--contaminate plain.toml: affects none of the replicates 1 to 8",
         "replicates are counted from 1",
     );
     fs::write(
@@ -218,17 +218,17 @@ fn mistakes_are_refused_and_leave_nothing() {
     .unwrap();
     refused(
         &["plain.toml", "--spread"],
-        "plain.toml: no [spread] to draw parameters from",
+        "plain.toml: no [spread] to draw from",
         "leave --spread out",
     );
     refused(
         &["plain.toml", "--axes", "accel"],
-        "plain.toml has no noise model for the axes asked for",
+        "plain.toml has no noise model for these axes",
         "",
     );
     refused(
         &["model.toml", "--duration", "0.01"],
-        "a recording has 2 to 1e9 samples; these are 1",
+        "1 samples: a recording has 2 to 1e9",
         "",
     );
     refused(&["model.toml", "--samples", "1"], "--samples='1'", "");
@@ -349,7 +349,7 @@ fn recordings_of_another_job_are_not_mixed_in_and_inputs_not_overwritten() {
     let (code, said) = place.run(&["manifest.json", "--samples", "10", "-o", "."]);
     assert_eq!(code, 2);
     assert!(
-        said.contains("manifest.json is an input of this command and would be overwritten"),
+        said.contains("manifest.json is an input and would be overwritten"),
         "{said}"
     );
     assert_eq!(place.bytes("manifest.json"), MODEL.as_bytes());

@@ -81,7 +81,7 @@ fn check_speaks_json_and_exits_with_3_beyond_a_limit() {
         "{err}"
     );
     assert!(
-        err.contains("hint: a vehicle that does move so deserves a larger --limit-speed"),
+        err.contains("hint: a vehicle that moves so needs a larger --limit-speed"),
         "{err}"
     );
     // both at once: each is named
@@ -129,7 +129,8 @@ fn convert_places_local_coordinates_and_never_overwrites_its_input() {
     let (local, out) = (local.to_str().unwrap(), dir.path().join("out.csv"));
     let (code, _, err) = trajectory(&["convert", local, "-o", out.to_str().unwrap()]);
     assert_eq!(code, 2);
-    let expected = "local.csv: a trajectory in local coordinates needs an origin on the Earth\n\nhint: give --origin";
+    let expected =
+        "local.csv: local coordinates need an origin on the Earth\n\nhint: give --origin";
     assert!(err.contains(expected) && !out.exists(), "{err}");
     let (code, _, err) = trajectory(&[
         "convert",
@@ -157,12 +158,12 @@ fn convert_places_local_coordinates_and_never_overwrites_its_input() {
     );
     let (code, _, err) = trajectory(&["convert", local, "--origin", "-33,151,5", "-o", local]);
     assert!(
-        code == 2 && err.contains("is an input of this command and would be overwritten"),
+        code == 2 && err.contains("is an input and would be overwritten"),
         "{err}"
     );
     let (code, _, err) = trajectory(&["convert", local, "--origin", "-95,151,5", "-o", "x.csv"]);
     assert!(
-        code == 2 && err.contains("not LAT_DEG,LON_DEG,H_M with a latitude within ±89.9"),
+        code == 2 && err.contains("expected LAT_DEG,LON_DEG,H_M, latitude within ±89.9"),
         "{err}"
     );
 }

@@ -157,8 +157,7 @@ fn a_model_without_noise_to_multiply_is_not_tuned() {
             String::from_utf8_lossy(&output.stdout),
             String::from_utf8_lossy(&output.stderr),
         );
-        let words =
-            format!("the model has no {sensors} noise to multiply, where the truth has some");
+        let words = format!("the model has no {sensors} noise to scale, the truth has some");
         assert!(
             shown.contains(&words) && said.contains(&words) && said.contains("nav-sim datasheet"),
             "{said}"

@@ -328,7 +328,7 @@ fn a_change_between_calibrations_is_told_from_chance() {
             "1.toml is a file: runs are directories",
         ),
         ("1.toml", "1.toml is a file: runs are directories"),
-        ("out", "no run to compare with"),
+        ("out", "no run to compare"),
     ] {
         let ran = nav_sim(dir, &format!("compare {words}"));
         assert!(

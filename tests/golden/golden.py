@@ -5,12 +5,10 @@
     golden.py PROGRAM --show TEXT      prints the figures of this program whose path has TEXT
     golden.py PROGRAM --record         stores the figures anew: only where one changes on purpose
 
-Commands run on shipped data with fixed seeds in a temporary directory. JSON, CSV and TOML are parsed; a figure has a path,
-`run_15/summary.json/nees/mean`; a cell of a CSV is `FILE/COLUMN/ROW`, and of long tables every n-th row is kept, with
-the sum of each column's absolute values. Structure may change: map.toml says where a figure is now, or which deletion
-dropped it. Figures may not: 1e-12 relative. New figures are free. Not compared: times, threads, versions, hashes, sentences,
-manifests. On a machine whose arithmetic differs from the recorded one (`arithmetic`), 1e-9, and what follows a minimiser
-within the tolerances of `after_minimiser`; with NAV_SIM_CI set such a machine is refused.
+Commands run on shipped data with fixed seeds in a temporary directory. A figure has a path, `run_15/summary.json/nees/mean`; a
+cell of a CSV is `FILE/COLUMN/ROW`; long tables keep every n-th row and the sums of absolute values. map.toml says where a figure
+moved or why it went. Tolerance: 1e-12 relative; where the arithmetic differs from the recorded one 1e-9, and `after_minimiser` (refused with
+NAV_SIM_CI). Not compared: new figures, times, threads, versions, hashes, sentences, manifests.
 """
 
 import argparse

@@ -105,7 +105,7 @@ impl FromStr for Trim {
                 percent.map(|p: f64| Self::Fraction(p / 100.0))
             }
         };
-        let expected = "not a number of replicates such as 2, or a percentage under 50 such as 30%";
+        let expected = "expected a number such as 2, or a percentage under 50 such as 30%";
         found.ok_or_else(|| Refused(expected.to_owned()))
     }
 }
@@ -267,9 +267,8 @@ pub fn average(
     if !is_enough(count) {
         let trim = dropped(count);
         let least = 2 * trim + 1;
-        let message = format!(
-            "trimming {trim} replicates at each end needs at least {least} replicates; there are {count}"
-        );
+        let message =
+            format!("a trim of {trim} at each end needs {least} replicates; there are {count}");
         return Err(CalibrationError::new(CalibrationFault::Trim, message));
     }
     let quantization = estimator.is_robust().then(|| *tuning.quantization());

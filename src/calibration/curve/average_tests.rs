@@ -176,7 +176,7 @@ fn what_cannot_be_averaged_is_refused() {
     assert_eq!(error(&[], Estimator::Awv, Trim::Count(0)), "no replicates");
     assert_eq!(
         error(&eight(), Estimator::DrAwv, Trim::Count(4)),
-        "trimming 4 replicates at each end needs at least 9 replicates; there are 8"
+        "a trim of 4 at each end needs 9 replicates; there are 8"
     );
     assert_eq!(
         error(&eight(), Estimator::Gmwm, Trim::Count(0)),

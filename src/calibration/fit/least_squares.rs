@@ -171,7 +171,7 @@ fn settled(
         });
     Ok(ended
         .min_by(|a, b| a.objective.total_cmp(&b.objective))
-        .expect("two fits"))
+        .expect("two"))
 }
 
 /// Returns true if the weights of a fit reproduce themselves: they follow from its own result.
@@ -320,9 +320,8 @@ fn check(curve: &Curve, spec: &ModelSpec) -> Result<(), CalibrationError> {
     };
     if let Some(i) = bad(&curve.wv, Curve::WV_RANGE) {
         let (level, value) = (curve.levels[i], curve.wv[i]);
-        let message = format!(
-            "the wavelet variance at scale 2^{level} is {value}: it must be a number from 1e-100 to 1e100"
-        );
+        let message =
+            format!("the wavelet variance at scale 2^{level} is {value}, out of 1e-100 to 1e100");
         return Err(CalibrationError::new(
             CalibrationFault::NotPositive,
             message,
@@ -331,7 +330,7 @@ fn check(curve: &Curve, spec: &ModelSpec) -> Result<(), CalibrationError> {
     if let Some(i) = bad(&curve.edof, Curve::EDOF_RANGE) {
         let (level, value) = (curve.levels[i], curve.edof[i]);
         return Err(CalibrationError::other(format!(
-            "the degrees of freedom at scale 2^{level} are {value}: they must be a number from 1e-15 to 1e15"
+            "the degrees of freedom at scale 2^{level} are {value}, out of 1e-15 to 1e15"
         )));
     }
     let (parameters, scales) = (spec.parameters(), curve.levels.len() - curve.ignored.len());

@@ -140,7 +140,7 @@ impl BatchRequest {
         if let (Some((name, what)), false) = (changed.first(), self.force || self.dry_run) {
             return refused(
                 format!("cell {name} {what}"),
-                "choose another directory with --out, or compute it again with --force",
+                "choose another --out, or recompute with --force",
             );
         }
         let units = units(&cells, context)?;
@@ -254,7 +254,7 @@ fn difference(there: &Manifest, wanted: &Manifest) -> String {
         let [old, new] = [there, wanted].map(|manifest| manifest.options.get(key));
         if old != new {
             let (old, new) = (shown(old), shown(new));
-            return format!("is of another study: its \"{key}\" is {old}, not {new}");
+            return format!("is of another study: \"{key}\" is {old}, not {new}");
         }
     }
     let differs = |input: &&crate::app::Input| {
@@ -324,14 +324,12 @@ impl BatchOutcome {
                 left,
             } => Some(
                 Failure::stopped(format!("stopped; {left} units left"))
-                    .hint("the same command goes on where this one stopped"),
+                    .hint("the same command continues"),
             ),
             // the same command would end the same way: no code for "to be resumed"
             Self::Stopped { left, .. } => Some(
-                Failure::could_not(format!(
-                    "stopped before a single unit was done; {left} units left"
-                ))
-                .hint("a longer --time-limit"),
+                Failure::could_not(format!("stopped; {left} units left"))
+                    .hint("a longer --time-limit"),
             ),
         }
     }
@@ -444,7 +442,7 @@ impl Study {
             if !names.insert(name.to_lowercase()) {
                 return refused(
                     format!("two cells have the name {name}"),
-                    "name the values under [vary], a table of keys each",
+                    "name the values under [vary]",
                 );
             }
             door.cell(name.clone(), labels, run.clone()).map_err(|e| {
@@ -499,7 +497,7 @@ impl Study {
                     .map(|(_, label)| label.as_str()),
             );
             if !known.contains(&label.as_str()) {
-                let message = format!("\"reference.{axis}\" = \"{label}\" is no label of an axis");
+                let message = format!("\"reference.{axis}\" = \"{label}\" is not a label");
                 let hint = match known.is_empty() {
                     true => format!("there is no axis {axis}"),
                     false => format!("labels: {}", known.join(", ")),
@@ -655,8 +653,7 @@ impl RunValidator {
             if !self.inputs.contains_key(&path) {
                 self.inputs.insert(
                     path.clone(),
-                    input::input(&role, &path)
-                        .map_err(|e| e.hint("paths are relative to the study's file"))?,
+                    input::input(&role, &path).map_err(|e| e.hint("relative paths"))?,
                 );
             }
             inputs.push(Input {
@@ -764,7 +761,7 @@ fn nested(path: &str, value: Value) -> Table {
 fn named_request(run: &Table) -> Result<Map<String, serde_json::Value>> {
     // in JSON it would be null: not given
     if let Some((key, value)) = run.iter().find(|(_, value)| !is_finite(value)) {
-        let message = format!("\"run.{key}\" = {value} is not finite");
+        let message = format!("\"run.{key}\" = {value} is not a finite number");
         return Err(Failure::input(message));
     }
     if let Some((path, _)) = leaves(run, "").iter().find(|(_, value)| value.is_table()) {
@@ -1164,8 +1161,8 @@ fn find_shard(
         };
         let Some(count) = count else {
             return refused(
-                format!("{name}={id} says which shard this is, but not of how many"),
-                "add --shards n (indices from 0 to n − 1)",
+                format!("{name}={id} names a shard, but not their number"),
+                "add --shards N",
             );
         };
         let index = id.checked_sub(first.unwrap_or(0));
@@ -1181,7 +1178,7 @@ fn find_shard(
     match shards {
         None | Some(1) => Ok(None),
         Some(n) => refused(
-            format!("--shards {n}: no scheduler says which of them this is"),
+            format!("--shards {n}: no scheduler names this shard"),
             "give --shard i/n",
         ),
     }
@@ -1234,7 +1231,7 @@ mod tests {
                 && parse_shard("-1/2").is_err()
         );
         let error = |r: Result<(u64, u64), String>| r.unwrap_err();
-        assert!(error(found(None, None, &[("HQ_TASK_ID", "7")])).contains("not of how many"));
+        assert!(error(found(None, None, &[("HQ_TASK_ID", "7")])).contains("but not their number"));
         assert!(
             error(found(None, Some(7), &[("HQ_TASK_ID", "7")])).contains("is not one of 7 shards")
         );

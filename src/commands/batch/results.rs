@@ -283,7 +283,7 @@ impl Answer for StudyAnswer {
             document.note(
                 Importance::Warning,
                 format!(
-                    "runs diverged in {}; they are in no number",
+                    "runs diverged in {}; no figure includes them",
                     first_names(&names)
                 ),
             );
@@ -299,7 +299,7 @@ impl Answer for StudyAnswer {
         document.table(Table::of(self, "/cells/*/outages/*", &columns).with_keys(2));
         document.charts(
             &self.charts(),
-            "95 % quantile of the horizontal error at the end of the first outage.",
+            "95 % quantile of the horizontal error after the first outage.",
         );
         for comparison in &self.comparisons {
             document.section(&format!("ASEE relative to {}", comparison.reference));

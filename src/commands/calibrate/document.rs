@@ -202,8 +202,7 @@ fn parameters(outcome: &Outcome) -> Table {
 // The charts of a calibration: wavelet variance and model, and what is exported on the Allan deviation.
 
 /// Caption of [`chart`].
-const CAPTION: &str = "Allan deviation with its 95 % band, the recordings, the model and its processes, and what is exported: N is \
-     read at 1 s, K at 3 s, B at the floor; below: wavelet variance, data over model.";
+const CAPTION: &str = "Above: Allan deviation with 95 % band, recordings, model, processes and export (N at 1 s, K at 3 s, B at the floor). Below: wavelet variance, data over model.";
 
 /// `Accelerometer x`, or `Gyroscope, all axes`.
 fn group_name(fitted: &FittedCurve) -> String {
@@ -349,7 +348,7 @@ pub(crate) fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> 
     }
     if count < FEWEST_TO_COMPARE {
         return Some(format!(
-            "{count} recordings: too few to name an abnormal one ({FEWEST_TO_COMPARE} are needed)"
+            "{count} recordings: {FEWEST_TO_COMPARE} are needed to find abnormal ones"
         ));
     }
     let finding = |d: &Diagnosis| {
@@ -377,7 +376,7 @@ pub(crate) fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> 
             .iter()
             .find_map(|o| o.differing())
             .map_or(String::new(), |(p, _)| {
-                format!(", but they differ beyond their noise (p = {p:.3})")
+                format!(", but differ beyond their noise (p = {p:.3})")
             });
         return Some(format!("{count} recordings, none abnormal{differ}"));
     }
@@ -431,7 +430,7 @@ fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
         )
     }));
     if outcome.recordings == 2 && outcome.inference.is_some() {
-        notes.push("two recordings hardly bound how recordings differ: intervals are wide".into());
+        notes.push("two recordings hardly show their differences: intervals are wide".into());
     }
     // A range that was asked for is no news.
     if let ([first, ..], None) = (&curve.ignored[..], settings.fit_range) {
@@ -445,12 +444,7 @@ fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
             .inference
             .iter()
             .filter_map(|i| i.indistinct.as_ref())
-            .map(|i| {
-                format!(
-                    "{} describes the curve as well (p = {:.2})",
-                    i.spec, i.p_value
-                )
-            }),
+            .map(|i| format!("{} fits as well (p = {:.2})", i.spec, i.p_value)),
     );
     if let Some(reading) = &outcome.reading {
         let counted = reading.counted_levels();
@@ -471,7 +465,7 @@ fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
             && reading.departure().scales < outcome.departure().scales
         {
             notes.push(format!(
-                "the other scales spoil the fit: --scales {range} leaves them out"
+                "other scales spoil the fit: --scales {range} leaves them out"
             ));
         }
     }
@@ -483,7 +477,7 @@ fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
         let name = model.name_of(i.of);
         let factor = readable((i.high / i.low).sqrt());
         notes.push(if i.low > 0.0 {
-            format!("{name} is known to a factor of {factor} only")
+            format!("{name} is known only to a factor of {factor}")
         } else {
             format!("{name} may be zero")
         });
@@ -492,7 +486,7 @@ fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
         fit.zero
             .iter()
             .map(|i| &labels[*i])
-            .map(|label| format!("{label} is zero: not seen in these data")),
+            .map(|label| format!("{label} is zero: not observed")),
     );
     let longest_s = outcome.counted_levels().last().map_or(0.0, seconds);
     for (i, label) in labels
@@ -531,9 +525,9 @@ fn undetermined(interval: &ParameterInterval, why: &Undetermined, labels: &[Stri
             "{process} is zero in {} of the draws",
             percent(interval.lost)
         ),
-        Undetermined::OneSided => "the draws lie to one side of the estimate".to_owned(),
-        Undetermined::BeyondSearch => "any correlation time beyond the scales fits".to_owned(),
-        Undetermined::Open => format!("the draws differ by more than a factor of {WIDEST}"),
+        Undetermined::OneSided => "the draws lie on one side of the estimate".to_owned(),
+        Undetermined::BeyondSearch => "any longer correlation time fits".to_owned(),
+        Undetermined::Open => format!("the draws differ by over a factor of {WIDEST}"),
         Undetermined::Indistinct(alike) => {
             let alike: Vec<&str> = alike.iter().map(|i| labels[*i].as_str()).collect();
             format!("the data do not need both {}", alike.join(" and "))
@@ -557,9 +551,7 @@ fn recording_notes(
         .count();
     let mut notes = Vec::new();
     if abnormal > 0 && 2 * abnormal >= own.len() {
-        notes.push(
-            "half of the recordings or more are abnormal: there is no majority to trust".to_owned(),
-        );
+        notes.push("at least half of the recordings are abnormal: no majority".to_owned());
     } else if abnormal > 0 {
         notes.extend(trim_note(sensor, abnormal, outcomes, settings));
     }
@@ -570,13 +562,13 @@ fn recording_notes(
         let size = percent(found.size);
         notes.push(match found.cause {
             CommonCause::Outliers => format!(
-                "outliers in most recordings: they add up to {size} to the wavelet variance, from {from_to}; awv has them"
+                "outliers in most recordings add up to {size} to the wavelet variance, from {from_to}; awv includes them"
             ),
             CommonCause::GaussianQuantization => format!(
-                "QN is Gaussian from {from_to}: robust estimators read it up to {size} too low; use awv"
+                "QN is Gaussian from {from_to}: robust estimators read up to {size} too low; use awv"
             ),
             CommonCause::CoarseSteps => format!(
-                "quantisation steps are as large as the noise from {from_to}: without outliers use awv"
+                "quantization steps are as large as the noise from {from_to}: without outliers use awv"
             ),
             CommonCause::Drift => format!(
                 "all recordings drift alike ({} {:+.2e} {}/h): add DR, or warm up longer",
@@ -598,8 +590,7 @@ fn trim_note(
 ) -> Option<String> {
     if !settings.estimators.contains(&Estimator::DrAwv) {
         return Some(
-            "the model includes the abnormal recordings: --estimator dr-awv leaves them out"
-                .to_owned(),
+            "the model includes abnormal recordings: --estimator dr-awv leaves them out".to_owned(),
         );
     }
     let fit = outcomes
@@ -610,7 +601,7 @@ fn trim_note(
     let needed = abnormal * fit.replicates.div_ceil(fit.recordings);
     let trim = settings.trim.count(fit.replicates);
     (trim < needed).then_some(format!(
-        "a trim of {trim} does not leave out the abnormal recordings: --trim {needed}"
+        "a trim of {trim} keeps abnormal recordings: --trim {needed}"
     ))
 }
 
@@ -621,18 +612,16 @@ fn turn_on_remark(found: &TurnOnSpread) -> String {
         TurnOnFinding::Seen => {
             let (error, recordings) = (percent(found.relative_error()), found.recordings());
             format!(
-                "turn-on bias {spread} ± {error} from the means of {recordings} recordings, stored as [turn_on]"
+                "turn-on bias {spread} ± {error} from {recordings} recordings, stored as [turn_on]"
             )
         }
         TurnOnFinding::WithinNoise => {
-            format!("no turn-on bias seen: the recordings' means scatter by {spread}")
+            format!("no turn-on bias: the means of recordings scatter by {spread}")
         }
         TurnOnFinding::Moved => {
             format!("no turn-on bias stored: means differ by {spread}, not one mounting")
         }
-        TurnOnFinding::Removed => {
-            "no turn-on bias: the recordings' means were removed before".to_owned()
-        }
+        TurnOnFinding::Removed => "no turn-on bias: means were removed before".to_owned(),
     }
 }
 
@@ -643,7 +632,7 @@ fn reasons(ranking: &ModelRanking) -> Vec<String> {
     let (name, pair) = (&taken.spec, format!("{}, {}", wvic(taken), wvic(best)));
     let mut lines = vec![match taken.p_value {
         None if taken.spec == best.spec => {
-            format!("{name} has the least WVIC, nothing simpler fits as well")
+            format!("{name} has the least WVIC; no simpler model fits as well")
         }
         None => format!("{name} has the least WVIC that the J-test accepts ({pair})"),
         Some(p) => format!("{name} fits as well as the least WVIC (p = {p:.2}; {pair})"),

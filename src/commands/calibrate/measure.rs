@@ -62,9 +62,7 @@ impl EstimatorChoice {
     fn estimators(self, recordings: usize) -> Result<Vec<Estimator>, Failure> {
         match self {
             Self::One(estimator) if estimator.is_single() && recordings > 1 => refused(
-                format!(
-                    "--estimator {estimator} takes one recording at a time; there are {recordings}"
-                ),
+                format!("--estimator {estimator} takes one recording; there are {recordings}"),
                 "awv, sr-awv and dr-awv take several",
             ),
             Self::One(estimator) => Ok(vec![estimator]),
@@ -281,7 +279,7 @@ fn shortest(report: &Report, scales: Option<u32>, context: &Context<'_>) {
     );
     if scales < usual {
         context.warn(format!(
-            "{recording}: its {samples} samples have {scales} scales, half of the recordings have {usual}; the average has {used}"
+            "{recording}: {samples} samples have {scales} scales, most recordings {usual}; the average has {used}"
         ));
     }
 }
@@ -308,18 +306,15 @@ pub(crate) fn read_curves(
         (Some(stated), Some(given)) => {
             return refused(
                 format!(
-                    "{}: the curve says its rate, {stated} Hz; --rate-hz {given} is another",
+                    "{}: the curve is at {stated} Hz, --rate-hz is {given}",
                     path()
                 ),
-                "leave --rate-hz out: it is for a CSV curve",
+                "leave --rate-hz out: it is for CSV curves",
             );
         }
         (stated, given) => stated.or(given).ok_or_else(|| {
-            Failure::input(format!(
-                "{}: the curve does not say its sample rate",
-                path()
-            ))
-            .hint("give the rate with --rate-hz: correlation times and the model file need it")
+            Failure::input(format!("{}: the curve states no sample rate", path()))
+                .hint("give the rate with --rate-hz")
         })?,
     };
     let mut is_unsaid = false;
@@ -340,12 +335,8 @@ pub(crate) fn read_curves(
             .any(|(s, e, _)| (*s, *e) == (scope, estimator))
         {
             return refused(
-                format!(
-                    "{}: there are two curves of {} for {estimator}",
-                    path(),
-                    scope.name()
-                ),
-                "calibrate the recordings themselves: it averages them",
+                format!("{}: two curves of {} for {estimator}", path(), scope.name()),
+                "calibrate the recordings themselves",
             );
         }
         curves.push((scope, estimator, named.curve));

@@ -70,25 +70,24 @@ pub struct Calibrate {
     /// Fit a curve instead of recordings: CSV tau_samples,wv,edof, or a .wv.json of calibrate or wv
     #[arg(long, value_name = "FILE", conflicts_with_all = OF_RECORDINGS)]
     curve: Option<PathBuf>,
-    /// Which curve is fitted: an average over the replicates (awv; sr-awv, robust to outliers; dr-awv, robust to
-    /// abnormal replicates too), or the curve of a single recording (gmwm, classical; rgmwm, robust; avlr: slopes of its
-    /// Allan deviation, read off one by one: WN, QN, RW, DR); all: the three averages (of one recording: gmwm and rgmwm)
-    #[arg(long, value_parser = parse::one_of::<EstimatorChoice>(&ESTIMATORS), default_value = "dr-awv")]
+    /// Average over replicates: awv; sr-awv, robust to outliers; dr-awv, also to abnormal replicates. Single
+    /// recordings: gmwm; rgmwm, robust; avlr, slopes of the Allan deviation. all: the averages
+    #[arg(long, value_name = "NAME", hide_possible_values = true, value_parser = parse::one_of::<EstimatorChoice>(&ESTIMATORS), default_value = "dr-awv")]
     estimator: EstimatorChoice,
-    /// Sum of WN QN AR1 GM MA1 FN RW DR such as 2*AR1+RW+WN+QN, N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN, or auto: the
-    /// simplest sum of WN QN RW DR and up to two AR1 that fits as well as the best one, with the reasons
+    /// Sum of WN QN AR1 GM MA1 FN RW DR; N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN; or auto: the simplest sum that fits
+    /// as well as the best one
     #[arg(long, value_name = "SUM", default_value = ModelSpec::USUAL)]
     model: String,
     /// Replicates that dr-awv drops at each end of each scale: a number, or a percentage of all
     #[arg(long, value_name = "A", default_value_t)]
     trim: Trim,
-    /// Weight of a scale in the fit: model, the inverse variance by the fitted model, where a scale far above it weighs
-    /// less; edof, the same with the observed wv: the convention of the literature, low where wv is low by chance
-    #[arg(long, value_parser = parse::one_of::<Weighting>(&Weighting::NAMES), default_value_t)]
+    /// Weight of a scale: model, the inverse variance by the fitted model; edof, by the observed curve (as in the
+    /// literature)
+    #[arg(long, value_name = "NAME", hide_possible_values = true, hide_short_help = true, value_parser = parse::one_of::<Weighting>(&Weighting::NAMES), default_value_t)]
     weighting: Weighting,
-    /// Which signals are replicates of one another: axes, those of one axis (a model per axis), or sensor, those of all
-    /// axes of a sensor (default: sensor; axes for gmwm, rgmwm and avlr)
-    #[arg(long, value_parser = parse::one_of::<Pool>(&Pool::NAMES))]
+    /// Replicates of one model: axes, the signals of an axis; sensor, those of all its axes [default: sensor; axes
+    /// for gmwm, rgmwm, avlr]
+    #[arg(long, value_name = "NAME", hide_possible_values = true, value_parser = parse::one_of::<Pool>(&Pool::NAMES))]
     pool: Option<Pool>,
     /// Draws behind intervals and goodness of fit (0: neither), fewer for tests
     #[arg(long, value_name = "B", hide = true, default_value_t = Bootstrap::DRAWS as u32, value_parser = clap::value_parser!(u32).range(0..=100_000))]
@@ -113,7 +112,7 @@ impl Command for Calibrate {
     const NAME: &'static str = "calibrate";
     const OUT: Out = Out::File {
         name: "model.toml",
-        help: "The model file (default: model.toml; none for --curve)",
+        help: "Model file (default: model.toml; none for --curve)",
     };
     const PLOT: bool = false;
 
@@ -137,10 +136,7 @@ impl Command for Calibrate {
         let (.., is_unsaid) = self.curves(path, &self.settings()?)?;
         if is_unsaid {
             refused(
-                format!(
-                    "{}: the curve does not say of which sensor it is",
-                    path.display()
-                ),
+                format!("{}: the curve names no sensor", path.display()),
                 "--axes accel or --axes gyro",
             )
         } else {
@@ -155,7 +151,7 @@ impl Command for Calibrate {
                 let (curves, settings, is_unsaid) = self.curves(path, &settings)?;
                 if is_unsaid {
                     context.remark(format!(
-                        "{}: taken as of an accelerometer (--axes gyro: of a gyroscope)",
+                        "{}: taken as an accelerometer (--axes gyro: gyroscope)",
                         path.display()
                     ));
                 }
@@ -179,7 +175,7 @@ impl Command for Calibrate {
                 )?;
                 if self.pool == Some(Pool::Sensor) && settings.pool() == Pool::Axes {
                     return refused(
-                        "--pool sensor: gmwm, rgmwm and avlr take one signal at a time",
+                        "--pool sensor: gmwm, rgmwm and avlr take one signal",
                         "--pool axes",
                     );
                 }
@@ -294,8 +290,8 @@ impl Calibrate {
         let is_avlr = self.estimator == EstimatorChoice::One(Estimator::Avlr);
         if is_avlr && self.tuning.fitted().is_some() {
             return refused(
-                "--scales FROM:TO with --estimator avlr: slopes are read where they are found",
-                "--estimator gmwm fits the same curve over a range",
+                "--scales FROM:TO with --estimator avlr, which finds its own",
+                "--estimator gmwm fits a range",
             );
         }
         Ok(chosen)
@@ -342,9 +338,7 @@ impl Calibration {
             };
         }
         let page = shown.page();
-        let draws = draws.map(|draws| {
-            serde_json::to_string(&draws).expect("plain structs are always JSON") + "\n"
-        });
+        let draws = draws.map(|draws| serde_json::to_string(&draws).expect("serialises") + "\n");
         let model = crate::io::model_file::to_toml(&model);
         let texts = [
             draws,

@@ -138,7 +138,7 @@ impl Candidate {
 
 /// Noise model of most filters: white noise and a random walk.
 fn white_and_walk() -> ModelSpec {
-    "WN+RW".parse().expect("a sum of known processes")
+    "WN+RW".parse().expect("processes")
 }
 
 /// Returns true if every process has a slope of its own in the Allan deviation.

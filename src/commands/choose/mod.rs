@@ -48,29 +48,26 @@ pub struct Choose {
     /// Outages, receiver, start, what filters expect.
     #[command(flatten)]
     settings: SettingsArgs,
-    /// Estimators to compare, as `calibrate --estimator` describes them [default: awv, sr-awv, dr-awv and, for comparison,
-    /// gmwm and avlr of single recordings]
-    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = parse::one_of::<Estimator>(EACH))]
+    /// Estimators to compare, those of `calibrate` [default: awv, sr-awv, dr-awv; gmwm and avlr for comparison]
+    #[arg(long, value_name = "NAMES", hide_possible_values = true, value_delimiter = ',', value_parser = parse::one_of::<Estimator>(EACH))]
     estimator: Vec<Estimator>,
     /// Models to compare, such as N2,N1,WN+RW,auto [default: N2, and WN+RW with awv]
     #[arg(long, value_name = "MODELS", value_delimiter = ',')]
     model: Vec<String>,
-    /// Filters to compare: 15 (one bias per axis), 21 (and a scale factor per axis), full (a bias state for each process)
-    /// [default: 15, and full with awv]
+    /// Filters to compare: 15, 21, full, as in `run` [default: 15, and full with awv]
     #[arg(long, value_name = "STATES", value_delimiter = ',')]
     filter: Vec<FilterStates>,
-    /// Inflation of models: none, x10 (ten times the standard deviations) [default: none, and both
-    /// with awv]
+    /// Inflation of standard deviations: none, x10 [default: none, and both with awv]
     #[arg(long, value_name = "HOW", value_delimiter = ',')]
     inflate: Vec<Inflation>,
     /// Runs on each recording
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     runs: u64,
-    /// Replicates that DR-AWV drops at each end of each scale: a number, or a share such as 30%
-    #[arg(long, value_name = "A", default_value_t)]
+    /// Replicates that dr-awv drops at each end of each scale: a number, or a share
+    #[arg(long, value_name = "A", default_value_t, hide_short_help = true)]
     trim: Trim,
-    /// Handling of gaps and repeated times: refuse the file, split it there, or ignore them
-    #[arg(long, value_parser = parse::one_of::<Gaps>(WHOLE), default_value_t)]
+    /// Gaps and repeated times: refuse, split (into recordings) or ignore
+    #[arg(long, value_name = "HOW", hide_possible_values = true, hide_short_help = true, value_parser = parse::one_of::<Gaps>(WHOLE), default_value_t)]
     gaps: Gaps,
     /// Options for reading recordings.
     #[command(flatten)]
@@ -109,7 +106,7 @@ impl Command for Choose {
         let outages = inputs::placed(&scenario, &trajectory, seed, context)?;
         if outages.is_empty() {
             return refused(
-                "there is no outage, and candidates are judged at the ends of outages",
+                "no outage: candidates are compared at the ends of outages",
                 "give one with --outage START:END",
             );
         }
@@ -134,7 +131,7 @@ impl Command for Choose {
         let rate_hz = nominal_hz(found_hz, scenario.gnss.rate_hz);
         if rate_hz != found_hz {
             context.remark(format!(
-                "the recordings run at {} Hz: taken as {rate_hz} Hz, so that fixes meet samples",
+                "the recordings run at {} Hz: taken as {rate_hz} Hz, to meet the fixes",
                 six_digits(found_hz)
             ));
             measured.settings.rate_hz = rate_hz;
@@ -142,12 +139,12 @@ impl Command for Choose {
         let files = &measured.report.files;
         if files.len() < FEWEST {
             let message = format!(
-                "{} recordings are too few to leave one out: {FEWEST} or more are needed",
+                "{} recordings are too few to leave one out: {FEWEST} are needed",
                 files.len()
             );
             return refused(
                 message,
-                "each recording is a file; nav-sim calibrate takes fewer",
+                "one file is one recording; nav-sim calibrate takes fewer",
             );
         }
         let units = units(&measured);
@@ -229,12 +226,12 @@ impl Command for Choose {
             }
         };
         warn(
-            "abnormal, and no judge of candidates (nav-sim calibrate says how)",
+            "abnormal, ranks no candidate (nav-sim calibrate says how)",
             &abnormal,
         );
         let undescribed: Vec<&str> = ranking.undescribed.iter().map(String::as_str).collect();
         warn(
-            "described by no candidate (a warm-up? look at it with nav-sim calibrate)",
+            "no candidate describes it (a warm-up? see nav-sim calibrate)",
             &undescribed,
         );
         let ends = outages.iter().map(|o| window(o.start_s, o.end_s));
@@ -280,7 +277,7 @@ impl Choose {
             return Ok(candidates);
         }
         refused(
-            "no candidate uses all recordings: gmwm, rgmwm and avlr take one at a time",
+            "gmwm, rgmwm and avlr take one recording, and no other estimator is given",
             "add awv, sr-awv or dr-awv to --estimator",
         )
     }
@@ -326,22 +323,19 @@ impl Ranking {
         let name = &winner.candidate;
         let eligible = self.candidates.iter().filter(|p| p.eligible).count();
         let mut lines = vec![match (self.tells, eligible) {
-            (_, 1) => format!("{name}: there is no other candidate"),
+            (_, 1) => format!("{name}: no other candidate"),
             (true, _) => {
                 format!("{name} is the best of {eligible} candidates on {recordings} recordings")
             }
             (false, _) => format!(
-                "undecided: {recordings} recordings cannot tell {eligible} candidates apart; {name} scores highest"
+                "undecided: {recordings} recordings cannot separate {eligible} candidates; {name} scores highest"
             ),
         }];
         if self.tells && !self.tied.is_empty() {
-            lines.push(format!(
-                "cannot be told from it: {}",
-                first_names(&self.tied)
-            ));
+            lines.push(format!("as good: {}", first_names(&self.tied)));
         }
         lines.push(format!(
-            "its horizontal error at the ends of outages: {} m, believed {} m, NEES {} (9 if right)",
+            "its horizontal error at the ends of outages: {} m, stated {} m, NEES {} (9 if right)",
             readable(winner.rmse_m),
             readable(winner.believed_m),
             readable(winner.nees.value)

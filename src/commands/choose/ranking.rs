@@ -100,7 +100,7 @@ impl Ranking {
         // the first of equals
         let higher = |best: usize, c: usize| if score(c) > score(best) { c } else { best };
         let winner = eligible.iter().copied().reduce(higher);
-        let winner = winner.expect("one may be chosen");
+        let winner = winner.expect("candidate");
         let rivals = eligible.len().saturating_sub(1).max(1);
         let mut placed: Vec<RankedCandidate> = (0..candidates.len())
             .map(|c| place(c, &candidates[c], winner, rivals, folds))

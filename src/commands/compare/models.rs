@@ -119,11 +119,11 @@ pub(super) fn compare(paths: [&Path; 2], context: &Context<'_>) -> Result<PlainA
     let (tone, verdict) = match (judged, &changed[..]) {
         (0, _) => (
             Tone::Undecided,
-            "not judged: no figure that both have has intervals (calibrate writes them)".to_owned(),
+            "not judged: no shared figure has intervals (calibrate writes them)".to_owned(),
         ),
         (_, []) => (
             Tone::Good,
-            format!("no change seen: all {rest} figures within 1.5 half widths of a 95 % interval"),
+            format!("no change seen: all {rest} figures within 1.5 half widths of 95 %"),
         ),
         _ => (
             Tone::Doubtful,
@@ -160,5 +160,4 @@ pub(super) fn compare(paths: [&Path; 2], context: &Context<'_>) -> Result<PlainA
 /// comparisons of ten figures.
 const FAR: f64 = 1.5;
 
-const DISTANCE: &str = "Distance: over 1.5 half widths of the 95 % interval of a difference; by chance, one of ten figures is beyond 1 in 4 % of \
-                        comparisons. A model without intervals counts as known.";
+const DISTANCE: &str = "Distance: over 1.5 half widths of the 95 % interval of a difference, exceeded by one of ten figures in 4 % of comparisons. Figures without intervals count as known.";

@@ -57,7 +57,7 @@ impl Command for ExportArgs {
     const NAME: &'static str = "export";
     const OUT: Out = Out::File {
         name: "parameters.txt",
-        help: "File to write to (default: stdout)",
+        help: "File to write (default: stdout)",
     };
     const PLOT: bool = false;
     const PRINTS_FILE: bool = true;
@@ -228,7 +228,7 @@ impl Export {
             let (name, accel_s, gyro_s) = (target.name, accel.t_corr_s, gyro.t_corr_s);
             return refused(
                 format!(
-                    "{name} has one correlation time, the model's sensors have {accel_s:.3} s and {gyro_s:.3} s"
+                    "{name} has one correlation time; the sensors have {accel_s:.3} s and {gyro_s:.3} s"
                 ),
                 MATCHED,
             );
@@ -249,7 +249,7 @@ impl Export {
     }
 }
 
-const MATCHED: &str = "--policy matched fits the bias that the target has, over --horizon";
+const MATCHED: &str = "--policy matched fits the target's bias over --horizon";
 
 /// Refuses a sensor without axes, and a strict pair of a bias that the target has not. The AR1 beside a random walk are what a
 /// strict pair leaves out, as its doubts say; a Gauss-Markov process that is the model's only bias is not left out.
@@ -262,8 +262,8 @@ fn check(
     let (name, sensor) = (target.name, sensor.name());
     if axes.is_empty() {
         return refused(
-            format!("the model has no {sensor}, and {name} needs both sensors"),
-            "calibrate recordings of both sensors, or write the other one's section by hand",
+            format!("the model has no {sensor}, and {name} needs both"),
+            "calibrate both sensors, or write the other section by hand",
         );
     }
     let has = |kind| {
@@ -326,7 +326,7 @@ impl Export {
     fn head(&self, model: &str) -> Vec<String> {
         let (horizon, name) = (self.horizon, self.target.name);
         let mut lines = vec![format!(
-            "{name}: {model}, {} Hz, policy {} over averages of {} s to {} s (nav-sim export)",
+            "{name}: {model}, {} Hz, policy {} from {} s to {} s (nav-sim export)",
             self.rate_hz, self.policy, horizon.from_s, horizon.to_s
         )];
         lines.extend(self.summary());
@@ -361,13 +361,11 @@ impl Export {
         doubts.extend(self.filled(&[]).0.iter().filter_map(|e| {
             let (ExportEntry { key, value, .. }, wanted) = (e, e.wanted?);
             Some(format!(
-                "{key} is {value:.3e}, the end of its range; the model says {wanted:.3e}"
+                "{key} is {value:.3e}, the end of its range, for {wanted:.3e}"
             ))
         }));
         if self.target.vibrates {
-            doubts.push(
-                "a recording at rest has no vibration: these values are a lower bound".into(),
-            );
+            doubts.push("a recording at rest has no vibration: use larger values".into());
         }
         doubts
     }
@@ -386,10 +384,10 @@ impl SensorExport {
                 Policy::Strict => ": try --policy matched",
                 _ => "",
             };
-            doubts.push(format!("N is 0, with which many filters fail{remedy}"));
+            doubts.push(format!("N is 0, which many filters refuse{remedy}"));
         }
         if walk <= 0.0 && markov.is_none_or(|m| m.sigma <= 0.0) {
-            doubts.push("K is 0: a filter will hold its bias estimate for certain".to_owned());
+            doubts.push("K is 0: a filter will never correct its bias".to_owned());
         }
         let (lowest, highest) = (self.closure.lowest, self.closure.highest);
         let is_far = [lowest.ratio < 1.0 / TOLERANCE, highest.ratio > TOLERANCE];

@@ -185,7 +185,7 @@ fn values_outside_documented_ranges_are_told() {
     let accel = entries.iter().find(|e| e.key == "EKF2_ACC_NOISE").unwrap();
     assert!((accel.wanted.unwrap() / (N_A / 0.1) - 1.0).abs() < 1e-12);
     assert_eq!(accel.value, 0.01);
-    let told = "EKF2_ACC_NOISE is 1.000e-2, the end of its range; the model says 3.333e-3";
+    let told = "EKF2_ACC_NOISE is 1.000e-2, the end of its range, for 3.333e-3";
     assert!(
         export.doubts().iter().any(|d| d == told),
         "{:?}",
@@ -461,7 +461,7 @@ fn axes_that_differ_are_told() {
     let refused = exported("kalibr", &file, Policy::Strict).unwrap_err();
     assert_eq!(
         refused.to_string(),
-        "the model has no gyro, and kalibr needs both sensors"
+        "the model has no gyro, and kalibr needs both"
     );
 }
 

@@ -126,9 +126,9 @@ impl FuseAnswer {
     pub(crate) fn advice(&self) -> &'static str {
         let outcome = &self.summary.outcome;
         if outcome.reference.is_some() && outcome.nis_per_component < 1.0 {
-            "axes and clock of the reference may be others than those of the solution"
+            "the reference may have other axes or another clock"
         } else {
-            "check axes (--mounting), units, start (--initial), clocks (--gnss-delay), antenna (--lever-arm) and the standard deviations of the fixes (--gnss-sigma)"
+            "check axes (--mounting), units, start (--initial), clocks (--gnss-delay), antenna (--lever-arm) and stated deviations of the fixes (--gnss-sigma)"
         }
     }
 
@@ -264,24 +264,22 @@ fn at_windows(found: &Withheld) -> String {
 /// Evidence in a sentence.
 fn evidence(finding: &Finding, outages: &[(f64, f64)]) -> String {
     match *finding {
-        Finding::NoFix => "no fix was used".to_owned(),
+        Finding::NoFix => "no fix used".to_owned(),
         Finding::Start { nis_per_component } => format!(
-            "the fixes of the first minute contradict every start that was tried (NIS {})",
+            "the fixes of the first minute contradict every start (NIS {})",
             readable(nis_per_component)
         ),
-        Finding::Direction => {
-            "the fixes do not tell whether the vehicle goes forwards or backwards".to_owned()
-        }
+        Finding::Direction => "the fixes do not show whether the vehicle goes backwards".to_owned(),
         Finding::NotLevel {
             roll_deg,
             pitch_deg,
         } => {
             format!(
-                "the axes are not front, right, down: roll {roll_deg:.0}°, pitch {pitch_deg:.0}° at the start"
+                "axes not front, right, down: roll {roll_deg:.0}°, pitch {pitch_deg:.0}° at the start"
             )
         }
         Finding::Nis { per_component } if per_component > 1.0 => format!(
-            "NIS {} per component: the fixes are {:.1} times as far from the solution as stated",
+            "NIS {} per component: fixes {:.1} times as far from the solution as stated",
             readable(per_component),
             per_component.sqrt()
         ),
@@ -290,7 +288,7 @@ fn evidence(finding: &Finding, outages: &[(f64, f64)]) -> String {
             readable(per_component)
         ),
         Finding::Correlated { lag_1, .. } => {
-            format!("the errors of the fixes last (correlation {lag_1:.2} from one to the next)")
+            format!("errors of the fixes last (correlation {lag_1:.2} from one to the next)")
         }
         Finding::Minutes {
             bad,
@@ -310,7 +308,7 @@ fn evidence(finding: &Finding, outages: &[(f64, f64)]) -> String {
             aid,
             nis_per_component,
         } => format!(
-            "{aid}: NIS {} per component, it is {:.1} times as far from the solution as stated",
+            "{aid}: NIS {} per component, {:.1} times as far from the solution as stated",
             readable(nis_per_component),
             nis_per_component.sqrt()
         ),
@@ -346,13 +344,10 @@ fn rejected(outliers: &Outliers) -> String {
     };
     let reopened = match outliers.gate_reopened_s.as_slice() {
         [] => String::new(),
-        t_s => format!(
-            "; too many in a row, so that fixes are used again from {}",
-            times(t_s)
-        ),
+        t_s => format!("; too many in a row: used again from {}", times(t_s)),
     };
     format!(
-        "{} fixes ({:.1} %) are outliers and left out (--gate): at {}{reopened}",
+        "{} fixes ({:.1} %) are outliers (--gate): at {}{reopened}",
         outliers.t_s.len(),
         100.0 * outliers.share,
         times(&outliers.t_s)
@@ -367,7 +362,7 @@ fn own_noise(noise: &OwnNoise) -> String {
         sigma2,
     } = noise;
     format!(
-        "{sensor}: the white noise of the recording is {times_model:.1} times the model's and is believed instead; in the model, section [{sensor}]: {{ type = \"WN\", sigma2 = {sigma2:.3e} }}"
+        "{sensor}: the recording has {times_model:.1} times the model's white noise, which is used instead; to keep it, in [{sensor}] of the model: {{ type = \"WN\", sigma2 = {sigma2:.3e} }}"
     )
 }
 
@@ -379,7 +374,7 @@ fn apart(clocks: &ClocksApart) -> String {
         None => format!("{:.1}", clocks.delay_s),
     };
     format!(
-        "the clocks are apart: --gnss-delay={delay} makes the turns agree (correlation {then:.2}, now {now:.2})"
+        "the clocks differ: --gnss-delay={delay} matches the turns (correlation {then:.2}, now {now:.2})"
     )
 }
 
@@ -415,8 +410,8 @@ fn cause(cause: &InnovationCause) -> String {
 const UNEVEN: f64 = 0.5;
 
 const POSITION: &str = "Dashed: horizontal 1 σ stated. Line: distance from the reference.";
-const ERRORS: &str = "Lines: estimate less reference. Bands: ± 3 σ as stated.";
-const FIXES: &str = "Of a right filter 95 % of the used fixes are in the band.";
+const ERRORS: &str = "Lines: estimate minus reference. Bands: ± 3 σ as stated.";
+const FIXES: &str = "A consistent filter has 95 % of the used fixes in the band.";
 
 /// Colour of what is smoothed.
 const SMOOTHED: Colour = Colour::Hue(2);

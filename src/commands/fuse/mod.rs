@@ -101,8 +101,7 @@ const ROWS_HZ: f64 = 10.0;
 /// sd_d_m, and v_n_m_s … sd_vd_m_s where velocity is measured. Either may be a text file of KF-GINS (7 or 8
 /// columns of increments; 7 of position, 13 with velocity). GNSS may also be a solution of RTKLIB (.pos, GPST)
 /// or NMEA sentences (GGA, RMC, GST), in seconds of the day or in Unix time, as the IMU is. A log (MCAP, bag,
-/// ULog, UBX) may be either, or both. Gaps of up to 5 s are bridged, with the uncertainty that the recording shows over such times elsewhere. Writes solution.csv,
-/// innovations.csv, errors.csv (with a reference), solution.kml, summary.json, report.html, manifest.json; with
+/// ULog, UBX) may be either, or both. Gaps of up to 5 s are bridged. Writes solution.csv, innovations.csv, errors.csv (with a reference), solution.kml, summary.json, report.html, manifest.json; with
 /// --smooth also smoothed.csv, errors_smoothed.csv, smoothed.kml. Exit code 3: the solution is overconfident.
 #[derive(clap::Args, Debug, Clone)]
 pub struct Fuse {
@@ -115,11 +114,11 @@ pub struct Fuse {
     /// Noise model that the filter believes
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// Initial state: a file (TOML); the heading and its standard deviation (degrees), where the course does not show it;
-    /// auto: level from the IMU, heading from the GNSS course
+    /// Initial state: a file (TOML), auto (level from the IMU, heading from the GNSS course), or only the heading,
+    /// DEG:SD
     #[arg(
         long,
-        value_name = "FILE|DEG:SD|auto",
+        value_name = "START",
         default_value = "auto",
         allow_hyphen_values = true
     )]
@@ -128,66 +127,69 @@ pub struct Fuse {
     #[arg(long = "lever-arm", value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
         hide_default_value = true, allow_hyphen_values = true)]
     lever_arm_m: [f64; 3],
-    /// Attitude of the IMU in the vehicle (degrees) if its axes are not front, right, down; after a colon the standard
-    /// deviations about the vehicle's front, right, down (1 where not given); flu or rfu: axes of that name; auto:
-    /// estimated from the drive of a road vehicle
-    #[arg(
-        long,
-        value_name = "ROLL,PITCH,YAW[:SD,SD,SD]|flu|rfu|auto",
-        allow_hyphen_values = true
-    )]
+    /// Attitude of the IMU in the vehicle: ROLL,PITCH,YAW[:SD,SD,SD] (degrees), flu, rfu, or auto: estimated from
+    /// the drive of a road vehicle
+    #[arg(long, value_name = "ANGLES", allow_hyphen_values = true)]
     mounting: Option<MountingChoice>,
-    /// Reference trajectory to compare with; stretches where it jumps are left out
+    /// Reference trajectory to compare with
     #[arg(long, value_name = "TRAJECTORY")]
     reference: Option<PathBuf>,
-    /// Window in which fixes are withheld, on the clock of the data in seconds (repeatable)
+    /// Window without fixes, in seconds on the clock of the data (repeatable)
     #[arg(long = "outage", value_name = "START:END")]
     outages: Vec<Outage>,
-    /// States of the filter: 15 (one bias an axis, to which the model is reduced), 21 (and a scale factor an axis) or
-    /// full (a bias state for each process)
+    /// States of the filter: 15 (one bias per axis), 21 (and a scale factor per axis) or full (each process)
     #[arg(long, value_name = "STATES", default_value = "15")]
     filter: FilterStates,
-    /// Constant biases that the filter expects beside the model: standard deviations, accelerometer in m/s²,
-    /// gyroscope in rad/s
-    #[arg(long, value_name = "ACCEL,GYRO", value_parser = pair)]
+    /// Turn-on biases that the filter expects: standard deviations (m/s², rad/s)
+    #[arg(long, value_name = "ACCEL,GYRO", value_parser = pair, hide_short_help = true)]
     turn_on_bias: Option<[f64; 2]>,
-    /// Standard deviations where the GNSS file states none: of the position in m, and after a colon of the velocity in
-    /// m/s; each one number or north,east,down. x3 or x3:2: times what it states
-    #[arg(long, value_name = "POS[:VEL]|xPOS[:VEL]", value_parser = gnss_sigma)]
+    /// Standard deviations of fixes that state none: POS[:VEL] (m, m/s), each one number or north,east,down; x3:2
+    /// multiplies the stated ones
+    #[arg(long, value_name = "SIGMAS", value_parser = gnss_sigma)]
     gnss_sigma: Option<GnssSigma>,
-    /// Time by which receiver or logger stamp the fixes late (s)
+    /// Time by which the fixes are stamped late (s)
     #[arg(long = "gnss-delay", value_name = "S", value_parser = number, default_value = "0", allow_hyphen_values = true)]
     gnss_delay_s: f64,
     /// Correlation time of the fixes' errors: auto (from the innovations), none, or seconds (of
     /// positions)
-    #[arg(long, value_name = "auto|none|SECONDS", value_parser = correlation, default_value = "auto")]
+    #[arg(long, value_name = "S", value_parser = correlation, default_value = "auto", hide_short_help = true)]
     gnss_correlation: Correlation,
-    /// Fixes are left out as outliers whose normalised innovation a right filter exceeds less often than 1 - LEVEL
-    #[arg(long, value_name = "LEVEL|none", value_parser = gate, default_value = "0.9999")]
+    /// Reject fixes whose NIS exceeds this level of its chi-square distribution, or none
+    #[arg(long, value_name = "LEVEL", value_parser = gate, default_value = "0.9999", hide_short_help = true)]
     gate: GateLevel,
-    /// Windows of fixes that a second run withholds, to learn from their ends whether the filter is right; none with --outage
-    #[arg(long, value_name = "auto|none", value_parser = ["auto", "none"], default_value = "auto")]
+    /// Fixes that a second run withholds, to test the filter without a reference: auto or none
+    #[arg(long, value_name = "WHICH", value_parser = ["auto", "none"], default_value = "auto", hide_short_help = true, hide_possible_values = true)]
     withhold: String,
-    /// Road vehicle: its rear axle moves neither sideways nor up; needs the mounting of the IMU
+    /// Non-holonomic constraint: the rear axle moves neither sideways nor up; needs --mounting
     #[arg(long)]
     nhc: bool,
-    /// The velocity is zero where IMU and fixes show that the vehicle stands
+    /// Zero-velocity updates at standstill
     #[arg(long)]
     zupt: bool,
-    /// Speed of a wheel: a table of t_s and wheel_m_s (or _km_h), negative in reverse; its scale is estimated
+    /// Wheel speed: a table of t_s and wheel_m_s (or _km_h), negative in reverse
     #[arg(long, value_name = "FILE")]
     odometer: Option<PathBuf>,
     /// Middle of the rear axle from the IMU: front, right, down (m)
-    #[arg(long = "rear-axle", value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
+    #[arg(long = "rear-axle", hide_short_help = true, value_name = "X,Y,Z", value_parser = arm, default_value = "0,0,0",
         hide_default_value = true, allow_hyphen_values = true)]
     rear_axle_m: [f64; 3],
     /// Names of the IMU's columns, for a file without a header or instead of it
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(
+        long,
+        value_name = "NAMES",
+        value_delimiter = ',',
+        hide_short_help = true
+    )]
     columns: Option<Vec<String>>,
-    /// Topic of the IMU in a log that has several; after a comma that of the fixes
-    #[arg(long, value_name = "IMU[,FIXES]", value_delimiter = ',')]
+    /// Topic of the IMU in a log that has several, and of the fixes
+    #[arg(
+        long,
+        value_name = "IMU[,FIXES]",
+        value_delimiter = ',',
+        hide_short_help = true
+    )]
     topic: Vec<String>,
-    /// Also smooth the solution: every row is then estimated from all fixes, later ones included
+    /// Also smooth the solution (RTS)
     #[arg(long)]
     smooth: bool,
 }
@@ -282,7 +284,7 @@ pub(super) fn number(text: &str) -> Result<f64, &'static str> {
 }
 
 fn arm(text: &str) -> Result<[f64; 3], String> {
-    let arm: [f64; 3] = numbers(text).ok_or("expected 3 numbers between commas")?;
+    let arm: [f64; 3] = numbers(text).ok_or("expected 3 numbers")?;
     if arm.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
         Ok(arm)
     } else {
@@ -296,7 +298,7 @@ fn correlation(text: &str) -> Result<Correlation, &'static str> {
         "none" => Ok(Correlation::None),
         _ => positive(text)
             .map(Correlation::Seconds)
-            .map_err(|_| "expected auto, none, or a correlation time in seconds"),
+            .map_err(|_| "expected auto, none, or seconds"),
     }
 }
 
@@ -307,9 +309,7 @@ struct GateLevel(Option<f64>);
 fn gate(text: &str) -> Result<GateLevel, &'static str> {
     let level = text.parse().ok().filter(|x| (0.5..1.0).contains(x));
     match level {
-        None if text != "none" => {
-            Err("expected none, or a probability from 0.5 to below 1, such as 0.9999")
-        }
+        None if text != "none" => Err("expected none, or a probability from 0.5 to below 1"),
         level => Ok(GateLevel(level)),
     }
 }
@@ -329,7 +329,7 @@ fn gnss_sigma(text: &str) -> Result<GnssSigma, &'static str> {
 fn fix_sigma(text: &str) -> Result<FixSigma, &'static str> {
     let three = |part: &str| {
         numbers::<3>(part).or(numbers::<1>(part).map(|[all]| [all; 3])).filter(|sigma| sigma.iter().all(|x| *x > 0.0)).ok_or(
-            "expected metres above 0, one or three (north, east, down), and after a colon m/s: 2,2,4:0.1",
+            "expected metres > 0, one or three (north, east, down), then m/s after a colon: 2,2,4:0.1",
         )
     };
     let (position, velocity) = text
@@ -385,7 +385,7 @@ impl From<FusionError> for Failure {
                 Some("check t_s, lat_deg, lon_deg and pos_sigma_m of the initial state".to_owned())
             }
             FusionError::Memory { .. } => {
-                Some("a filter of fewer states, or the drive in parts".to_owned())
+                Some("use a smaller filter, or fuse the drive in parts".to_owned())
             }
             FusionError::Diverged { .. } => {
                 return Self::could_not(&e).hint("check axes, units and the initial state");
@@ -550,7 +550,7 @@ impl<'a> RecordedDrive<'a> {
         let delay_s = self.request.gnss_delay_s + origin_s.unwrap_or(0.0) + rest_s;
         if origin_s.is_some() {
             context.warn(format!(
-                "the clocks had nothing in common: fused with --gnss-delay={delay_s:.2}, from turns and innovations"
+                "clocks without overlap: fused with --gnss-delay={delay_s:.2}, from turns and innovations"
             ));
         }
         let aligned = match (&self.initial, self.request.given_heading()) {
@@ -563,10 +563,8 @@ impl<'a> RecordedDrive<'a> {
         };
         let Alignment { start, doubts } = aligned.map_err(|e| {
             Failure::input(e).hint(match self.request.given_heading() {
-                Some(_) => "give the whole start with --initial FILE",
-                None => {
-                    "give the heading with --initial DEG:SD, or the whole start with --initial FILE"
-                }
+                Some(_) => "give the state with --initial FILE",
+                None => "give the heading with --initial DEG:SD, or all with --initial FILE",
             })
         })?;
         settings.outages.retain(|outage| {
@@ -574,7 +572,7 @@ impl<'a> RecordedDrive<'a> {
             if is_early {
                 let span = window(outage.start_s, outage.end_s);
                 context.warn(format!(
-                    "outage {span} ends before the start of the solution: it is left out"
+                    "outage {span} ends before the solution starts: left out"
                 ));
             }
             !is_early
@@ -596,7 +594,7 @@ impl<'a> RecordedDrive<'a> {
         let weighed = fuse_correlated(&recorded, &belief, &start, &settings, asked)?;
         if self.reference.is_some() && weighed.solution.rows.iter().all(|row| row.error.is_none()) {
             return refused(
-                "the reference and the solution have no time in common",
+                "reference and solution have no time in common",
                 "both need one clock",
             );
         }
@@ -691,8 +689,7 @@ impl RecordedDrive<'_> {
             let weeks_s = apart.delay_s().filter(|s| s % WEEK_S == 0.0);
             let hint = weeks_s.map(|s| format!("--gnss-delay={}", given_s + s));
             let clock = || {
-                "bring both to one clock: --gnss-delay S takes S seconds off the times of the fixes"
-                    .into()
+                "use one clock: --gnss-delay S takes S seconds off the times of the fixes".into()
             };
             Failure::from(apart).or_hint(hint.unwrap_or_else(clock))
         })?;
@@ -709,7 +706,7 @@ impl RecordedDrive<'_> {
             |w: &WheelSpeed| span.is_some_and(|(a, b)| (a.t_s..=b.t_s).contains(&w.t_s));
         if !self.wheel.is_empty() && !self.wheel.iter().any(is_within) {
             return refused(
-                "the wheel and the IMU have no time in common",
+                "wheel and IMU have no time in common",
                 "both need one clock",
             );
         }
@@ -1068,10 +1065,10 @@ impl From<&Mounting> for MountingRow {
         let km = found.way_m / 1000.0;
         let widened = match found.sigma_factor {
             1.0 => String::new(),
-            factor => format!("; the fixes taken as {factor:.1} times as uncertain as they state"),
+            factor => format!("; fix sigmas × {factor:.1}"),
         };
         let how = format!(
-            "from gravity, accelerations and turns, and the attitude of the IMU beside the track over {km:.1} km; the roads taken as level across on average, the vehicle as going where it looks{widened}"
+            "from gravity, accelerations, turns and the attitude along {km:.1} km of track; assumes level roads and no side slip{widened}"
         );
         Self {
             roll_deg,

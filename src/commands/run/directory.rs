@@ -107,7 +107,7 @@ fn part<T>(
         Some(blake3) if *blake3 != input::hash_of(text.as_bytes()) => Err(Failure::contents(
             path,
             Place::Within,
-            "is not what its manifest.json says (BLAKE3): it is damaged, or was changed",
+            "differs from manifest.json (BLAKE3): damaged or changed",
         )
         .or_hint(REPEAT)),
         _ => Ok(found),

@@ -20,12 +20,10 @@ const OUTAGES: usize = 3;
 /// Sources of errors that a line names.
 const SOURCES: usize = 3;
 
-const HORIZONTAL: &str = "Horizontal RMSE, and the filter's own standard deviation (ASEE, averaged standard estimation error; north and \
-     east together) with the range up to three times that. Dots: median at the end of an outage, the bar up to the 95 % quantile.";
-const STATES_SHOWN: &str = "RMSE: how wrong the filter is. ASEE: its own standard deviation. Their ratio is 1 if the filter is right.";
-const FIRST: &str = "Lines: estimate less truth in one run. Bands: ± 3 ASEE.";
-const CONSISTENCY: &str = "NEES: normalised estimation error squared of position, velocity and attitude. Coverage: share of errors inside \
-     the filter's ellipsoid of position and attitude.";
+const HORIZONTAL: &str = "Horizontal RMSE and the filter's standard deviation (ASEE), shaded up to 3 σ. Dots: median at the end of an outage; bars: up to the 95 % quantile.";
+const STATES_SHOWN: &str = "RMSE: true error. ASEE (averaged standard estimation error): the filter's own standard deviation. Their ratio is 1 if the filter is right.";
+const CONSISTENCY: &str = "NEES: normalised estimation error squared of position, velocity and attitude. Coverage: share of errors inside the filter's ellipsoid.";
+const FIRST: &str = "Lines: estimate minus truth in one run. Bands: ± 3 ASEE.";
 
 /// The document of an answer.
 pub(super) fn document(answer: &RunAnswer) -> Document {
@@ -240,7 +238,7 @@ fn budgets(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
         return;
     }
     page.section("Sources of errors");
-    page.text("Shares in the mean square at the end of each outage, by covariance analysis.");
+    page.text("Shares of the mean square at the end of each outage, by covariance analysis.");
     let columns = [
         ("source", "@"),
         ("north", "pos_n_m"),
@@ -369,7 +367,7 @@ fn remedy(summary: &Summary, unexpected: &[String], answer: &RunAnswer) -> Strin
         Some(found) => return found.clone(),
         // where the reduced filter is right about the errors of its own model, the errors are of something else
         None if ratios.fold(0.0, f64::max) > 1.0 + verdict.tolerance => {
-            return "--filter full has a state for each process of the model".to_owned();
+            return "--filter full models each process".to_owned();
         }
         None if is_recorded || is_modelled || is_analysed && !is_far => {
             let how = if is_recorded || is_modelled {
@@ -378,7 +376,7 @@ fn remedy(summary: &Summary, unexpected: &[String], answer: &RunAnswer) -> Strin
                 " --scenario"
             };
             return format!(
-                "the errors are not those of MODEL: nav-sim tune{how} finds variances that cover them"
+                "MODEL is not the truth: nav-sim tune{how} finds variances that cover it"
             );
         }
         None => {}
@@ -395,6 +393,6 @@ fn remedy(summary: &Summary, unexpected: &[String], answer: &RunAnswer) -> Strin
         ""
     };
     format!(
-        "errors too large for a linear filter; another MODEL or nav-sim tune does not help{iterated}"
+        "errors too large for a linear filter: another MODEL or nav-sim tune does not help{iterated}"
     )
 }

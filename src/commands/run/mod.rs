@@ -52,14 +52,14 @@ pub struct Run {
     /// Noise model that makes the INS errors (default: MODEL itself)
     #[arg(long, value_name = "MODEL2", conflicts_with = "static")]
     pub truth: Option<PathBuf>,
-    /// Draw the parameters that make the errors of each run from the spread that their model states
+    /// Draw the true parameters of each run from the [spread] of their model
     #[arg(long, conflicts_with = "static")]
     spread: bool,
     /// Static recording whose windows make the INS errors (repeatable)
     #[arg(id = "static", long = "static", value_name = "FILE")]
     pub recordings: Vec<PathBuf>,
     /// Sample rate of static recordings without a time column
-    #[arg(long, value_name = "HZ", value_parser = parse::rate_hz, requires = "static")]
+    #[arg(long, value_name = "HZ", value_parser = parse::rate_hz, requires = "static", hide_short_help = true)]
     rate_hz: Option<f64>,
     /// Outages and other settings of the run.
     #[command(flatten)]
@@ -70,16 +70,15 @@ pub struct Run {
     /// States of the filter, and what it expects beside the model.
     #[command(flatten)]
     filter: FilterArgs,
-    /// Source of the statistics: monte-carlo (sampled runs), lincov (linear covariance analysis) or
-    /// both (runs, compared with their expected values)
-    #[arg(long, value_name = "METHOD", value_parser = parse::one_of::<Method>(&Method::NAMES))]
+    /// monte-carlo (sampled runs), lincov (linear covariance analysis) or both
+    #[arg(long, value_name = "METHOD", hide_possible_values = true, value_parser = parse::one_of::<Method>(&Method::NAMES))]
     method: Option<Method>,
-    /// Gains of sampled runs: own (of each run), shared (those along the reference) or auto (shared where runs 0 to 7,
-    /// made both ways, agree within 3 %) [default: auto]
-    #[arg(long, value_name = "GAINS", value_parser = parse::one_of::<Gains>(&Gains::NAMES))]
+    /// Filter gains: own (of each run), shared (along the reference) or auto (shared where eight runs agree
+    /// within 3 %) [default: auto]
+    #[arg(long, value_name = "GAINS", hide_possible_values = true, hide_short_help = true, value_parser = parse::one_of::<Gains>(&Gains::NAMES))]
     gains: Option<Gains>,
-    /// Limit on an error at the end of every outage, as NAME<=LIMIT (repeatable): p50_m, p95_m (horizontal),
-    /// rmse_pos_e_m, yaw_deg and the other states; or "consistent"; exit code 3 if it is not met
+    /// Limit at the end of every outage (repeatable): p50_m, p95_m, rmse_pos_e_m, yaw_deg, …; or "consistent"; exit
+    /// code 3 if not met
     #[arg(long, value_name = "NAME<=LIMIT")]
     require: Vec<Requirement>,
 }
@@ -245,8 +244,8 @@ impl Run {
         if let Some(wanting) = wanting {
             let name = wanting.name();
             return refused(
-                format!("--require {wanting}: {name} is of the ends of outages, and there is none"),
-                "give an outage with --outage START:END",
+                format!("--require {wanting}: {name} needs an outage"),
+                "give one with --outage START:END",
             );
         }
         scenario.outage = Some(outages);
@@ -285,7 +284,7 @@ impl Run {
         let Some(spread) = &file.spread else {
             return refused(
                 format!("{path}: no [spread] to draw parameters from"),
-                "nav-sim calibrate writes one where three recordings or more differ, or leave --spread out",
+                "nav-sim calibrate writes one where three recordings differ; else leave --spread out",
             );
         };
         let of_run = |run| {
@@ -425,7 +424,7 @@ impl PreparedRun<'_> {
             // Another thread makes the same.
             drop(self.filter.set(self.make_filter()?));
         }
-        Ok(self.filter.get().expect("it has just been made"))
+        Ok(self.filter.get().expect("exists"))
     }
 
     fn make_filter(&self) -> Result<FilterTracks> {
@@ -437,14 +436,14 @@ impl PreparedRun<'_> {
             let merged = track.merged();
             drop(self.track.set([track, merged]));
         }
-        let [track, merged] = self.track.get().expect("it has just been made");
+        let [track, merged] = self.track.get().expect("exists");
         let track = track.with_outages(&outages);
         let belief = scenario.belief(model, &outages, &track).map_err(|e| {
             inputs::no_filter(
                 &e,
                 &request.model,
                 file.gnss.as_deref().or(file.scenario.as_deref()),
-                "raise it, or take the full filter (--filter full), which reduces nothing",
+                "raise it, or use --filter full, which reduces nothing",
             )
         })?;
         Ok(FilterTracks {
@@ -469,7 +468,7 @@ impl PreparedRun<'_> {
             filter,
             ..
         } = self;
-        let filter = filter.get().expect("it was made above");
+        let filter = filter.get().expect("exists");
         let mut navigation = with_runs(
             &inputs,
             &origin.configuration,
@@ -527,14 +526,15 @@ impl Answer for RunAnswer {
         } = summary;
         if *diverged > 0 && diverged == runs {
             return Some(
-                Failure::could_not(format!("all {runs} runs diverged: there is no result"))
-                    .hint("does the model fit the IMU, are [imu] and [initial] plausible?"),
+                Failure::could_not(format!("all {runs} runs diverged"))
+                    .hint("do the models fit the IMU, are [imu] and [initial] plausible?"),
             );
         }
         if *diverged > 0 {
-            return Some(Failure::bound(format!("{diverged} of {runs} runs diverged")).hint(
-                "their indices are in summary.json, under diverged_runs; they are in no other number",
-            ));
+            return Some(
+                Failure::bound(format!("{diverged} of {runs} runs diverged"))
+                    .hint("summary.json lists them (diverged_runs); no figure includes them"),
+            );
         }
         let missed = summary.require.iter().filter(|met| !met.met);
         let missed: Vec<String> = missed.map(|met| requirement_line(met, summary)).collect();
@@ -544,7 +544,7 @@ impl Answer for RunAnswer {
         verdict.is_far_off().then(|| {
             let nees = summary.nees.mean;
             Failure::bound(format!(
-                "the filter is overconfident by far: NEES {nees:.0}, 9 if it is right"
+                "the filter is overconfident by far: NEES {nees:.0}, 9 if right"
             ))
             .hint("the results are written")
         })
@@ -670,10 +670,10 @@ fn with_runs(
     // beside runs that were asked for alone it may be impossible
     let expected = possible.ok().and_then(|()| analysis.expected());
     if method != Method::MonteCarlo && expected.is_none() {
-        return Err(Failure::could_not(
-            "the covariance analysis did not stay finite and positive definite",
-        )
-        .hint("do the models fit the IMU, are [imu] and [initial] plausible?"));
+        return Err(
+            Failure::could_not("the covariance did not stay finite and positive definite")
+                .hint("do the models fit the IMU, are [imu] and [initial] plausible?"),
+        );
     }
     let mut navigation = match (method, expected) {
         (
@@ -719,11 +719,11 @@ fn with_runs(
 fn possible(inputs: &NavigateInputs) -> Result<()> {
     match inputs.truth {
         TrueImu::Recordings(_) => refused(
-            "covariance analysis needs a model of what makes the errors; static recordings have none",
+            "covariance analysis needs a model of the errors, not static recordings",
             "calibrate the recordings and give the model with --truth, or use --method monte-carlo",
         ),
         TrueImu::Drawn(_) => refused(
-            "covariance analysis is of one truth; --spread draws one for each run",
+            "covariance analysis has one truth; --spread draws one per run",
             "leave --spread out, or use --method monte-carlo",
         ),
         TrueImu::AsBelieved | TrueImu::Model(_) => Ok(()),
@@ -751,8 +751,7 @@ fn motion(recording: &Recording) -> Option<String> {
         let limit = if signal.channel.sensor == Sensor::Accel { MOTION.0 } else { MOTION.1 };
         let (low, high) = signal.samples.chunks_exact(second).map(|c| c.iter().sum::<f64>() / second as f64).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
         let message = format!(
-            "{}: not static? The mean over a second of {} goes from {:.3} to {:.3} {}: motion becomes errors of the \
-             IMU",
+            "{}: not static? One-second means of {} go from {:.3} to {:.3} {}: motion becomes IMU errors",
             recording.name,
             signal.channel,
             low + signal.mean,
@@ -783,7 +782,7 @@ fn sampled(
         monte_carlo::run_range(&plan, first, block.min(runs - first), &|| true, &|n| {
             context.advance(n)
         })
-        .expect("nothing stops it")
+        .expect("unstoppable")
         .swap_remove(0)
     };
     let mut result = of_block(0);

@@ -108,14 +108,14 @@ fn parse(source: &TomlSource, rate_hz: f64) -> Result<Contamination, Failure> {
                     None => is_zero(value),
                 };
                 if is_size && is_nothing {
-                    let reason = "does nothing: it must not be 0";
+                    let reason = "must not be 0";
                     return Err(source.refused(&format!("{key}.{name}"), reason));
                 }
                 let count = value.as_array().map_or(listed, Vec::len);
                 if count != listed || value.is_array() && replicates.is_none() {
                     let reason = match replicates {
                         Some(_) => format!("has {count} values for {listed} replicates"),
-                        None => "is a list, where no \"replicates\" are listed".to_owned(),
+                        None => "is a list, but no \"replicates\" are listed".to_owned(),
                     };
                     return Err(source.refused(&format!("{key}.{name}"), reason));
                 }
@@ -152,10 +152,7 @@ fn operation(
             at_s,
         } => {
             if at_share.is_some() && at_s.is_some() {
-                return Err(refused(
-                    "at_s",
-                    "says again what \"at_share\" says".to_owned(),
-                ));
+                return Err(refused("at_s", "repeats \"at_share\"".to_owned()));
             }
             let share = at_share.as_ref().map_or(0.5, |share| share.of(i));
             let samples = at_s.as_ref().map(|s| (s.of(i) * rate_hz).round() as u64);
@@ -374,7 +371,7 @@ mod tests {
         );
         assert_eq!(
             step("at_s = 1\nat_share = 0.5\namplitude = 1"),
-            "c.toml, line 3: \"accel[1].at_s\" = 1 says again what \"at_share\" says | "
+            "c.toml, line 3: \"accel[1].at_s\" = 1 repeats \"at_share\" | "
         );
         assert_eq!(
             step("amplitude = [1, 2]\nreplicates = [1, 2, 3]"),
@@ -382,7 +379,7 @@ mod tests {
         );
         assert_eq!(
             step("amplitude = [1.0]"),
-            "c.toml, line 3: \"accel[1].amplitude\" = [1.0] is a list, where no \"replicates\" are listed | "
+            "c.toml, line 3: \"accel[1].amplitude\" = [1.0] is a list, but no \"replicates\" are listed | "
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"bursts\"\namplitude = 1\ncount = 0\n"),
@@ -416,7 +413,7 @@ mod tests {
         );
         assert_eq!(
             step("amplitude = 0"),
-            "c.toml, line 3: \"accel[1].amplitude\" = 0 does nothing: it must not be 0 | "
+            "c.toml, line 3: \"accel[1].amplitude\" = 0 must not be 0 | "
         );
         for (name, rest) in [
             ("share", "operation = \"replace\"\nsigma = 1"),
@@ -425,7 +422,7 @@ mod tests {
             ("amplitude", "operation = \"drift\""),
         ] {
             let said = refusal(&format!("[[gyro]]\n{rest}\n{name} = 0.0\n"));
-            assert!(said.contains("0.0 does nothing"), "{said}");
+            assert!(said.contains("0.0 must not be 0"), "{said}");
         }
         // some of the replicates alone; outliers of one value
         for text in [

@@ -188,7 +188,7 @@ impl Datasheet {
         let not_stated = self.not_stated();
         known(json!({
             "estimator": "datasheet",
-            "label": "an assumption: figures of a datasheet, not a calibration",
+            "label": "assumed from data-sheet figures, not calibrated",
             "program": PROGRAM,
             "schema": SCHEMA,
             "unit": self.name,
@@ -224,7 +224,7 @@ fn doubt_floor(sensor: Sensor, flicker: Flicker, density: f64, is_time_given: bo
     let mut doubts = Vec::new();
     if !is_time_given {
         doubts.push(format!(
-            "{name}: no correlation time is given; {ASSUMED_CORRELATION_TIME_S} s is assumed for the bias instability"
+            "{name}: no correlation time given; {ASSUMED_CORRELATION_TIME_S} s assumed for the bias instability"
         ));
     }
     // the white noise falls throughout, so that both together are lowest where the floor ends
@@ -233,15 +233,13 @@ fn doubt_floor(sensor: Sensor, flicker: Flicker, density: f64, is_time_given: bo
     let lowest = white.hypot(1.0);
     if white > 1.0 {
         doubts.push(format!(
-            "{name}: at {} s the white noise alone is above the bias instability, which the Allan deviation then \
-             does not show; a correlation time above {} s would",
+            "{name}: at {} s the white noise hides the bias instability in the Allan deviation; a correlation time above {} s would not",
             readable(tau_s),
             readable(flicker.t_corr_s * white * white)
         ));
     } else if lowest > NOTABLE {
         doubts.push(format!(
-            "{name}: with the white noise the lowest Allan deviation of this model is {lowest:.2} times the bias instability, \
-             at {} s: the model is cautious; a longer correlation time is less so",
+            "{name}: the lowest Allan deviation of this model is {lowest:.2} times the bias instability, at {} s; a longer correlation time lowers it",
             readable(tau_s)
         ));
     }
@@ -384,20 +382,17 @@ impl StatedQuantity {
             ));
         };
         if unit.is_empty() {
-            return Err(format!("has no unit; units that fit: {}", fitting()));
+            return Err(format!("has no unit; expected {}", fitting()));
         }
         match units.iter().find(|(name, _)| plain(name) == plain(unit)) {
-            Some((_, factor)) if number * factor > MOST => Err(format!(
-                "is more than {MOST:e} in SI units, which no sensor has"
-            )),
+            Some((_, factor)) if number * factor > MOST => {
+                Err(format!("is more than {MOST:e} in SI units"))
+            }
             Some((_, factor)) => Ok(Self {
                 given: given.to_owned(),
                 value: number * factor,
             }),
-            None => Err(format!(
-                "has the unit {unit}, which does not fit; units that fit: {}",
-                fitting()
-            )),
+            None => Err(format!("has the unit {unit}; expected {}", fitting())),
         }
     }
 }
@@ -511,17 +506,11 @@ mod unit_tests {
 
     #[test]
     fn what_is_no_figure_is_refused_with_the_units_that_fit() {
-        let fitting = "units that fit: deg/h, deg/s, mdeg/s, rad/s";
+        let fitting = "expected deg/h, deg/s, mdeg/s, rad/s";
         let refused = |text| parse(Sensor::Gyro, Figure::Bias, text).unwrap_err();
         assert_eq!(refused("10"), format!("has no unit; {fitting}"));
-        assert_eq!(
-            refused("10 ug"),
-            format!("has the unit ug, which does not fit; {fitting}")
-        );
-        assert_eq!(
-            refused("1e300 deg/s"),
-            "is more than 1e12 in SI units, which no sensor has"
-        );
+        assert_eq!(refused("10 ug"), format!("has the unit ug; {fitting}"));
+        assert_eq!(refused("1e300 deg/s"), "is more than 1e12 in SI units");
         for text in [
             "",
             "deg/h",
@@ -783,10 +772,8 @@ pub fn measured(path: &Path, rate_hz: Option<f64>) -> Result<(Datasheet, Option<
             .map_err(|e| refused(&e))?;
         if is_of_sample {
             let Some(rate_hz) = rate_hz else {
-                return Err(
-                    refused("is that of a sample: the rate of the recording is needed")
-                        .hint("give it with --rate-hz HZ"),
-                );
+                return Err(refused("is of a sample: the rate is needed")
+                    .hint("give the rate with --rate-hz"));
             };
             quantity.value /= rate_hz.sqrt();
             quantity.given = format!(

@@ -186,19 +186,17 @@ pub(super) const FIXES: Dictionary<'_> = Dictionary {
         "t_s lat_deg lon_deg h_m sd_n_m sd_e_m sd_d_m",
         "t_s lat_deg lon_deg h_m v_n_m_s v_e_m_s v_d_m_s sd_n_m sd_e_m sd_d_m sd_vn_m_s sd_ve_m_s sd_vd_m_s",
     ],
-    bad_cell: "remove the row: a fix that is not whole is no fix; angles are in degrees, or named lat_rad, lon_rad",
+    bad_cell: "remove the row: a fix needs every number; angles are in degrees, or named lat_rad, lon_rad",
     ..Dictionary::new(
         &FIX_QUANTITIES,
-        "columns: t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m, sd_d_m; with velocity v_n_m_s … and \
-             sd_vn_m_s …; without a header, as KF-GINS has it, 7 of them (t_s, latitude, longitude, height, three deviations) \
-             or 13 (velocity behind the height)",
+        "columns: t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m, sd_d_m; with velocity v_n_m_s … and sd_vn_m_s …; as KF-GINS without a header, 7 (t_s, latitude, longitude, height, three deviations) or 13 (velocity after the height)",
     )
 };
 
 /// Dictionary of solutions, which have numbers that stand for none.
 const SOLUTION: Dictionary<'_> = Dictionary {
     is_partial: true,
-    advice: "let RTKLIB write latitude, longitude and height, or x, y, z (out-solformat = llh or xyz)",
+    advice: "let RTKLIB write latitude, longitude, height, or x, y, z (out-solformat = llh or xyz)",
     ..FIXES
 };
 
@@ -307,7 +305,7 @@ fn fix(
     let refused = |message| Error::contents(path, *line, message);
     let [place, sigma, velocity, velocity_sigma] = *stated;
     let Some(place) = place.filter(|place| (*place + *t_s).is_finite()) else {
-        return Err(refused("a fix without a time, or a place to navigate from"));
+        return Err(refused("a fix without a time or position"));
     };
     let sigma = sigma.filter(|sigma| sigma.is_finite());
     let pos_sigma_n = sigma.or(unsaid.map(|sigma| sigma.pos_m.into()));
@@ -373,7 +371,7 @@ fn read_fixes(
         None => {
             let text = source::table_text(path)?;
             if text.trim_start().starts_with('<') {
-                let message = "XML, as GPX and KML are, not a table of fixes";
+                let message = "XML such as GPX or KML, not a table of fixes";
                 return Err(Error::contents(shown, 1_u64, message).or_hint(
                     "write its points as a table t_s, lat_deg, lon_deg, h_m on the clock of the IMU",
                 ));
@@ -416,7 +414,7 @@ fn read_fixes(
         .any(|(.., [_, sigma, ..])| sigma.is_none_or(|sigma| !sigma.is_finite()))
     {
         remarks.push(remark(
-            "standard deviations as given where the file states none",
+            "standard deviations as given where the file has none",
         ));
     }
     remarks.extend(doubt_degrees(fixes.iter().map(|fix| [fix.lat, fix.lon])).map(doubt));
@@ -443,7 +441,7 @@ pub(super) fn check_jump(
     }
     let seconds = (1e6 * seconds).round() / 1e6;
     let message = format!("position jumps by {metres:.0} m in {seconds} s");
-    let advice = "is a latitude swapped with a longitude, a sign lost, or a row damaged?";
+    let advice = "latitude and longitude swapped, a sign lost, or a damaged row?";
     Err(Error::contents(path, line, message).or_hint(advice))
 }
 
@@ -498,7 +496,7 @@ mod fix_tests {
                 .ends_with("line 1: columns \"h_m\" and \"altitude\" both give h_m"),
             "{e}"
         );
-        assert_eq!(e.advice().unwrap(), "remove one of them");
+        assert_eq!(e.advice().unwrap(), "give one of them");
     }
 
     /// Text of Inertial Explorer: units in a line of their own, week and second, velocities up. The IMU ran in seconds of the
@@ -657,7 +655,7 @@ fn rtklib(path: &str, text: &str, (at, names): (usize, &str)) -> Result<Table, E
                     }
                 });
                 whole += &row.ok_or_else(|| {
-                    let message = "not a row of time, position, quality, satellites and standard deviations";
+                    let message = "not a row of time, position, quality, satellites and deviations";
                     let advice = "2021/03/01 00:00:01.000 (or 2147 86401.000), latitude, longitude, height, Q, ns, sdn, sde, sdu";
                     refuse(i, message, advice)
                 })?;
@@ -904,9 +902,7 @@ const SAMPLES: Dictionary<'_> = Dictionary {
         "t_s dtheta_x_rad dtheta_y_rad dtheta_z_rad dv_x_m_s dv_y_m_s dv_z_m_s",
         "t_s dtheta_x_rad dtheta_y_rad dtheta_z_rad dv_x_m_s dv_y_m_s dv_z_m_s odometer_m_s",
     ],
-    advice: "columns: t_s, gyro_x_rad_s … accel_z_m_s2 (rates) or t_s, dtheta_x_rad … dv_z_m_s (increments); without a header, \
-             as KF-GINS has it, 7 of them (t_s, dtheta_x, dtheta_y, dtheta_z in rad, dv_x, dv_y, dv_z in m/s), or 8 with an \
-             odometer",
+    advice: "columns: t_s, gyro_x_rad_s … accel_z_m_s2 (rates) or t_s, dtheta_x_rad … dv_z_m_s (increments); as KF-GINS without a header, 7 (t_s, dtheta_x, dtheta_y, dtheta_z in rad, dv_x, dv_y, dv_z in m/s), or 8 with an odometer",
     ..recordings::DICTIONARY
 };
 
@@ -947,14 +943,14 @@ pub(crate) fn read_imu(
     if table.is_bare {
         let odometer = match table.ignored.is_empty() {
             true => "",
-            false => "; the odometer's speed in column 8 is not used",
+            false => "; the odometer in column 8 is not used",
         };
         let text = "no header: read as KF-GINS text, angle then velocity increments";
         remarks.push(remark(format!("{text}{odometer}")));
     }
     let t_s: Vec<f64> = time.values.iter().map(|t| t * unit_s).collect();
     if t_s.len() < 3 {
-        let message = format!("{} samples, but at least 3 are needed", t_s.len());
+        let message = format!("{} samples, but 3 are needed", t_s.len());
         return Err(Error::contents(&table.path, Place::Within, message));
     }
     increasing(&table.path, |k| table.line(k), t_s.iter().copied())?;
@@ -1002,17 +998,16 @@ pub(crate) fn read_imu(
         let missing_s = since_s(k) - step;
         if missing_s > LONGEST_GAP_S + 0.5 * step {
             let [from, to] = [k - 1, k].map(|k| t_s[k]);
-            let message =
-                format!("no samples from {from} s to {to} s: {LONGEST_GAP_S} s can be bridged");
+            let message = format!("no samples from {from} s to {to} s: at most {LONGEST_GAP_S} s");
             let advice = "fuse the stretches before and after it one by one";
             return Err(refuse(message).or_hint(advice));
         }
         let angle = sample.dtheta.length();
         if angle > MAX_ROTATION {
             let [degrees, most] = [angle, MAX_ROTATION].map(|a| a / DEG);
-            let message = format!("a rotation of {degrees:.1}° in one sample, {most:.1}° at most");
+            let message = format!("a rotation of {degrees:.1}° in one sample, at most {most:.1}°");
             let advice =
-                "is the unit right? gyro_x_deg_s is in degrees, gyro_x_rad_s in radians a second";
+                "is the unit right? gyro_x_deg_s is degrees, gyro_x_rad_s radians per second";
             return Err(refuse(message).or_hint(advice));
         }
         if missing_s > (GAP - 1.0) * step {
@@ -1080,7 +1075,7 @@ fn doubt_units(
         check_gravity(path, force.max(0.3), None)?;
     }
     let degrees = rate / DEG;
-    let text = format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?");
+    let text = format!("mean angular rate {degrees:.0} deg/s: deg/s named rad/s?");
     Ok((rate > FAST).then_some(text))
 }
 
@@ -1305,7 +1300,7 @@ mod wheel_tests {
             (
                 "t_s,wheel_m_s,speed_m_s\n0,1,1\n",
                 "columns \"wheel_m_s\" and \"speed_m_s\" both give speed",
-                "remove one",
+                "give one",
             ),
             ("t_s,gear\n0,1\n", "column speed is missing", "wheel_m_s"),
             ("wheel_m_s\n1\n", "column t_s is missing", "t_s"),

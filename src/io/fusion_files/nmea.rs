@@ -144,7 +144,7 @@ pub(super) fn fixes(
         {
             let found: String = line.chars().take(60).collect();
             let refused = Error::contents(path, i, format!("{message}: {found}"));
-            return Err(refused.or_hint("remove the line, if no more than it is damaged"));
+            return Err(refused.or_hint("remove the line, if only that is damaged"));
         }
     }
     let day = || (0.0, "seconds of the day (UTC)".to_owned());
@@ -165,19 +165,19 @@ pub(super) fn fixes(
     let fixes: Vec<_> = log.epochs.iter().filter_map(fix).collect();
     let count = fixes.len();
     if count == 0 {
-        let message = "NMEA sentences without a position: no GGA with a fix";
+        let message = "NMEA sentences without GGA fixes";
         return Err(Error::contents(path, 1_u64, message)
             .or_hint("let the receiver write GGA, RMC and GST"));
     }
     let text = format!("NMEA sentences: {count} fixes, times are {clock}");
     let mut remarks = vec![remark(text)];
     if !is_summed {
-        let text = "no sentence has a checksum: damaged digits go unseen";
+        let text = "no sentence has a checksum: damaged digits are undetected";
         remarks.push(doubt(text));
     }
     if vel_sigma.is_none() && log.epochs.iter().any(|e| e.velocity.is_some()) {
         let text =
-            "speed and course are not used without standard deviations: --gnss-sigma 2,2,4:0.1";
+            "speed and course are unused without standard deviations: --gnss-sigma 2,2,4:0.1";
         remarks.push(doubt(text));
     }
     if !log.has_separation {
@@ -193,7 +193,7 @@ fn body(line: &str) -> Result<&str, &'static str> {
     let start = line.find(['$', '!']);
     start
         .map(|start| &line[start + 1..])
-        .ok_or("not a sentence: it has no $")
+        .ok_or("not a sentence: no $")
 }
 
 /// The fields of a sentence whose checksum is right: what is between `$` and `*`, a XOR of its bytes; of logs without any, all.
@@ -203,10 +203,10 @@ fn fields(line: &str, is_summed: bool) -> Result<Vec<&str>, &'static str> {
     }
     let whole = body(line)?.rsplit_once('*');
     let summed = whole.and_then(|(body, sum)| Some((body, u8::from_str_radix(sum, 16).ok()?)));
-    let (body, sum) = summed.ok_or("a sentence without its checksum")?;
+    let (body, sum) = summed.ok_or("no checksum")?;
     match sum == body.bytes().fold(0, |all, byte| all ^ byte) {
         true => Ok(body.split(',').collect()),
-        false => Err("a sentence whose checksum is wrong"),
+        false => Err("wrong checksum"),
     }
 }
 

@@ -94,7 +94,7 @@ impl ModelFile {
     pub(crate) fn doubts(&self, path: &std::path::Path) -> Vec<String> {
         let shown = path.display();
         let unsaid = |channel: &Channel| {
-            format!("{shown} has no noise model for {channel}; it is taken as free of noise")
+            format!("{shown} has no noise model for {channel}: taken as free of noise")
         };
         let misfit = self.misfit().map(|misfit| format!("{shown} {misfit}"));
         let out_of_range = facts::out_of_range(&self.model).into_iter();
@@ -279,9 +279,9 @@ impl JsonSchema for ProcessTable {
                 };
                 let hint = match parameter {
                     Parameter::Phi => {
-                        "phi = exp(−1/(T·rate_hz)) for a correlation time of T seconds; phi = 1 is a random walk: RW"
+                        "phi = exp(−1/(T·rate_hz)) for a correlation time of T seconds; for phi = 1 use RW"
                     }
-                    _ => "a variance is never negative; 0 switches the process off",
+                    _ => "a variance is ≥ 0; 0 switches the process off",
                 };
                 if !matches!(
                     parameter,
@@ -367,7 +367,7 @@ pub(crate) fn schema() -> serde_json::Value {
 pub(crate) fn known(json: serde_json::Value) -> toml::Table {
     let mut fields = json.as_object().cloned().unwrap_or_default();
     fields.retain(|_, value| !value.is_null());
-    toml::Table::try_from(fields).expect("texts and numbers are always TOML")
+    toml::Table::try_from(fields).expect("serialises")
 }
 
 /// Disagreement of a model with the recordings that it was fitted to, as its provenance has it.
@@ -391,7 +391,7 @@ impl fmt::Display for Misfit {
         let figures: Vec<String> = p.into_iter().chain(worst).collect();
         write!(f, "does not fit its recordings ({})", figures.join(", "))?;
         match self.is_read {
-            true => write!(f, ": the reading of their curve stands for it"),
+            true => write!(f, ": navigation uses the reading of their curve"),
             false => Ok(()),
         }
     }
@@ -520,8 +520,8 @@ fn read_sensor(
         let key = format!("{name}.{}", axis.name());
         match (&table.processes, own) {
             (Some(_), Some(_)) => {
-                let error = source.refused(&key, "is given both for all axes and for this one");
-                return Err(error.or_hint(format!("write either [{name}] or one table an axis")));
+                let error = source.refused(&key, "is given for all axes and for this one");
+                return Err(error.or_hint(format!("write either [{name}] or one table per axis")));
             }
             (Some(all), None) => {
                 read_axis(source, name, all, table.reading.as_ref(), channel, file)?
@@ -619,11 +619,11 @@ fn read_process(
     rate_hz: f64,
 ) -> Result<Process, Failure> {
     let code = values["type"].as_str().unwrap_or_default();
-    let kind = Kind::named(code).expect("the description has the codes of the kinds");
+    let kind = Kind::named(code).expect("codes");
     let names = kind.parameters().iter().map(|p| p.name());
     let values: Vec<f64> = names.clone().map(|name| number(&values[name])).collect();
     if let Some((name, _)) = names.zip(&values).find(|(_, value)| value.abs() > LARGEST) {
-        let reason = format!("is more than {LARGEST:e}, which no sensor has");
+        let reason = format!("is more than {LARGEST:e}");
         return Err(source.refused(&format!("{key}.{name}"), reason));
     }
     Process::of_values(kind, &values, rate_hz).map_err(|e| {
@@ -661,7 +661,7 @@ fn read_laws(
                 .any(|v| (v.process.as_str(), v.of.parameter.name()) == (process, parameter))
             {
                 let key = format!("{key}.parameter");
-                return Err(source.refused(&key, "of this process already has a law"));
+                return Err(source.refused(&key, "of this process is given twice"));
             }
             into.push(variation);
         }
@@ -751,7 +751,7 @@ fn processes(file: &ModelFile, channel: Channel) -> Option<String> {
     if let Some(reading) = &file.reading
         && !reading.missing.contains(&channel)
     {
-        out += "# read off the curve, which the processes do not describe: navigation and exports take it in their place\n";
+        out += "# read off the curve, which the processes do not describe: used in navigation and exports\n";
         out += &list(reading, channel, "reading");
     }
     Some(out)

@@ -49,8 +49,7 @@ pub(crate) fn drop_copies(table: &mut Table) -> Option<String> {
     let copies = facts::copies(&stamps.values, &axes(table, |_| true));
     leave_out(table, &copies);
     let count = copies.len();
-    (count > 0)
-        .then(|| format!("{count} rows are copies of the row before, stamp and values: left out"))
+    (count > 0).then(|| format!("{count} rows copy the row before, stamp and values: left out"))
 }
 
 fn leave_out(table: &mut Table, rows: &[usize]) {
@@ -74,7 +73,7 @@ fn lost(table: &Table) -> (Vec<usize>, Option<String>) {
 /// A warning of the zeros of a column.
 fn zeros(name: impl Display, values: &[f64]) -> Option<String> {
     let share = percent(facts::zeros(values)?);
-    let why = "which its step does not explain: a dead band, or lost samples";
+    let why = "more than its step explains: a dead band, or lost samples";
     Some(format!("{share} of {name} is exactly 0, {why}"))
 }
 
@@ -269,8 +268,14 @@ impl Repair {
             let first = found.iter().find_map(|(s, r)| Some((*s, r.as_ref()?)));
             let text = first.map_or_else(String::new, |(s, r)| repeated(s, r, rate_hz));
             return Err(Failure::contents(&table.path, Place::Within, text)
-                .or_option(("axes", "take one sensor at a time, each at its own rate: --axes accel, then --axes gyro"))
-                .or_hint_without(("axes", "wv and calibrate take one sensor at a time: --axes accel, then --axes gyro")));
+                .or_option((
+                    "axes",
+                    "take one sensor at a time, each at its rate: --axes accel, then --axes gyro",
+                ))
+                .or_hint_without((
+                    "axes",
+                    "wv and calibrate take one sensor at a time: --axes accel, then --axes gyro",
+                )));
         }
         table.keep(firsts);
         self.rows_per_sample = *rows_per_sample;
@@ -319,7 +324,7 @@ impl Repair {
     pub(super) fn refuse_interpolated(self, path: &str) -> Result<(), Failure> {
         let refused = |text: String| {
             Failure::contents(path, Place::Within, text)
-                .or_hint("write the samples as the sensor gave them, at its own rate and stamps")
+                .or_hint("write the samples at the sensor's own rate and stamps")
                 .or_option(help::CHANNELS)
         };
         self.interpolated.map_or(Ok(()), |text| Err(refused(text)))
@@ -348,11 +353,11 @@ pub(super) fn examine(recording: &Recording, report: &mut FileReport) -> Result<
     if share > MOST_MOVING {
         let text = format!("moves in {} of its seconds: not static", percent(share));
         return Err(Failure::contents(&report.file, Place::Itself, text)
-            .or_hint("record with the unit at rest; nav-sim fuse reads drives and flights"));
+            .or_hint("record at rest; nav-sim fuse reads drives and flights"));
     }
     if moving > 0 {
         report.warn(format!(
-            "moves in {moving} of its {seconds} seconds, or was knocked"
+            "moves in {moving} of {seconds} seconds, or was knocked"
         ));
     }
     report.warnings.extend(drift(recording));
@@ -389,7 +394,7 @@ fn drift(recording: &Recording) -> Option<String> {
     };
     let more = and_more(found.len() - 1, ["axis", "axes"]);
     Some(format!(
-        "{channel} drifts by {slope}{more}, more than a random walk does: add DR, or keep the temperature"
+        "{channel} drifts by {slope}{more}, more than a random walk: add DR, or keep the temperature"
     ))
 }
 
@@ -405,8 +410,7 @@ fn shared_noise(recording: &Recording) -> Option<String> {
     let correlation = most.correlation;
     let more = and_more(found.len() - 1, ["pair", "pairs"]);
     Some(format!(
-        "{a} and {b}{more} share noise (correlation {correlation:.2}, averages of {from} to {to} s): \
-         a model has independent axes, its intervals are too narrow"
+        "{a} and {b}{more} share noise (correlation {correlation:.2}, averages of {from} to {to} s): intervals assume independent axes and are too narrow"
     ))
 }
 
@@ -462,9 +466,7 @@ fn exchanged(found: &[(Channel, f64)]) -> Option<String> {
     let [of_accel, of_gyro] =
         [(Sensor::Accel, accel), (Sensor::Gyro, gyro)].map(|(s, n)| in_hours(s, n));
     (accel < gyro).then(|| {
-        format!(
-            "accel N {of_accel} beside gyro N {of_gyro}: sensors exchanged, or deg/s named rad/s?"
-        )
+        format!("accel N {of_accel}, gyro N {of_gyro}: sensors exchanged, or deg/s named rad/s?")
     })
 }
 
@@ -533,7 +535,7 @@ fn copied(table: &Table) -> Option<String> {
     let (first, later) = facts::copied(&axes)?;
     let [first, later] = [first, later].map(|k| all[k].0);
     Some(format!(
-        "{later} has the samples of {first}: one axis was written twice"
+        "{later} repeats {first}: one axis was written twice"
     ))
 }
 
@@ -601,14 +603,11 @@ pub(super) fn compare(files: &[FileReport]) -> Result<Vec<String>, Failure> {
             if let Some(share) = shared.reduce(f64::max) {
                 let name = &first.file;
                 let message = match share > 0.99 && later.samples == first.samples {
-                    true => format!("is a copy of {name}: it would count as two replicates"),
-                    false => format!(
-                        "shares {} of its samples with {name}: they would count twice",
-                        percent(share)
-                    ),
+                    true => format!("is a copy of {name}"),
+                    false => format!("shares {} of its samples with {name}", percent(share)),
                 };
                 return Err(Failure::contents(&later.file, Place::Itself, message)
-                    .or_hint("leave one of them out, or cut what is in both out of one"));
+                    .or_hint("leave one out, or cut the common part from one"));
             }
         }
     }

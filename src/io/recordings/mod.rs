@@ -149,7 +149,7 @@ const SEVEN: &str =
 /// Dictionary of recordings.
 pub(crate) const DICTIONARY: Dictionary<'_> = Dictionary {
     array: &[SIX, SEVEN],
-    bad_cell: "remove the line, or record again: a sample that is made up would change the noise",
+    bad_cell: "remove the line, or record again: made-up samples change the noise",
     ..Dictionary::new(
         QUANTITIES.as_flattened(),
         "name the columns t_s, accel_x_m_s2 … gyro_z_rad_s (also _g, _mg, _deg_s, _deg_h; t_ms, t_us, t_ns)",
@@ -222,7 +222,7 @@ fn load_signals(
             .get("t_s")
             .is_some_and(|t| t.quantity.stems == SENSOR_LOGGER)
     {
-        let text = "has accelerations without gravity, as the phone estimates them; TotalAcceleration.csv has those measured";
+        let text = "has accelerations without gravity; TotalAcceleration.csv has measured ones";
         if path.with_file_name("TotalAcceleration.csv").exists() {
             return Err(Failure::contents(&table.path, Place::Itself, text)
                 .or_hint("name TotalAcceleration.csv")
@@ -254,7 +254,7 @@ fn load_signals(
 fn too_short(path: &str, samples: usize, needed: usize) -> Failure {
     let message = format!("{samples} samples, but {needed} are needed");
     Failure::contents(path, Place::Within, message)
-        .or_hint("record for longer, or ask for fewer scales")
+        .or_hint("record for longer, or use fewer scales")
 }
 
 /// Reads recordings; those of a directory in name order (numbers in names by value). All are held.
@@ -293,7 +293,7 @@ pub(crate) fn visit<T: Send>(
                 // the output of this very command, say, when it goes to a file in the directory
                 Err(e) if *is_found && e.skip_reason().is_some() => {
                     let (path, why) = (path.display(), e.skip_reason().unwrap_or_default());
-                    let text = format!("{path}: passed over, {why}");
+                    let text = format!("{path}: skipped, {why}");
                     report.warnings.push(text);
                     passed_over = passed_over.or(Some(e));
                 }
@@ -362,9 +362,9 @@ fn expand(paths: &[PathBuf]) -> Result<Vec<(PathBuf, bool)>, Failure> {
     for (path, _) in &files {
         // A pipe has no path of its own.
         if !seen.insert(path.canonicalize().unwrap_or_else(|_| path.clone())) {
-            let message = "is given twice: it would count as two replicates";
+            let message = "is given twice";
             return Err(Failure::contents(path.display(), Place::Itself, message)
-                .or_hint("name each file once; a directory stands for all its recordings"));
+                .or_hint("name each file once; a directory stands for its recordings"));
         }
     }
     Ok(files)
@@ -706,7 +706,7 @@ fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
             let message = format!("{channel} is nowhere above {largest:.0e}: no measurement");
             return Err(Failure::contents(&raw.path, Place::Within, message)
                 .or_option(help::CHANNELS)
-                .or_hint("write it in the unit that its name has"));
+                .or_hint("write it in the unit of its name"));
         }
         let per_sample = if column.quantity.per_sample {
             rate_hz
@@ -783,7 +783,7 @@ fn plausible(
             "accelerometers and gyroscopes are exchanged: |f| is {f:.4} m/s², the mean rate {rate:.4} rad/s"
         );
         return Err(Failure::contents(&report.file, Place::Within, message)
-            .or_hint("without names the first three columns are the accelerometers")
+            .or_hint("without names the first three columns are accelerometers")
             .or_option(help::COLUMN_NAMES));
     }
     if accel.len() == 3 {
@@ -821,11 +821,11 @@ pub(crate) fn check_gravity(path: &str, norm: f64, rate_hz: Option<f64>) -> Resu
     } else if near(STANDARD_GRAVITY * STANDARD_GRAVITY) {
         "it looks like m/s² named g"
     } else {
-        "wrong unit, or the sensor was moving"
+        "wrong unit, or moving"
     };
     let guess = increments.as_deref().unwrap_or(guess);
     let names = step.map(|_| "name increments dv_x_m_s … dv_z_m_s, dtheta_x_rad … dtheta_z_rad");
-    let message = format!("static |f| is {norm:.4} m/s², far from 9.81 m/s²: {guess}");
+    let message = format!("static |f| is {norm:.4} m/s², not 9.81 m/s²: {guess}");
     Err(Failure::contents(path, Place::Within, message)
         .or_hint_if(names.map(str::to_owned))
         .or_hint("name the unit in the columns: accel_x_m_s2, accel_x_g or accel_x_mg"))
@@ -849,7 +849,7 @@ fn same_rate(files: &[FileReport]) -> Result<(), Failure> {
                 six_digits(first.rate_hz)
             );
             Err(Failure::contents(&other.file, Place::Itself, message)
-                .or_hint("calibrate recordings of one rate at a time, or resample them"))
+                .or_hint("use recordings of one rate, or resample them"))
         }
     }
 }

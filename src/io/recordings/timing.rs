@@ -76,7 +76,7 @@ pub(super) fn timing(
             }
         }
         (None, None) => {
-            let message = "no time column, and no rate is given";
+            let message = "no time column, and no rate given";
             return Err(Failure::contents(&raw.path, Place::Within, message)
                 .or_option(("rate-hz", "give the rate with --rate-hz")));
         }
@@ -239,9 +239,7 @@ impl SampleClock {
             let message = format!(
                 "the rate changes from {first} Hz in the first tenth to {last} Hz in the last"
             );
-            return Err(refused(message).or_hint(
-                "split the file where the rate changes: a wavelet variance is of one rate",
-            ));
+            return Err(refused(message).or_hint("split the file where the rate changes"));
         }
         let lost: usize = holes.iter().flatten().map(|(_, lost)| lost).sum();
         // The whole span averages the jitter.
@@ -260,13 +258,13 @@ impl SampleClock {
         if apart > ROUNDED {
             report.rate_from = format!("given; the {} has {found} Hz", report.rate_from);
             report.warn(format!(
-                "{rate_hz} Hz is given, but the file runs at {found} Hz: the rate given is taken"
+                "{rate_hz} Hz as given, although the file has {found} Hz"
             ));
         }
         if !USUAL_RATES_HZ.contains(&rate_hz) {
             let (rate_hz, name) = (six_digits(rate_hz), &self.name);
             report.warn(format!(
-                "{rate_hz} Hz is no usual rate of an IMU: is the unit of \"{name}\" right?"
+                "{rate_hz} Hz is an unusual IMU rate: is the unit of \"{name}\" right?"
             ));
         }
         if let Some(first) = breaks.first().map(|first| raw.line(*first)) {

@@ -134,7 +134,7 @@ pub(crate) fn read(path: &Path, dictionary: &Dictionary<'_>) -> Result<Table, Fa
         None if ends_in("parquet") => of(parquet(path)?),
         #[cfg(not(feature = "parquet"))]
         None if ends_in("parquet") => {
-            let message = "is Apache Parquet, which this build does not read";
+            let message = "is Apache Parquet, which this build cannot read";
             let refusal = Failure::contents(&name, Place::Itself, message);
             Err(refusal.or_hint("build with --features parquet, or write CSV"))
         }
@@ -177,9 +177,7 @@ pub(crate) fn unreadable(path: &Path, e: std::io::Error) -> Failure {
     let is_cut = is_damage(e.kind()) && !matches!(e.kind(), K::FileTooLarge | K::Unsupported);
     let failure = Failure::io(path, e);
     match is_cut {
-        true => failure.hint(
-            "the file is cut off, or not gzipped though it ends in .gz: copy it again, or rename it",
-        ),
+        true => failure.hint("the file is cut off or not gzipped: copy it again, or rename it"),
         false => failure,
     }
 }
@@ -309,7 +307,7 @@ impl Table {
             let (Some(first), Some(second)) = (rank(earlier), rank(later)) else {
                 let (a, b) = (&earlier.name, &later.name);
                 let message = format!("columns \"{a}\" and \"{b}\" both give {name}");
-                return Err(self.refused(message).or_hint("remove one of them"));
+                return Err(self.refused(message).or_hint("give one of them"));
             };
             let out = if second < first { i } else { k };
             self.ignored.push(self.columns.remove(out).name);
@@ -327,7 +325,7 @@ impl Table {
                     && !dictionary.unwanted.is_some_and(|is| is(q))
             };
             if let Some(quantity) = dictionary.quantities.iter().find(is_meant) {
-                let problem = "is in a unit that is not known";
+                let problem = "is in an unknown unit";
                 let other = quantity.name.replace('.', "_");
                 let advice = format!("convert it, and end {other}");
                 let refusal = self.unit(name, quantity, problem, &advice);
@@ -381,7 +379,7 @@ impl Table {
             |cell| shown(&String::from_utf8_lossy(cell.trim_ascii()), 40),
         );
         let (text, reason) = match outside {
-            _ if !value.is_finite() => (format!("\"{text}\""), "is not finite"),
+            _ if !value.is_finite() => (format!("\"{text}\""), "is not a finite number"),
             Some((.., reason)) if is_measured => (text, reason),
             _ => (text, BEYOND),
         };
@@ -402,7 +400,7 @@ impl Table {
             return error.or_hint("write decimals with a point: 0.5, not 0,5");
         }
         let is_time = value.matches(':').count() > 1;
-        let time = "write the time in seconds, from any instant on, and name the column t_s";
+        let time = "write the time in seconds from any instant, and name the column t_s";
         match (is_time, dictionary.bad_cell) {
             (true, _) => error.or_hint(time),
             (false, "") => error,
@@ -468,7 +466,7 @@ impl Table {
             return Ok(());
         }
         let [needed, free] = [bytes(rows), free].map(|bytes| bytes.div_ceil(1 << 20));
-        let message = format!("its samples need {needed} MiB of memory, and {free} MiB are free");
+        let message = format!("its samples need {needed} MiB of memory, {free} MiB are free");
         let refusal = Failure::contents(&self.path, Place::Within, message);
         Err(refusal.or_option(("axes", "take fewer signals at a time with --axes")))
     }
@@ -647,7 +645,7 @@ fn read_text(
     table.rate_hz = head.rate_hz.map(|rate_hz| (rate_hz, "head of the file"));
     table.is_bare = head.is_bare;
     if head.is_latin_1 && dictionary.names.is_none() {
-        let text = "header not in UTF-8, taken as ISO-8859-1";
+        let text = "header not in UTF-8, read as ISO-8859-1";
         table.assumptions.push(text.to_owned());
     }
     let units = head.units_line.map(|line| format!("units by line {line}"));
@@ -896,7 +894,7 @@ impl HeaderLines {
                 if is_mark {
                     let message = "commas separate the cells and are their decimal marks";
                     return Err(Failure::contents(path, line, message).or_hint(
-                        "write decimals with a point, or separate the cells with semicolons",
+                        "write decimals with a point, or separate cells with semicolons",
                     ));
                 }
                 return Err(Failure::row_length(path, line, found, expected));
@@ -941,7 +939,7 @@ fn no_header(
     dictionary: &Dictionary<'_>,
 ) -> Failure {
     let found = shown(text, 60);
-    let message = format!("a header that names the columns is missing, found \"{found}\"");
+    let message = format!("no header with column names, found \"{found}\"");
     let names = layout(dictionary.array, count).map(|names| names.join(","));
     let option = format!(
         "name its {count} columns: --columns {}",
@@ -1133,18 +1131,16 @@ fn npy(path: &Path, dictionary: &Dictionary<'_>) -> Result<Columns, Failure> {
         _ => {
             let dimensions = array.shape.len();
             return Err(refused(format!(
-                "an array of {dimensions} dimensions, samples × columns are needed"
+                "an array of {dimensions} dimensions, not samples × columns"
             )));
         }
     };
     let named = dictionary.names.map(|_| vec![String::new(); count]);
     let names = named.or_else(|| layout(dictionary.array, count));
     let names = names.ok_or_else(|| {
-        refused(format!(
-            "an array of {count} columns, which names are not known"
-        ))
-        .or_hint(dictionary.advice)
-        .or_option(help::COLUMN_NAMES)
+        refused(format!("an array of {count} columns of unknown names"))
+            .or_hint(dictionary.advice)
+            .or_option(help::COLUMN_NAMES)
     })?;
     let columns = (0..).zip(names);
     Ok(columns

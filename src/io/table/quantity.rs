@@ -146,7 +146,7 @@ impl Quantity {
 
     /// The same where it is above 0, as a standard deviation is; the squares of smaller ones are no numbers to divide by.
     pub(crate) const fn positive(self) -> Self {
-        const REASON: &str = "is not a standard deviation: it must be above 0";
+        const REASON: &str = "is not a standard deviation > 0";
         Self {
             range: Some((1e-9, f64::MAX, REASON)),
             ..self

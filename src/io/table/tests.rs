@@ -91,7 +91,7 @@ fn an_unknown_unit_is_not_passed_over() {
         "dtheta_y_mrad",
     ] {
         let error = with_header(&["t_s", "gyro_x_rad_s", name], &[]).unwrap_err();
-        let expected = format!("a.csv, line 1: column \"{name}\" is in a unit that is not known");
+        let expected = format!("a.csv, line 1: column \"{name}\" is in an unknown unit");
         assert_eq!(error.to_string(), expected);
     }
     let is_there = ["accel_x_m_s2", "accel_x_sigma"];
@@ -156,7 +156,7 @@ fn columns_beyond_the_memory_are_refused_with_both_figures() {
     let table = with_header(&["t_s"], &[]).unwrap();
     let text = table.fits(u64::MAX / 16).unwrap_err().to_string();
     assert!(
-        text.starts_with("a.csv: its samples need 8796093022208 MiB of memory, and ")
+        text.starts_with("a.csv: its samples need 8796093022208 MiB of memory, ")
             && text.ends_with(" MiB are free"),
         "{text}"
     );

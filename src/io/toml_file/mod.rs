@@ -62,7 +62,7 @@ impl TomlSource {
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let text = source::text(path).map_err(|e| {
             let advice = match e.kind() {
-                ErrorKind::NotFound => Some("start from the files that nav-sim init makes"),
+                ErrorKind::NotFound => Some("start from the files of nav-sim init"),
                 _ => None,
             };
             Failure::io(path, e).or_hint_if(advice.map(str::to_owned))
@@ -183,7 +183,7 @@ impl TomlSource {
             true => self.refused(key, reason),
             false => self.error(key, format!("\"{key}\" = {value} {reason}")),
         };
-        let default = "the file does not set it: this is the default";
+        let default = "not set in the file: this is the default";
         let advice = error.advice.into_iter();
         let advice = advice.chain((!is_set).then_some(default));
         advice.fold(refusal, Failure::or_hint)
@@ -262,7 +262,7 @@ impl<'a> Checker<'a> {
     fn resolved(&self, schema: &'a Schema) -> &'a Schema {
         let of = |place: &str| self.root.pointer(&place[1..]);
         let place = schema["$ref"].as_str();
-        place.map_or(schema, |place| of(place).expect("a schema is whole"))
+        place.map_or(schema, |place| of(place).expect("schema"))
     }
 
     /// Alternatives, of which a value meets one.
@@ -353,7 +353,7 @@ impl<'a> Checker<'a> {
             (Some(first), Some(second)) => {
                 let [first, second] = [first, second].map(|kind| key_of(kind).unwrap_or_default());
                 let key = dotted(path, second);
-                let refusal = self.source.refused(&key, format!("stands beside {first}"));
+                let refusal = self.source.refused(&key, format!("beside {first}"));
                 Err(refusal.or_hint("give one of them"))
             }
         }
@@ -373,7 +373,7 @@ impl<'a> Checker<'a> {
                 let names = path.split('.').map(|part| part.split('[').next());
                 let names: Vec<&str> = names.flatten().collect();
                 let name = names.join(".");
-                format!("there may be several: write [[{name}]], in double brackets")
+                format!("write [[{name}]], in double brackets")
             };
             // Tables, each under its own header; a list of numbers has none.
             let is_one = expected == "a list"

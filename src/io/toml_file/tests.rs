@@ -60,7 +60,7 @@ fn refusals_name_file_line_key_and_value() {
         ),
         (
             "count = 1\n[parts]\nx = 1\n",
-            "line 2: \"parts\" = [parts] is not a list | there may be several: write [[parts]], in double brackets",
+            "line 2: \"parts\" = [parts] is not a list | write [[parts]], in double brackets",
         ),
         (
             "count = 1\npart = 3\n",

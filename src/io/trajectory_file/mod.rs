@@ -205,7 +205,7 @@ fn add_covariances(path: &Path, rows: &mut [StatedRow]) -> Result<Option<String>
             let row = numbers(text)
                 .filter(|row| COUNTS.contains(&row.len()) && row.iter().all(|x| x.is_finite()));
             let row = row.ok_or_else(|| {
-                let message = "a time and 9, 36 or 81 finite numbers are expected";
+                let message = "expected a time and 9, 36 or 81 finite numbers";
                 Error::contents(&name, line, message)
             })?;
             found.push((row[0], line, of_matrix(&row[1..])));
@@ -232,7 +232,7 @@ fn add_covariances(path: &Path, rows: &mut [StatedRow]) -> Result<Option<String>
         let is_symmetric = (&block - block.transpose()).amax() <= 1e-6 * block.amax();
         if !is_symmetric || block.cholesky().is_none() {
             let message = "the covariance is not symmetric and positive definite";
-            let advice = "a time and the matrix row by row, variances of m², (m/s)² and rad² on its diagonal";
+            let advice = "write a time and the matrix row by row, variances of m², (m/s)² and rad² on its diagonal";
             return Err(Error::contents(&name, *line, message).or_hint(advice));
         }
     }
@@ -254,7 +254,7 @@ fn add_covariances(path: &Path, rows: &mut [StatedRow]) -> Result<Option<String>
     let span = found.first().zip(found.last());
     if let Some((first, last)) = span.filter(|_| 2 * matched < rows.len()) {
         let message = format!(
-            "times {} to {} s fit {matched} of the {} rows of the solution, {} to {} s",
+            "times {} to {} s match {matched} of the {} rows of the solution, {} to {} s",
             first.0,
             last.0,
             rows.len(),
@@ -445,7 +445,7 @@ impl Rows {
         Err(self.refuse(
             bad,
             message,
-            "is a value in the wrong column, or the row damaged?",
+            "a value in the wrong column, or a damaged row?",
         ))
     }
 
@@ -469,9 +469,8 @@ impl Rows {
             return Err(self.refuse(1, message, advice));
         }
         if last_s - first_s > MAX_DURATION_S {
-            let message =
-                format!("time goes from {previous_s} s to {t_s} s, and may span a day at most");
-            let advice = "is that time stamp damaged, on another clock, or in another unit?";
+            let message = format!("time goes from {previous_s} s to {t_s} s; at most a day");
+            let advice = "a damaged time stamp, another clock, or another unit?";
             return Err(self.refuse(longest, message, advice));
         }
         if longest_s > LONG_STEP_S.max(1.5 * median_s) {
@@ -544,7 +543,7 @@ fn rows(
             // front-right-down to front-left-up: a half turn
             let q_flu_enu = DQuat::from_array(quaternion.map(|column| column.si(row)));
             if (q_flu_enu.length() - 1.0).abs() > 0.01 {
-                let reason = "does not make a unit quaternion with the others";
+                let reason = "makes no unit quaternion with the others";
                 let (line, w) = (table.line(row), q_flu_enu.w);
                 return Err(Error::cell(path, line, "qw", w, reason));
             }
@@ -577,7 +576,7 @@ fn rows(
     }
     let unused = (!table.ignored.is_empty())
         .then(|| format!("columns not used: {}", table.ignored.join(", ")));
-    let axes = "axes taken as ROS has them: position east, north, up; body forward, left, up";
+    let axes = "axes of ROS: position east, north, up; body forward, left, up";
     let path = "no attitude columns: heading and pitch follow the path, roll is 0";
     rows.of_trajectory = unused
         .into_iter()
@@ -618,7 +617,7 @@ fn check_units(table: &Table) -> Result<(), Error> {
         .map(|column| column.name.to_lowercase())
         .collect();
     let names = names.join(", ");
-    let message = format!("the unit of {names} is not in the name, and no value exceeds 2π");
+    let message = format!("no unit in the name of {names}, and no value exceeds 2π");
     Err(table
         .refused(message)
         .or_hint("end the names in _deg or _rad"))
@@ -645,10 +644,13 @@ fn local_origin(table: &Table, given: Option<[f64; 3]>) -> Result<[f64; 3], Erro
     let line = table.comments.iter().find_map(|c| c.strip_prefix("origin"));
     line.and_then(|line| parse_origin(line.trim_start_matches([':', '=', ' '])))
         .ok_or_else(|| {
-            let message = "a trajectory in local coordinates needs an origin on the Earth";
+            let message = "local coordinates need an origin on the Earth";
             Error::contents(&table.path, Place::Within, message)
                 .or_option(("origin", "give --origin LAT_DEG,LON_DEG,H_M"))
-                .or_hint_without(("origin", "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M"))
+                .or_hint_without((
+                    "origin",
+                    "convert it: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M",
+                ))
                 .or_hint("a first line \"# origin: LAT_DEG, LON_DEG, H_M\"")
         })
 }
@@ -826,9 +828,8 @@ fn heading(rows: &Rows, trajectory: &Trajectory) -> Option<String> {
         .iter()
         .map(|(words, meant)| (off(*meant), words));
     let (best, words) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (given > 20.0 && best < 0.25 * given).then(|| {
-        format!("yaw is {given:.0}° from the course in the mean, {best:.1}° when read {words}")
-    })
+    (given > 20.0 && best < 0.25 * given)
+        .then(|| format!("yaw is {given:.0}° from the mean course, {best:.1}° when read {words}"))
 }
 
 // A recorded trajectory that is only compared with: what jumps is left out.
@@ -842,8 +843,9 @@ impl Rows {
         if self.samples.is_empty() {
             let left_out = self.doubts.first().cloned();
             let message = left_out.unwrap_or_else(|| format!("{}: no rows in it", self.path));
-            return Err(Error::input(message)
-                .hint("check units: angles are in degrees, or their names end in _rad"));
+            return Err(
+                Error::input(message).hint("check units: angles are in degrees, or named _rad")
+            );
         }
         let (mut stretches, mut seconds) = (Vec::new(), 0.0);
         let mut contradicted = None;
@@ -866,7 +868,7 @@ impl Rows {
         let parts = stretches.len();
         let Some(reference) = Reference::of_stretches(stretches) else {
             let whole = self.stretch(0..self.samples.len()).err();
-            let none = "no stretch of five seconds without a jump in position or attitude";
+            let none = "no five seconds without a jump in position or attitude";
             let none = || Error::contents(&self.path, Place::Within, none);
             return Err(refused.or(whole).unwrap_or_else(none));
         };
@@ -891,7 +893,7 @@ impl Rows {
             Trajectory::from_samples(samples).map_err(|source| {
                 let advice = match source {
                     E::Time { .. } => Some("remove repeated rows, sort by time, or split the file where the clock was set back"),
-                    E::Rotation { .. } => Some("is an angle in the wrong column or unit? A vehicle that turns so fast needs more rows"),
+                    E::Rotation { .. } => Some("an angle in the wrong column or unit? Such fast turns need more rows"),
                     E::TooFew { .. } => Some("give at least four rows, one a second or more"),
                     E::Latitude { .. } => Some("latitude and longitude cannot navigate at the poles; is a column swapped?"),
                     E::NotFinite { .. } => None,
@@ -953,7 +955,7 @@ mod import_tests {
         let e = nav("2016 1 2 3\n").unwrap_err();
         assert_eq!(
             e.to_string(),
-            "truth.nav, line 1: a header that names the columns is missing, found \"2016 1 2 3\""
+            "truth.nav, line 1: no header with column names, found \"2016 1 2 3\""
         );
     }
 
@@ -978,16 +980,13 @@ mod import_tests {
             "{rpy:?}"
         );
         let e = tum("a.tum", &text, None).unwrap_err();
-        assert!(
-            e.to_string().contains("needs an origin on the Earth"),
-            "{e}"
-        );
+        assert!(e.to_string().contains("need an origin on the Earth"), "{e}");
         let e = tum("a.tum", "0 0 0 0 0 0 0 2\n", options)
             .unwrap_err()
             .to_string();
         assert_eq!(
             e,
-            "a.tum, line 1: column \"qw\": 2 does not make a unit quaternion with the others"
+            "a.tum, line 1: column \"qw\": 2 makes no unit quaternion with the others"
         );
     }
 }
@@ -1046,7 +1045,7 @@ fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
     }
     rows.doubt(
         None,
-        "GPX: heading and pitch follow the path, roll is 0; elevations are taken as ellipsoidal heights",
+        "GPX: heading and pitch follow the path, roll is 0; elevations count as ellipsoidal heights",
     );
     Ok(rows)
 }

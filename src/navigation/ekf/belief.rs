@@ -36,9 +36,7 @@ pub(super) const MAX_BLOCKS: usize = MAX_GROUPS + 1 + KINDS;
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum BeliefError {
     /// More bias states than the filter carries.
-    #[error(
-        "{channel}: more than {MAX_GROUPS} correlated processes; use the reduced filter (15 states)"
-    )]
+    #[error("{channel}: more than {MAX_GROUPS} correlated processes; use the 15-state filter")]
     TooManyStates {
         /// The axis that carries them.
         channel: Channel,

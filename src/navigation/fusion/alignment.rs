@@ -86,7 +86,7 @@ pub fn coarse(
     }
     best.map(|best| scene.finished(best)).ok_or_else(|| {
         Refused(format!(
-            "no IMU samples after the first moving fix at {first_s:.2} s to level with"
+            "no IMU samples for levelling after the first moving fix at {first_s:.2} s"
         ))
     })
 }
@@ -113,7 +113,7 @@ pub fn towards(
     };
     let start = (0..courses.len())
         .find_map(start_at)
-        .ok_or_else(|| Refused("no fix with IMU samples around it to level with".to_owned()))?;
+        .ok_or_else(|| Refused("no fix with IMU samples around it for levelling".to_owned()))?;
     let agreement = scene.agreement(&start, TRIAL_S);
     Ok(scene.finished(StartCandidate {
         start,

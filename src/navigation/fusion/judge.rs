@@ -404,8 +404,8 @@ const TRANSFORMATIONS: [Transformation; 16] = {
     const fn variance(block: usize, cause: &'static str) -> Transformation {
         Transformation { block, cause, truth: as_it_is, sigma: f64::sqrt, is_uneven: true }
     }
-    const RADIANS: &str = "attitudes are radians under a name of degrees";
-    const DEGREES: &str = "attitudes are degrees under a name of radians";
+    const RADIANS: &str = "attitudes are radians named degrees";
+    const DEGREES: &str = "attitudes are degrees named radians";
     const SPEEDS: &str = "velocities are km/h, not m/s";
     const OF_EAST: &str = "yaw is 90° − ψ, counted from east to north: write it from north to east";
     const REVERSED: &str = "yaw has the other sign: write it from north to east";
@@ -415,10 +415,10 @@ const TRANSFORMATIONS: [Transformation; 16] = {
         variance(2, "standard deviations of attitude are variances"),
         new(1, SPEEDS, |x| with_velocity(x, |v| v / KM_H), |s| s),
         new(1, SPEEDS, |x| with_velocity(x, |v| v / KM_H), |s| s / KM_H),
-        new(1, "velocities are east, north, up under names of north, east, down",
+        new(1, "velocities are east, north, up, named north, east, down",
             |x| with_velocity(x, |v| DVec3::new(v.y, v.x, -v.z)), |s| s),
-        new(2, "standard deviations of attitude are radians under a name of degrees", as_it_is, |s| s / DEG),
-        new(2, "standard deviations of attitude are degrees under a name of radians", as_it_is, |s| s * DEG),
+        new(2, "standard deviations of attitude are radians named degrees", as_it_is, |s| s / DEG),
+        new(2, "standard deviations of attitude are degrees named radians", as_it_is, |s| s * DEG),
         new(2, RADIANS, |x| with_angles(x, |all| all.map(|a| a * DEG)), |s| s),
         new(2, RADIANS, |x| with_angles(x, |all| all.map(|a| a * DEG)), |s| s * DEG),
         new(2, DEGREES, |x| with_angles(x, |all| all.map(|a| a / DEG)), |s| s),

@@ -62,7 +62,7 @@ pub struct Summary {
     pub require: Vec<RequirementResult>,
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands references")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serialises")]
 fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }

@@ -48,7 +48,7 @@ pub fn run(
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Vec<RunResult>, ExperimentError> {
     let results = run_range(&Plan::new(experiment)?, 0, runs, &|| true, progress);
-    Ok(results.expect("nothing stops it"))
+    Ok(results.expect("unstoppable"))
 }
 
 /// Runs `first..first + runs` of a planned experiment; `None` if `go_on`, asked before each batch of eight,

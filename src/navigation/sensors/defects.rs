@@ -250,7 +250,7 @@ impl Temperature {
     fn validate(&self) -> Result<(), SettingError> {
         let key = "profile_c";
         if self.profile_c.len() < 2 {
-            let requirement = "it must be two pairs of time (s) and temperature (°C), or more";
+            let requirement = "expected two pairs of time (s) and temperature (°C), or more";
             return Err(SettingError::new(
                 key,
                 format!("{:?}", self.profile_c),

@@ -28,7 +28,7 @@ pub enum TruthError {
     #[error(transparent)]
     Refused(#[from] Refused),
     /// A recording of another rate than the IMU's.
-    #[error("{recording} was sampled at {rate_hz} Hz, the simulated IMU runs at {imu_hz} Hz")]
+    #[error("{recording} was sampled at {rate_hz} Hz, the simulated IMU at {imu_hz} Hz")]
     Rate {
         /// Name of the recording.
         recording: String,
@@ -62,18 +62,18 @@ impl Truth<'_> {
         let check_model = |model: &Model| match same_rate(model.rate_hz, imu_hz) {
             true => Ok(()),
             false => refused(format!(
-                "the model of the truth belongs to {} Hz, the simulated IMU runs at {imu_hz} Hz",
+                "the model of the truth is at {} Hz, the simulated IMU at {imu_hz} Hz",
                 model.rate_hz
             )),
         };
         match self {
             Self::Model(model) => check_model(model),
-            Self::Drawn([]) => refused("no model drawn"),
+            Self::Drawn([]) => refused("draw"),
             Self::Drawn(models) => {
                 let labels = |model: &Model| model.axes.each_ref().map(Composite::labels);
                 let first = labels(&models[0]);
                 if models.iter().any(|model| labels(model) != first) {
-                    return refused("the models drawn do not have the same processes");
+                    return refused("the drawn models differ in their processes");
                 }
                 models.iter().try_for_each(check_model)
             }
@@ -105,7 +105,7 @@ fn check_recording(recording: &Recording, imu_hz: f64, needs: usize) -> Result<(
         .find(|c| recording.signal(*c).is_none())
     {
         return refused(format!(
-            "{}: channel {channel} is missing; all six are needed, in one file",
+            "{}: no channel {channel}; all six are needed, in one file",
             recording.name
         ));
     }
@@ -378,13 +378,13 @@ mod tests {
         );
         assert_eq!(
             refused(recording(50.0, 600)),
-            "r.csv was sampled at 50 Hz, the simulated IMU runs at 100 Hz"
+            "r.csv was sampled at 50 Hz, the simulated IMU at 100 Hz"
         );
         let mut partial = recording(100.0, 600);
         partial.signals.remove(4);
         assert_eq!(
             refused(partial),
-            "r.csv: channel gyro.y is missing; all six are needed, in one file"
+            "r.csv: no channel gyro.y; all six are needed, in one file"
         );
         assert!(Truth::Static(&[]).check(100.0, 1).is_err());
     }

@@ -25,7 +25,7 @@ pub(crate) fn normal(generator: &mut Generator) -> f64 {
 pub(crate) fn check_bounds<T: JsonSchema + Serialize>(settings: &T) -> Result<(), SettingError> {
     let root = schema_for!(T).to_value();
     // TOML holds what JSON does not: numbers that are infinite or none.
-    let value = toml::Value::try_from(settings).expect("settings have a form in files");
+    let value = toml::Value::try_from(settings).expect("serialises");
     check(&root, &root, &value, "")
 }
 
@@ -36,7 +36,7 @@ fn check(
     key: &str,
 ) -> Result<(), SettingError> {
     if let Some(place) = schema["$ref"].as_str() {
-        let schema = root.pointer(&place[1..]).expect("a schema is whole");
+        let schema = root.pointer(&place[1..]).expect("schema");
         return check(schema, root, value, key);
     }
     if let Some(kinds) = schema["anyOf"].as_array() {

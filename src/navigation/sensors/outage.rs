@@ -407,7 +407,7 @@ impl OutagePlan {
         // Every fixed window lies on the data by now: fewer windows than were asked for can only come of a
         // union.
         if self.fixed.len() > windows.len() {
-            remarks.push("outages that overlap or touch are made one".to_owned());
+            remarks.push("overlapping outages are merged".to_owned());
         }
         if let Some(first_s) = self
             .periodic

@@ -134,7 +134,7 @@ fn outages_that_are_not_as_asked_for_are_remarked() {
         ..OutagePlan::default()
     };
     let common = [
-        "outages that overlap or touch are made one",
+        "overlapping outages are merged",
         "outage_periodic.first_s = 100 s: the trajectory ends at 100 s",
     ];
     let found = remarks(plan.clone(), Fixes::Every { interval_s: 1.0 });

@@ -203,7 +203,7 @@ fn along_reference(plan: &Plan<'_>, belief: &Belief) -> SharedFilter {
         ekf.gains = GainSource::Kept(Vec::new());
         let _ = measure(&mut ekf, plan, &LaneMeasurements::exact(plan, event));
         let GainSource::Kept(updates) = std::mem::take(&mut ekf.gains) else {
-            unreachable!("they were kept")
+            unreachable!("kept")
         };
         SharedEvent {
             before,

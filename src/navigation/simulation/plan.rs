@@ -57,7 +57,7 @@ impl Experiment<'_> {
     /// The quantile of the coverage statistic: a filter believes in a chi-square law.
     pub(crate) fn coverage_quantile(&self) -> f64 {
         let chi2 = ChiSquared::new(super::COVERAGE_DOF as f64);
-        let chi2 = chi2.expect("degrees of freedom are positive");
+        let chi2 = chi2.expect("positive");
         chi2.inverse_cdf(self.coverage_level)
     }
 }
@@ -130,7 +130,7 @@ impl<'a> Plan<'a> {
         for belief in experiment.beliefs {
             if !same_rate(belief.rate_hz, rate_hz) {
                 return refused(format!(
-                    "the filter's model belongs to {} Hz, the IMU runs at {rate_hz} Hz",
+                    "the filter's model is at {} Hz, the IMU at {rate_hz} Hz",
                     belief.rate_hz
                 ));
             }
@@ -214,7 +214,7 @@ pub(super) fn check_rotation(
     let t_s = experiment.trajectory.start_s() + index as f64 / rate_hz;
     let (angle, most) = (angle / DEG, MAX_ROTATION / DEG);
     refused(format!(
-        "the vehicle turns {angle:.1}° within one IMU sample at {t_s} s; at most {most:.1}° can be followed at {rate_hz} Hz"
+        "the vehicle turns {angle:.1}° within one IMU sample at {t_s} s; at most {most:.1}° at {rate_hz} Hz"
     ))
 }
 
@@ -264,7 +264,7 @@ pub(super) fn schedule(
         let reference = trajectory.state(t_s);
         if reference.lat.abs() > MAX_LATITUDE {
             return refused(format!(
-                "the trajectory reaches latitude {}° at {t_s} s; beyond ±89.9° it cannot be navigated in latitude and longitude",
+                "the trajectory reaches latitude {}° at {t_s} s, beyond ±89.9°",
                 reference.lat / DEG
             ));
         }
@@ -389,8 +389,7 @@ fn check_sideslip(experiment: &Experiment<'_>, events: &[Event]) -> Result<(), E
         return Ok(());
     }
     refused(format!(
-        "aiding.nhc.sigma_m_s = {}: the reference itself moves sideways and up with {rms_m_s:.2} m/s (root mean square of each) \
-         at this point, more than 0.3 of it: set lever_arm_m to the rear axle of a car, or a larger sigma",
+        "aiding.nhc.sigma_m_s = {}: the reference itself moves sideways and up with {rms_m_s:.2} m/s (rms) at this point, over 0.3 of it: set lever_arm_m to the rear axle, or a larger sigma",
         nhc.sigma_m_s
     ))
 }

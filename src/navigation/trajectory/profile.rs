@@ -286,7 +286,7 @@ impl Problem {
 
     /// Something that only a moving vehicle can do.
     fn at_rest(key: &'static str) -> Self {
-        Self::new(key, "needs a moving vehicle, but it stands still here")
+        Self::new(key, "needs a moving vehicle, which stands still here")
             .advise("put an accelerate segment before it, or give the start a speed_m_s")
     }
 }
@@ -494,7 +494,7 @@ impl<'a> Path<'a> {
         }
         let total_s = self.t_s + duration - self.profile.start.t_s;
         if total_s > MAX_DURATION_S {
-            let text = format!("makes the trajectory {total_s:.3e} s long: more than a day");
+            let text = format!("makes the trajectory {total_s:.3e} s long: over a day");
             return Err(Problem::new("duration_s", text));
         }
         self.integrate(&piece);

@@ -260,19 +260,19 @@ fn what_cannot_be_followed_is_refused() {
     let straight_s = |s| straight(Length::Duration(s));
     assert_eq!(
         refused(1.0, straight_s(1e300)),
-        "segment 1: \"duration_s\" makes the trajectory 1.000e300 s long: more than a day"
+        "segment 1: \"duration_s\" makes the trajectory 1.000e300 s long: over a day"
     );
     assert_eq!(
         refused(2.0, straight(Length::Distance(1e300))),
-        "segment 1: \"distance_m\" makes the trajectory 5.000e299 s long: more than a day"
+        "segment 1: \"distance_m\" makes the trajectory 5.000e299 s long: over a day"
     );
     assert_eq!(
         refused(0.0, straight(Length::Distance(5.0))),
-        "segment 1: \"distance_m\" needs a moving vehicle, but it stands still here"
+        "segment 1: \"distance_m\" needs a moving vehicle, which stands still here"
     );
     assert_eq!(
         refused(0.0, turn(10.0, Turning::Radius(5.0))),
-        "segment 1: \"radius_m\" needs a moving vehicle, but it stands still here"
+        "segment 1: \"radius_m\" needs a moving vehicle, which stands still here"
     );
     assert_eq!(
         refused(

@@ -1,8 +1,5 @@
 //! Eight lanes in the registers of the machine, chosen at run time.
-#![allow(
-    unsafe_code,
-    reason = "vector instructions, used only after the processor was asked for them"
-)]
+#![allow(unsafe_code, reason = "checked vector instructions")]
 
 use super::{LANES, Lanes, Real};
 

@@ -206,8 +206,7 @@ impl AllanCurve {
             from_s >= shortest_s * (1.0 - 1e-9) && to_s >= 4.0 * from_s && to_s <= longest_s;
         if !usable {
             return Err(Refused(format!(
-                "the horizon {from_s} s to {to_s} s is refused: at {rate_hz} Hz it must begin at {shortest_s} s or \
-                 later, span a factor of four and end below {longest_s:.0} s"
+                "the horizon {from_s} s to {to_s} s is refused: at {rate_hz} Hz it must begin at {shortest_s} s or later, span a factor of four and end below {longest_s:.0} s"
             )));
         }
         let point = |samples| point(axes, samples);

@@ -633,7 +633,7 @@ impl Process {
                 amplitude * ((n - 1.0) * inner + 1.0 + theta * theta) / (n * n)
             }
             Kind::Ar1 | Kind::GaussMarkov => {
-                let [phi, _, variance] = self.recursion().expect("an AR1 or GM is a recursion");
+                let [phi, _, variance] = self.recursion().expect("recursion");
                 variance * ar1::mean_shape(phi, n)
             }
         }

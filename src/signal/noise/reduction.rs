@@ -36,8 +36,7 @@ pub enum ReductionError {
     Parameter(#[from] ParameterError),
     /// Fewer than three scales between the GNSS interval and the window.
     #[error(
-        "fixes {interval_s} s apart are too rare to reduce the model over the scales up to {window_s} s: at most \
-         {longest_interval_s:.1} s apart, they leave the three that it needs"
+        "fixes {interval_s} s apart are too rare to reduce the model over scales up to {window_s} s: at most {longest_interval_s:.1} s"
     )]
     TooFewScales {
         /// GNSS interval (s).
@@ -130,7 +129,7 @@ impl WaveletFit {
             self.start(-log2_tau * std::f64::consts::LN_2)
         });
         let best = starts.min_by(|a, b| self.cost(a).total_cmp(&self.cost(b)));
-        self.polish(best.expect("the grid has 60 starts"))
+        self.polish(best.expect("grid"))
     }
 
     /// The two variances for a given kappa: linear least squares of the relative misfit, both kept

@@ -147,7 +147,7 @@ impl Variation {
         };
         for end in ends {
             if let Err(e) = noise.clone().set(of, end) {
-                let message = format!("the law reaches values that are refused: {e}");
+                let message = format!("the distribution reaches refused values: {e}");
                 return refused("distribution", message);
             }
         }
@@ -178,7 +178,7 @@ impl Variation {
             Law::Normal { sd } => check("sd", sd, sd >= 0.0, "a finite number ≥ 0"),
             Law::Lognormal { .. } if self.of.parameter == Parameter::Theta => refused(
                 "distribution",
-                "theta has no logarithm: a lognormal law is of variances, slopes, phi and beta",
+                "theta has no logarithm: lognormal is for variances, slopes, phi and beta",
             ),
             Law::Lognormal { median, sd, .. } => {
                 check("median", median, median > 0.0, "a finite number > 0")?;
@@ -200,7 +200,7 @@ impl Variation {
         loop {
             let value = match self.law {
                 Law::Beta { a, b, low, width } => {
-                    let share = Beta::new(a, b).expect("shapes > 0, by Variation::new");
+                    let share = Beta::new(a, b).expect("shapes");
                     low + width * g.sample(share)
                 }
                 Law::Normal { sd } => centre + sd * g.sample::<f64, _>(StandardNormal),

@@ -173,6 +173,6 @@ fn impossible_laws_are_refused_in_words() {
     assert!(refusal("AR1", "phi", lognormal(1.5, 0.1)).contains("phi = 1.5 is not between"));
     assert_eq!(
         refusal("AR1", "phi", beta(1.0, 0.5, 0.5)),
-        "the law reaches values that are refused: AR1: phi = 1 is not between −1 and 1 (exclusive)"
+        "the distribution reaches refused values: AR1: phi = 1 is not between −1 and 1 (exclusive)"
     );
 }

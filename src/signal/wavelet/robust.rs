@@ -599,7 +599,7 @@ pub struct Tuning {
 
 impl Default for Tuning {
     fn default() -> Self {
-        Self::new(Self::DEFAULT_EFFICIENCY).expect("an efficiency in the range")
+        Self::new(Self::DEFAULT_EFFICIENCY).expect("range")
     }
 }
 

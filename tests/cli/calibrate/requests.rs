@@ -31,7 +31,7 @@ fn files_that_are_no_tables_are_refused_as_such() {
         (&["plain.csv.gz"], "plain.csv.gz: ", "not gzipped"),
         (
             &["feet.csv"],
-            "feet.csv, line 1: column \"accel_x_ft_s2\" is in a unit that is not known",
+            "feet.csv, line 1: column \"accel_x_ft_s2\" is in an unknown unit",
             "_m_s2, _g, _mg",
         ),
         (
@@ -81,7 +81,7 @@ fn bad_requests_are_refused_with_a_hint() {
     check(
         calibrate(&["--trim", "2"], 2),
         &[
-            "gyro, dr-awv: trimming 2 replicates at each end needs at least 5 replicates; there are 4",
+            "gyro, dr-awv: a trim of 2 at each end needs 5 replicates; there are 4",
             "hint:",
         ],
     );
@@ -111,7 +111,7 @@ fn bad_requests_are_refused_with_a_hint() {
     let before = std::fs::read(dir.path().join("runs/run0.csv")).unwrap();
     check(
         calibrate(&["-o", "runs/run0.csv"], 2),
-        &["is an input of this command and would be overwritten"],
+        &["is an input and would be overwritten"],
     );
     check(
         refusal(dir.path(), &["wv", "runs", "-o", "runs/run0.csv"], 2),
@@ -236,14 +236,16 @@ fn what_was_drawn_is_recorded_and_copies_are_refused() {
     };
     let (said, scales) = said_and_scales();
     assert!(
-        said.contains("run2.csv: its 599 samples have 8 scales, half of the recordings have 13; the average has 13"),
+        said.contains(
+            "run2.csv: 599 samples have 8 scales, most recordings 13; the average has 13"
+        ),
         "{said}"
     );
     assert_eq!(scales, 13);
     std::fs::remove_file(dir.path().join("runs/run1.csv")).unwrap();
     let (said, scales) = said_and_scales();
     assert!(
-        said.contains("run2.csv: its 599 samples have 8 scales, half of the recordings have 13; the average has 8"),
+        said.contains("run2.csv: 599 samples have 8 scales, most recordings 13; the average has 8"),
         "{said}"
     );
     assert_eq!(scales, 8);

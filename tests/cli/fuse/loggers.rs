@@ -232,7 +232,7 @@ fn files_of_other_kinds_are_named() {
         "rec/gnss.csv",
         nmea,
         "",
-        &["gnss.csv, line 2: a sentence whose checksum is wrong"],
+        &["gnss.csv, line 2: wrong checksum"],
     );
     let gpx = |_: &str| "<?xml version=\"1.0\"?>\n<gpx><trk/></gpx>\n".to_owned();
     refused(

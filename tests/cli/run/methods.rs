@@ -555,6 +555,6 @@ fn a_spread_that_is_not_there_or_cannot_be_analysed_is_refused() {
     refused(
         "run drive.toml imu.toml --spread --seed 1",
         2,
-        "imu.toml: no [spread] to draw parameters from",
+        "imu.toml: no [spread] to draw from",
     );
 }

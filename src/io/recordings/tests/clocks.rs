@@ -130,7 +130,7 @@ fn rates() {
     );
     assert_eq!(
         refusal("gyro_x_rad_s\n1\n2\n"),
-        "a.csv: no time column, and no rate is given"
+        "a.csv: no time column, and no rate given"
     );
     // Stamps rounded to 1 ms at 128 Hz: the span knows the rate, no single step does.
     let rounded: String = (0..1000)

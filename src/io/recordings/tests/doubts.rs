@@ -26,7 +26,7 @@ fn doubts_are_told() {
     );
     assert_eq!(
         warnings(&format!("t_s,gyro_x_rad_s,b\n{}", rows(10.0)), &plain),
-        ["0.1 Hz is no usual rate of an IMU: is the unit of \"t_s\" right?"]
+        ["0.1 Hz is an unusual IMU rate: is the unit of \"t_s\" right?"]
     );
     // A stretch of 30 beside one of 969 would cost all the long scales.
     let gap = |k: usize| k as f64 * 0.01 + if k >= 970 { 1.0 } else { 0.0 };
@@ -67,7 +67,7 @@ fn a_rate_beside_that_of_the_time_column_is_told() {
     let found = report(100.9);
     assert_eq!(
         found.warnings,
-        ["100.9 Hz is given, but the file runs at 100 Hz: the rate given is taken"]
+        ["100.9 Hz as given, although the file has 100 Hz"]
     );
     assert_eq!(
         (found.rate_hz, found.rate_from.as_str()),

@@ -199,7 +199,7 @@ fn rows_that_are_no_measurements_are_left_out_and_counted() {
     let (copied, said) = kept(&table(stamps, &twice), None);
     assert_eq!(
         said,
-        ["6000 rows are copies of the row before, stamp and values: left out"]
+        ["6000 rows copy the row before, stamp and values: left out"]
     );
     assert_eq!((copied.rate_hz, copied.len()), (100.0, 6000));
 
@@ -373,7 +373,7 @@ fn a_knock_a_dead_band_and_a_misspelt_column_are_told() {
     knocked[3050..3060].iter_mut().for_each(|row| row[2] += 3.0);
     assert_eq!(
         kept(&at(100.0, &knocked), None).1,
-        ["moves in 2 of its 60 seconds, or was knocked"]
+        ["moves in 2 of 60 seconds, or was knocked"]
     );
     let mut dead = rows(8, 6000);
     for x in dead.iter_mut().map(|row| &mut row[5]) {
@@ -381,7 +381,7 @@ fn a_knock_a_dead_band_and_a_misspelt_column_are_told() {
     }
     let said = kept(&at(100.0, &dead), None).1;
     assert!(
-        said[0].contains("of gyro.z is exactly 0, which its step does not explain"),
+        said[0].contains("of gyro.z is exactly 0, more than its step explains"),
         "{said:?}"
     );
     let slip = at(100.0, &rows(9, 600)).replace("gyro_y", "gryo_y");
@@ -407,7 +407,7 @@ fn a_knock_a_dead_band_and_a_misspelt_column_are_told() {
 fn copied_axes_and_exchanged_sensors_are_told() {
     let mut copied = rows(13, 6000);
     copied.iter_mut().for_each(|row| row[4] = row[3]);
-    let text = "gyro.y has the samples of gyro.x: one axis was written twice";
+    let text = "gyro.y repeats gyro.x: one axis was written twice";
     assert_eq!(kept(&at(100.0, &copied), None).1, [text]);
     let degrees: Vec<[f64; 6]> = rows(14, 6000)
         .iter()

@@ -16,15 +16,15 @@ fn gravity_tells_wrong_units() {
     let message = |text| refusal_with("a.csv", text, &at_100_hz()).0;
     assert_eq!(
         message(six_axes(1.0 / STANDARD_GRAVITY, "_m_s2")),
-        "a.csv: static |f| is 1.0003 m/s², far from 9.81 m/s²: it looks like g"
+        "a.csv: static |f| is 1.0003 m/s², not 9.81 m/s²: it looks like g"
     );
     assert_eq!(
         message(six_axes(1.0, "_g")),
-        "a.csv: static |f| is 96.1954 m/s², far from 9.81 m/s²: it looks like m/s² named g"
+        "a.csv: static |f| is 96.1954 m/s², not 9.81 m/s²: it looks like m/s² named g"
     );
     assert_eq!(
         message(six_axes(0.5, "_m_s2")),
-        "a.csv: static |f| is 4.9046 m/s², far from 9.81 m/s²: wrong unit, or the sensor was moving"
+        "a.csv: static |f| is 4.9046 m/s², not 9.81 m/s²: wrong unit, or moving"
     );
     // A mean removed before is no gravity at all.
     read_one("a.csv", six_axes(0.0, "_m_s2"), &at_100_hz()).unwrap();

@@ -51,7 +51,7 @@ fn units_below_the_names_are_theirs() {
     assert_close(&[recording.rate_hz], &[100.0]);
     assert_eq!(
         refusal("t_s,gyro_x\ns,turns/s\n0,1\n0.01,2\n"),
-        "a.csv, line 1: column \"gyro_x turns/s\" is in a unit that is not known"
+        "a.csv, line 1: column \"gyro_x turns/s\" is in an unknown unit"
     );
     assert_eq!(
         refusal("t_s,gx_dps\ns,deg/s\ns,deg/s\n0,1\n"),
@@ -71,7 +71,7 @@ fn a_header_in_iso_8859_1_has_its_units() {
     assert_close(&samples_with_mean(&recording.signals[1]), &[DEG, 2.0 * DEG]);
     assert_eq!(
         report.assumptions,
-        ["header not in UTF-8, taken as ISO-8859-1"]
+        ["header not in UTF-8, read as ISO-8859-1"]
     );
 }
 
@@ -145,8 +145,8 @@ fn files_named_after_their_sensor_are_read() {
     let [without, other] = &report.warnings[..] else {
         panic!("{:?}", report.warnings);
     };
-    assert!(without.ends_with("Accelerometer.csv: passed over, it is without gravity"));
-    assert!(other.ends_with("Gravity.csv: passed over, no column is a known one"));
+    assert!(without.ends_with("Accelerometer.csv: skipped, it is without gravity"));
+    assert!(other.ends_with("Gravity.csv: skipped, no column is a known one"));
     let refusal = read(&[estimate], &ReadOptions::default()).unwrap_err();
     assert_eq!(refusal.advice().unwrap(), "name TotalAcceleration.csv");
 

@@ -66,7 +66,7 @@ fn profiles_are_refused_with_line_key_and_hint() {
     );
     assert_eq!(
         segment("kind = \"straight\"\nduration_s = 3\ndistance_m = 4").0,
-        "p.toml, line 9: \"segment[1].distance_m\" = 4 stands beside duration_s"
+        "p.toml, line 9: \"segment[1].distance_m\" = 4 beside duration_s"
     );
     assert_eq!(
         segment("kind = \"straight\"").0,

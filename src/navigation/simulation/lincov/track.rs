@@ -752,7 +752,7 @@ impl Step {
     fn joined(leg: &[Self]) -> Self {
         let mut steps = leg.iter().cloned();
         let joined = steps.by_ref().reduce(|step, next| step.of_means(&next));
-        joined.expect("a leg has steps")
+        joined.expect("steps")
     }
 
     /// Covariances for unit white noise in each sample over steps that have none of their own: through the mean of all it
@@ -1277,7 +1277,7 @@ impl Sides {
             .inputs
             .iter()
             .find(|(samples, _)| *samples == step.samples);
-        &found.expect("every length of the track is there").1
+        &found.expect("lengths").1
     }
 }
 

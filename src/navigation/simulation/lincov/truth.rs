@@ -325,9 +325,7 @@ pub fn weak_heading(while_fixed: impl Iterator<Item = (f64, f64)>) -> Option<Str
         "over 180°".to_owned()
     };
     Some(format!(
-        "the heading is hardly observable: its standard deviation is {sigma} after {after_s:.0} s although there are \
-         fixes (horizontal accelerations are too small to show it); there the filter's sigma of yaw may be \
-         several times too small, with any number of states"
+        "the heading is hardly observable: sigma of yaw is {sigma} after {after_s:.0} s of fixes (horizontal accelerations are too small); it may be several times too small, with any number of states"
     ))
 }
 
