@@ -57,6 +57,10 @@ pub(crate) fn run(args: &DemoArgs, session: &Session) -> Result<(), Failure> {
     let force = session.common.force;
     let page = out.join("report.html");
     let _page = atomic::claim_file(&page, ".html", [])?;
+    // The study at the end would refuse another command's directory, after minutes.
+    if !study.exists() {
+        atomic::guard_others(&out.join("manifest.json"), "manifest.json")?;
+    }
     let there = std::fs::read_to_string(&study).unwrap_or_else(|_| text.clone());
     if there != text && !(force && there.starts_with(HEAD)) {
         let message = format!("{} belongs to another demo", study.display());

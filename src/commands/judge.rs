@@ -178,7 +178,7 @@ fn summary(judgement: &Judgement, outages: &[(f64, f64)]) -> serde_json::Value {
 }
 
 /// Whatever else explains the errors, in a sentence with what to do.
-fn doubt(doubt: &SetupFault) -> String {
+pub(crate) fn setup_fault(doubt: &SetupFault) -> String {
     match doubt {
         SetupFault::Apart { metres } => format!(
             "solution and reference are {} m apart: another origin, swapped latitude and longitude, or another drive",
@@ -227,7 +227,7 @@ fn lines(judgement: &Judgement, outages: &[(f64, f64)]) -> Vec<String> {
     if judgement.doubts.is_empty() {
         return vec![own];
     }
-    let mut lines: Vec<String> = judgement.doubts.iter().map(doubt).collect();
+    let mut lines: Vec<String> = judgement.doubts.iter().map(setup_fault).collect();
     lines[0] = format!("{}: {}", judgement.kind, lines[0]);
     let without = judgement.without_offset.as_ref();
     lines.extend(without.map(|s| {
@@ -265,7 +265,7 @@ fn page(judgement: &Judgement, outages: &[(f64, f64)]) -> Document {
     {
         let text = format!(
             "{}: less than the solution states",
-            doubt(&SetupFault::Offset(found))
+            setup_fault(&SetupFault::Offset(found))
         );
         document.note(Importance::Remark, text);
     }

@@ -416,7 +416,18 @@ impl Study {
     pub(crate) fn cells(&self, beside: &Path) -> Result<Vec<StudyCell>> {
         let mut requests = vec![(Labels::new(), self.run.clone())];
         for (axis, values) in &self.vary {
-            let values = named(axis, values).map_err(|e| self.at(&format!("vary.{axis}"), e))?;
+            let values = named(axis, values).and_then(|values| {
+                let places = self.run.values().chain(self.vary.values());
+                let is_named = places.into_iter().any(|value| uses(value, axis));
+                match is_named || values.iter().any(|(_, keys)| !keys.is_empty()) {
+                    true => Ok(values),
+                    false => refused(
+                        format!("\"vary.{axis}\" changes nothing"),
+                        format!("write {{{axis}}} in a value of [run], or the list as run.{axis}"),
+                    ),
+                }
+            });
+            let values = values.map_err(|e| self.at(&format!("vary.{axis}"), e))?;
             let product = |(labels, run): &(Labels, Table)| -> Vec<(Labels, Table)> {
                 let with = |(label, keys): &(String, Table)| {
                     let mut run = run.clone();
@@ -715,6 +726,16 @@ fn named(axis: &str, values: &Value) -> Result<Vec<(String, Table)>> {
         Err(refused("is empty"))
     } else {
         Ok(values)
+    }
+}
+
+/// True if a value holds `{axis}`.
+fn uses(value: &Value, axis: &str) -> bool {
+    match value {
+        Value::String(text) => text.contains(&format!("{{{axis}}}")),
+        Value::Array(list) => list.iter().any(|one| uses(one, axis)),
+        Value::Table(table) => table.values().any(|one| uses(one, axis)),
+        _ => false,
     }
 }
 

@@ -164,6 +164,15 @@ impl Calibration {
         for outcome in fits {
             let reasons = outcome.ranking.iter().flat_map(reasons);
             let name = fit_name(outcome, fits);
+            if let Some(a) = outcome.axes_differ.filter(|a| a.ratio > OTHER_UNIT) {
+                let text = format!(
+                    "{} has up to {} times the wavelet variance of {}: in another unit?",
+                    a.largest,
+                    readable(a.ratio),
+                    a.smallest
+                );
+                note(Importance::Warning, &name, text);
+            }
             for text in reasons.chain(fit_notes(outcome, settings)) {
                 note(Importance::Remark, &name, text);
             }
@@ -412,6 +421,9 @@ fn fit_name(outcome: &Outcome, outcomes: &[Outcome]) -> String {
     }
 }
 
+/// Ratio of wavelet variances of two axes above which one may be in another unit: half of (m/s²)² in g², 96, the smallest
+/// square of a usual conversion.
+const OTHER_UNIT: f64 = 48.0;
 /// An amplitude known to no better than this factor, either way, is told.
 const FACTOR: f64 = 3.0;
 /// The wavelet variance of an AR1 peaks at this many correlation times.

@@ -1,6 +1,7 @@
 //! A fusion as a document: verdict, figures, track, errors, innovations.
 
 use super::{FuseAnswer, InnovationCause};
+use crate::commands::judge::setup_fault;
 use crate::report::trajectory::track_map;
 use crate::report::verdict::{deciding, drive_line};
 use crate::report::{error_charts, reduction_doubt, reduction_line, tone};
@@ -123,13 +124,17 @@ impl FuseAnswer {
     }
 
     /// Advice for an overconfident solution.
-    pub(crate) fn advice(&self) -> &'static str {
+    pub(crate) fn advice(&self) -> String {
         let outcome = &self.summary.outcome;
-        if outcome.reference.is_some() && outcome.nis_per_component < 1.0 {
+        if let Some(fault) = self.reference_faults.first() {
+            return setup_fault(fault);
+        }
+        let advice = if outcome.reference.is_some() && outcome.nis_per_component < 1.0 {
             "the reference may have other axes or another clock"
         } else {
             "check axes (--mounting), units, start (--initial), clocks (--gnss-delay), antenna (--lever-arm) and stated deviations of the fixes (--gnss-sigma)"
-        }
+        };
+        advice.to_owned()
     }
 
     /// `0–900 s, 90000 IMU samples at 100.00 Hz, 15 states`

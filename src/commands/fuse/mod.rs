@@ -12,11 +12,13 @@ use crate::io::trajectory_file::load_reference;
 use crate::parse::{numbers, pair, positive};
 use crate::report::json;
 use glam::{DMat3, DQuat, DVec3};
+use nalgebra::SMatrix;
 use nav_sim_document::{Document, shortest, window};
 use nav_sim_navigation::earth::{GravityModel, radii};
 use nav_sim_navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
 use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
+use nav_sim_navigation::fusion::judge::{ReferenceOffset, SetupFault, StatedRow, judge};
 use nav_sim_navigation::fusion::mounting::{self, Mounting};
 use nav_sim_navigation::fusion::{
     AlignmentSummary, ClocksApart, Correlation, Displaced, Finding, FixRecord, FusionAssessment,
@@ -411,6 +413,9 @@ pub struct FuseAnswer {
     /// Quality of the model reduced to the filter's states, where it loses something.
     #[serde(skip)]
     pub reduction: Option<ReductionQuality>,
+    /// Faults of the reference that would explain the errors.
+    #[serde(skip)]
+    pub reference_faults: Vec<SetupFault>,
     /// Settings, for the manifest.
     #[serde(skip)]
     configuration: Value,
@@ -451,12 +456,33 @@ impl<'a> RecordedDrive<'a> {
         for note in imu.remarks.into_iter().chain(remarks) {
             context.note(note.importance, note.text);
         }
+        let is_unused = |given: &FixSigma| {
+            let mut stated = gnss.iter().map(|fix| fix.pos_sigma_n / position);
+            stated.all(|sigma| (sigma - DVec3::from(given.pos_m)).length() > 1e-6 * sigma.length())
+        };
+        if unsaid.as_ref().is_some_and(is_unused) {
+            context.warn(
+                "--gnss-sigma is not used: the file states standard deviations; x2 doubles them",
+            );
+        }
         let wheel = request
             .odometer
             .as_deref()
             .map(read_wheel)
             .transpose()?
             .unwrap_or_default();
+        if let (Some(path), [first, .., last], Some((from_s, to_s))) =
+            (&request.odometer, &wheel[..], span)
+        {
+            let covered_s = last.t_s.min(to_s) - first.t_s.max(from_s);
+            if covered_s < 0.5 * (to_s - from_s) {
+                let (path, covered_s) = (path.display(), covered_s.max(0.0));
+                context.warn(format!(
+                    "{path} covers {covered_s:.1} s of {:.1} s: another clock or unit of time?",
+                    to_s - from_s
+                ));
+            }
+        }
         let initial = request
             .initial_file()
             .map(|path| read_initial(path))
@@ -550,7 +576,7 @@ impl<'a> RecordedDrive<'a> {
         let delay_s = self.request.gnss_delay_s + origin_s.unwrap_or(0.0) + rest_s;
         if origin_s.is_some() {
             context.warn(format!(
-                "clocks without overlap: fused with --gnss-delay={delay_s:.2}, from turns and innovations"
+                "clocks without overlap: fused with --gnss-delay={delay_s:.4}, from turns and innovations"
             ));
         }
         let aligned = match (&self.initial, self.request.given_heading()) {
@@ -659,13 +685,33 @@ impl<'a> RecordedDrive<'a> {
             withheld,
             outcome,
         };
+        let is_overconfident = kind == VerdictKind::Overconfident;
+        let reference = self.reference.as_ref().filter(|_| is_overconfident);
+        let faults = reference.map(|reference| reference_faults(&weighed.solution, reference));
         Ok(FuseAnswer {
+            reference_faults: faults.unwrap_or_default(),
             solution: weighed.solution,
             summary,
             reduction,
             configuration,
         })
     }
+}
+
+/// Faults of axes, units or heights between a solution and a reference. Its clock and point are for `judge`.
+fn reference_faults(solution: &Solution, reference: &Reference) -> Vec<SetupFault> {
+    let row = |row: &Row| StatedRow {
+        t_s: row.t_s,
+        state: row.state,
+        has: [true; 2],
+        covariance: SMatrix::from_diagonal(&row.sigma.map(|sigma| sigma * sigma).into()),
+        has_correlations: false,
+    };
+    let rows: Vec<StatedRow> = solution.rows.iter().map(row).collect();
+    let judgement = judge(&rows, reference, ReferenceOffset::default(), &[]);
+    let mut faults = judgement.map_or(Vec::new(), |judgement| judgement.doubts);
+    faults.retain(|fault| !matches!(fault, SetupFault::Offset(_)));
+    faults
 }
 
 /// Help where the mounting is not found.

@@ -77,10 +77,13 @@ fn check_unit(table: &Table, imu_s: Option<(f64, f64)>) -> Result<(), Failure> {
         let span_s = (t_s[t_s.len() - 1] - t_s[0]) * unit_s;
         (0.5..2.0).contains(&(span_s / (to_s - from_s)))
     };
-    match UNITS[1..].iter().find(is_meant).filter(|_| step > LONG_S) {
-        Some((_, unit)) => Err(no_seconds(table, time, step, unit)),
-        None => Ok(()),
-    }
+    let Some((factor, _)) = UNITS[1..].iter().find(is_meant).filter(|_| step > LONG_S) else {
+        return Ok(());
+    };
+    // The name may state a unit already, of which this is a fraction.
+    let unit_s = factor * time.factor.unwrap_or(1.0);
+    let unit = UNITS.iter().find(|(s, _)| (s / unit_s - 1.0).abs() < 0.1);
+    unit.map_or(Ok(()), |(_, unit)| Err(no_seconds(table, time, step, unit)))
 }
 
 /// The refusal of times in another unit than their name says.

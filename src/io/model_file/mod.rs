@@ -19,6 +19,7 @@
 
 use super::file_kind::FileKind;
 use super::recordings::facts;
+use super::recordings::timing::USUAL_RATES_HZ;
 use super::toml_file::{OneOrEach, TomlSource};
 use super::{Failure, atomic, file_kind};
 use crate::report::readable;
@@ -63,6 +64,21 @@ pub struct ModelFile {
     pub reading: Option<Box<Self>>,
 }
 
+/// Rates and correlation times that no IMU has, in words.
+fn unusual_times(model: &Model) -> impl Iterator<Item = String> {
+    let rate_hz = model.rate_hz;
+    let rate = (!USUAL_RATES_HZ.contains(&rate_hz))
+        .then(|| format!("rate_hz = {rate_hz} is an unusual IMU rate"));
+    let is_short =
+        |process: &&Process| process.kind() == Kind::GaussMarkov && process.shape() > rate_hz;
+    let mut processes = model.axes.iter().flat_map(|axis| &axis.processes);
+    let short = processes.find(is_short).map(|process| {
+        let beta = process.shape();
+        format!("GM with beta = {beta} 1/s: its correlation time 1/beta is below a sample")
+    });
+    rate.into_iter().chain(short)
+}
+
 impl ModelFile {
     /// Model for navigation: axes with a reading of the curve use it in place of their processes.
     #[must_use]
@@ -96,12 +112,15 @@ impl ModelFile {
         let unsaid = |channel: &Channel| {
             format!("{shown} has no noise model for {channel}: taken as free of noise")
         };
+        let is_empty = |c: &Channel| self.model.axis(*c).processes.is_empty();
+        let empty: Vec<Channel> = self.present().filter(is_empty).collect();
         let misfit = self.misfit().map(|misfit| format!("{shown} {misfit}"));
         let out_of_range = facts::out_of_range(&self.model).into_iter();
         misfit
             .into_iter()
             .chain(out_of_range.map(|text| format!("{shown}: {text}")))
-            .chain(self.missing.iter().map(unsaid))
+            .chain(unusual_times(&self.model).map(|text| format!("{shown}: {text}")))
+            .chain(self.missing.iter().chain(&empty).map(unsaid))
             .collect()
     }
 

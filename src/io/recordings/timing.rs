@@ -344,7 +344,7 @@ pub(crate) fn median_step(times: &[f64]) -> f64 {
 }
 
 /// Rates beyond these are looked at twice (Hz).
-const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 0.5..=20_000.0;
+pub(crate) const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 0.5..=20_000.0;
 
 /// The units of time and their length (s).
 pub(crate) const UNITS: [(f64, &str); 4] = [(1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")];
