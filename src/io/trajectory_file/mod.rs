@@ -16,6 +16,7 @@ use nav_sim_navigation::earth::{e_to_n, ecef_to_geodetic, geodetic_to_ecef};
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, q_e_n, wrap_angle};
 use nav_sim_navigation::fusion::judge::StatedRow;
 use nav_sim_navigation::gnss::GnssFix;
+use nav_sim_navigation::linalg::median;
 use nav_sim_navigation::trajectory;
 use nav_sim_navigation::trajectory::plausibility::VelocityMisfit;
 use nav_sim_navigation::trajectory::reference::{Reference, breaks, usable};
@@ -570,6 +571,20 @@ fn rows(
         geodetic: !is_local,
         ..Rows::default()
     };
+    if let Some(quaternion) = quaternion {
+        // Level with x, y, z, w in order, and if they are w, x, y, z.
+        let level = |order: [usize; 4]| {
+            let up = |row| {
+                let q = DQuat::from_array(order.map(|k| quaternion[k].si(row)));
+                (q * DVec3::Z).z
+            };
+            median((0..table.rows()).map(up)).unwrap_or(0.0)
+        };
+        if level([0, 1, 2, 3]) < 0.5 && level([1, 2, 3, 0]) > 0.9 {
+            let text = "the vehicle is level only if the quaternions are w, x, y, z: order them x, y, z, w";
+            rows.doubt(None, text.to_owned());
+        }
+    }
     rows.sigmas = sigmas(&table);
     if let Some(own) = velocity {
         rows.velocities = all.map(|row| triad(own, row).into()).collect();
