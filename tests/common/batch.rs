@@ -1,12 +1,8 @@
 //! A study of eight cells of a few milliseconds, and how to run parts of it.
 
-#[path = "drive.rs"]
-mod drive;
-
-pub use drive::MODEL;
-use drive::{DRIVE, place_with};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use super::drive::*;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
 
 /// Four units of two cells.
 pub const STUDY: &str = "
@@ -24,21 +20,17 @@ wrong = { model = \"wrong.toml\" }
 ";
 pub const CELLS: usize = 8;
 
-/// A directory with the study and what it needs.
-pub fn place() -> tempfile::TempDir {
-    let dir = place_with(DRIVE, MODEL);
-    std::fs::write(dir.path().join("study.toml"), STUDY).unwrap();
-    std::fs::write(
-        dir.path().join("wrong.toml"),
-        MODEL.replace("4e-12", "4e-13"),
-    )
-    .unwrap();
-    dir
+/// A directory with the study and the files that it names.
+pub fn place() -> Place {
+    let place = place_with(DRIVE, MODEL);
+    place.write("study.toml", STUDY);
+    place.write("wrong.toml", MODEL.replace("4e-12", "4e-13"));
+    place
 }
 
-/// `nav-sim …` in a directory.
+/// Returns a `nav-sim` command in a directory, on no scheduler.
 pub fn command(dir: &Path, arguments: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_nav-sim"));
+    let mut command = Command::new(PROGRAM);
     command.current_dir(dir).args(arguments.split_whitespace());
     for variable in [
         "HQ_TASK_ID",
@@ -51,56 +43,45 @@ pub fn command(dir: &Path, arguments: &str) -> Command {
     command
 }
 
-/// The exit code and what it said.
+/// Runs a command, and returns its exit code and its errors.
 pub fn ran(dir: &Path, arguments: &str) -> (i32, String) {
-    let Output { status, stderr, .. } = command(dir, arguments).output().unwrap();
-    (
-        status.code().unwrap(),
-        String::from_utf8_lossy(&stderr).into_owned(),
-    )
+    let output = command(dir, arguments).output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    (output.status.code().unwrap(), errors)
 }
 
-/// What it said; it must have ended with this code.
+/// Runs a command that must end with this code, and returns its errors.
 pub fn ended(dir: &Path, arguments: &str, code: i32) -> String {
-    let (ended, said) = ran(dir, arguments);
-    assert_eq!(ended, code, "{arguments}\n{said}");
-    said
+    let (ended, errors) = ran(dir, arguments);
+    assert_eq!(ended, code, "{arguments}\n{errors}");
+    errors
 }
 
 pub fn spawn(dir: &Path, arguments: &str) -> Child {
     let mut command = command(dir, arguments);
-    command
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap()
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    command.spawn().unwrap()
 }
 
-/// Results and the tables of cells, with their bytes.
-pub fn results(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+/// Results and the tables of cells of a study directory, by name.
+pub fn results(place: &Place, study: &str) -> Vec<(String, String)> {
     let mut files = ["results.csv", "summary.json", "report.html"]
-        .map(|name| dir.join(name))
+        .map(str::to_owned)
         .to_vec();
-    for cell in cells(dir) {
-        files.extend(["epochs.csv", "runs.csv"].map(|name| cell.join(name)));
+    for cell in cells(place, study) {
+        files.extend(["epochs.csv", "runs.csv"].map(|name| format!("cells/{cell}/{name}")));
     }
-    let of_file = |path: PathBuf| {
-        let bytes = std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-        (path.strip_prefix(dir).unwrap().to_owned(), bytes)
-    };
-    files.into_iter().map(of_file).collect()
+    let read = |name: String| (name.clone(), place.read(&format!("{study}/{name}")));
+    files.into_iter().map(read).collect()
 }
 
-/// The finished cells of a study directory.
-pub fn cells(dir: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(dir.join("cells"))
-        .into_iter()
-        .flatten()
-        .flatten();
-    let mut cells: Vec<PathBuf> = entries
-        .map(|e| e.path())
-        .filter(|path| path.join("manifest.json").exists())
-        .collect();
-    cells.sort();
-    cells
+/// Names of the finished cells of a study directory, sorted.
+pub fn cells(place: &Place, study: &str) -> Vec<String> {
+    let cells = format!("{study}/cells");
+    if !place.at(&cells).exists() {
+        return Vec::new();
+    }
+    let mut names = place.entries(&cells);
+    names.retain(|name| place.at(&format!("{cells}/{name}/manifest.json")).exists());
+    names
 }

@@ -1,100 +1,68 @@
-//! `nav-sim fuse` of an IMU and a receiver whose clocks are apart.
+//! Clocks of an IMU and of a receiver that are apart, by how much is found from the turns and the innovations.
 
-use crate::common::drive::{DRIVE, MODEL, done, nav_sim, place_with};
-use std::fs;
+use super::{recorded, recorded_on};
+use crate::common::drive::*;
 
-/// GPS time is 18 s ahead of UTC: the commonest of differences.
-#[test]
-fn clocks_that_are_apart_are_named_with_what_to_add() {
-    let place = place_with(DRIVE, MODEL);
-    done(
-        place.path(),
-        "trajectory record drive.toml imu.toml --seed 3 -o rec",
-    );
-    let text = fs::read_to_string(place.path().join("rec/gnss.csv")).unwrap();
-    let later = |line: &str| match line.split_once(',') {
-        Some((t_s, rest)) if line.starts_with(|c: char| c.is_ascii_digit()) => {
-            format!("{},{rest}\n", t_s.parse::<f64>().unwrap() + 18.0)
+/// Writes the recorded fixes with other times.
+fn later(place: &Place, to: &str, seconds: f64) {
+    place.edit("rec/gnss.csv", to, |_, line| match line.split_once(',') {
+        Some((t_s, rest)) if t_s.parse::<f64>().is_ok() => {
+            format!("{:.4},{rest}", t_s.parse::<f64>().unwrap() + seconds)
         }
-        _ => format!("{line}\n"),
-    };
-    fs::write(
-        place.path().join("gps_time.csv"),
-        text.lines().map(later).collect::<String>(),
-    )
-    .unwrap();
-    let ran = nav_sim(
-        place.path(),
-        "fuse rec/imu.csv gps_time.csv imu.toml -o out",
-    );
-    assert_eq!(ran.code, 3, "{}", ran.stderr);
-    let cause = "the clocks are apart: --gnss-delay=18.0";
-    assert!(
-        ran.stdout.lines().nth(1).unwrap().starts_with(cause),
-        "{}",
-        ran.stdout
-    );
-    assert!(
-        ran.stdout.lines().count() <= 20 && ran.stdout.lines().all(|l| l.chars().count() <= 120)
-    );
-    let summary = fs::read_to_string(place.path().join("out/summary.json")).unwrap();
-    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
-    let delay_s = summary["verdict"]["cause"]["clocks"]["delay_s"]
-        .as_f64()
-        .unwrap();
-    assert!((delay_s - 18.0).abs() < 1e-9, "{summary}");
+        _ => line.to_owned(),
+    });
 }
 
-/// Clocks that have nothing in common are brought together: the receiver's is 50 399 s ahead, and both recordings begin in
-/// the same minute. Where no turn tells by how much, the option is named.
-#[test]
-fn clocks_that_do_not_overlap_are_brought_together() {
-    let place = place_with(DRIVE, MODEL);
-    let ahead = |line: &str| match line.split_once(',') {
-        Some((t_s, rest)) if line.starts_with(|c: char| c.is_ascii_digit()) => {
-            format!("{},{rest}\n", t_s.parse::<f64>().unwrap() + 50_399.0)
-        }
-        _ => format!("{line}\n"),
-    };
-    let record = || {
-        done(
-            place.path(),
-            "trajectory record drive.toml imu.toml --seed 3 -o rec",
-        );
-        let text = fs::read_to_string(place.path().join("rec/gnss.csv")).unwrap();
-        fs::write(
-            place.path().join("day.csv"),
-            text.lines().map(ahead).collect::<String>(),
-        )
-        .unwrap();
-    };
-    record();
-    let ran = done(
-        place.path(),
-        "fuse rec/imu.csv day.csv imu.toml --reference rec/reference.csv -o out",
-    );
-    let found = ran
-        .stderr
+/// The numbers behind the option in a text.
+#[track_caller]
+fn delays(text: &str) -> Vec<f64> {
+    let rest = text
         .split("--gnss-delay=")
         .nth(1)
-        .and_then(|rest| rest.split(',').next())
-        .unwrap();
+        .unwrap_or_else(|| panic!("{text}"));
+    rest.split(['(', ')', '±', ' ', ','])
+        .filter_map(|word| word.parse().ok())
+        .collect()
+}
+
+/// GPS time is 18 s ahead of UTC; a day less a second leaves nothing in common.
+#[test]
+fn clocks_that_are_apart_are_brought_together() {
+    let place = recorded_on(DRIVE, MODEL);
+    later(&place, "gps_time.csv", 18.0);
+    place.ends("fuse rec/imu.csv gps_time.csv imu.toml -o out", 3);
+    let delay_s = number(
+        &place.json("out/summary.json"),
+        "/verdict/cause/clocks/delay_s",
+    );
+    assert!((delay_s - 18.0).abs() < 1e-9, "{delay_s}");
+    later(&place, "day.csv", 50_399.0);
+    let ran = place.done("fuse rec/imu.csv day.csv imu.toml -o out");
     assert!(
-        (found.parse::<f64>().unwrap() - 50_399.0).abs() < 0.1,
+        (delays(&ran.stderr)[0] - 50_399.0).abs() < 0.1,
         "{}",
         ran.stderr
     );
-    assert!(ran.stdout.starts_with("undecided"), "{}", ran.stdout);
+}
 
-    let straight = "start = { lat_deg = 46.5, lon_deg = 6.5, h_m = 400, heading_deg = 40, speed_m_s = 10 }\n\
-                    segment = [{ kind = \"straight\", duration_s = 60 }]\n";
-    fs::write(place.path().join("drive.toml"), straight).unwrap();
-    record();
-    let ran = nav_sim(place.path(), "fuse rec/imu.csv day.csv imu.toml -o none");
+/// Fixes 0.4 s late: the verdict names the delay and the option, with which the solution is to be believed.
+#[test]
+fn late_fixes_are_told_and_their_delay_is_an_option() {
+    let place = recorded();
+    later(&place, "late.csv", 0.4);
+    let command = "fuse rec/imu.csv late.csv imu.toml --initial rec/initial.toml -o";
+    // `… --gnss-delay=0.396 (± 0.007)`
+    let told = place.judged(&format!("{command} late"));
+    let found = delays(&told.stdout);
     assert!(
-        ran.code == 2 && ran.stderr.contains("hint: bring both to one clock"),
+        (found[0] - 0.4).abs() < 4.0 * found[1] && found[1] < 0.02,
         "{}",
-        ran.stderr
+        told.stdout
+    );
+    place.done(&format!("{command} sound --gnss-delay 0.4"));
+    assert_eq!(
+        place.json("sound/summary.json")["verdict"]["kind"],
+        "undecided"
     );
 }
 
@@ -102,27 +70,10 @@ fn clocks_that_do_not_overlap_are_brought_together() {
 /// positions do, which are off by an antenna 2 m ahead. Clocks that make the innovations larger are no cause.
 #[test]
 fn clocks_are_named_only_where_the_innovations_agree() {
-    let place = place_with(DRIVE, MODEL);
-    done(
-        place.path(),
-        "trajectory record drive.toml imu.toml --seed 3 -o rec",
-    );
-    let text = fs::read_to_string(place.path().join("rec/reference.csv")).unwrap();
-    let numbers = |line: &str| {
-        line.split(',')
-            .map(|c| c.parse().unwrap())
-            .collect::<Vec<f64>>()
-    };
-    let rows: Vec<Vec<f64>> = text
-        .lines()
-        .filter(|l| l.starts_with(|c: char| c.is_ascii_digit()))
-        .map(numbers)
-        .collect();
+    let place = recorded_on(DRIVE, MODEL);
+    let rows = place.table("rec/reference.csv");
     let step_s = rows[1][0] - rows[0][0];
-    let (second, late) = (
-        (1.0 / step_s).round() as usize,
-        (0.7 / step_s).round() as usize,
-    );
+    let [second, late] = [1.0, 0.7].map(|s| (s / step_s).round() as usize);
     let mut fixes = "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m,v_n_m_s,v_e_m_s,v_d_m_s,sd_vn_m_s,sd_ve_m_s,sd_vd_m_s\n".to_owned();
     for k in (second..rows.len()).step_by(second) {
         let (row, before) = (&rows[k], &rows[k - late]);
@@ -135,45 +86,31 @@ fn clocks_are_named_only_where_the_innovations_agree() {
         let v = [4, 5, 6].map(|i| before[i].to_string()).join(",");
         fixes += &format!("{},{lat},{lon},{},0.2,0.2,0.2,{v},1,1,1\n", row[0], row[3]);
     }
-    fs::write(place.path().join("lagging.csv"), fixes).unwrap();
-    let ran = nav_sim(
-        place.path(),
-        "fuse rec/imu.csv lagging.csv imu.toml --initial rec/initial.toml -o out",
-    );
-    assert!(
-        !ran.stdout.contains("the clocks are apart"),
-        "{}",
-        ran.stdout
-    );
+    place.write("lagging.csv", fixes);
+    place.judged("fuse rec/imu.csv lagging.csv imu.toml --initial rec/initial.toml -o out");
+    let cause = &place.json("out/summary.json")["verdict"]["cause"];
+    assert!(cause["clocks"].is_null(), "{cause}");
 }
 
 /// A delay far beyond the minute that two loggers begin apart is found where the turns tell it, to a step of the search, and is
 /// what to paste.
 #[test]
 fn a_delay_of_minutes_is_named() {
-    let turn = |deg: f64| format!("  {{ kind = \"turn\", angle_deg = {deg}, duration_s = 12 }},\n");
-    let straight = |s: u32| format!("  {{ kind = \"straight\", duration_s = {s} }},\n");
-    let angles = [
-        90.0, -60.0, 120.0, -90.0, 50.0, -130.0, 80.0, -100.0, 70.0, -40.0,
-    ];
-    let parts: String = angles
-        .iter()
-        .enumerate()
-        .map(|(k, deg)| turn(*deg) + &straight(7 + (5 * k as u32) % 13))
-        .collect();
+    let angles = [90, -60, 120, -90, 50, -130, 80, -100, 70, -40];
+    let parts = (0..).zip(angles).map(|(k, deg)| {
+        format!(
+            "  {{ kind = \"turn\", angle_deg = {deg}, duration_s = 12 }},\n  \
+             {{ kind = \"straight\", duration_s = {} }},\n",
+            7 + (5 * k) % 13
+        )
+    });
     let start = "{ lat_deg = 46.5, lon_deg = 6.5, h_m = 400, heading_deg = 40, speed_m_s = 12 }";
-    let place = place_with(&format!("start = {start}\nsegment = [\n{parts}]\n"), MODEL);
-    done(
-        place.path(),
-        "trajectory record drive.toml imu.toml --seed 3 -o rec",
+    let drive = format!(
+        "start = {start}\nsegment = [\n{}]\n",
+        parts.collect::<String>()
     );
-    let ran = nav_sim(
-        place.path(),
-        "fuse rec/imu.csv rec/gnss.csv imu.toml --gnss-delay 80 -o out",
-    );
-    assert_eq!(ran.code, 3, "{}", ran.stdout);
-    let named = ran.stdout.split("--gnss-delay=").nth(1).expect(&ran.stdout);
-    let delay_s: f64 = named.split(' ').next().unwrap().parse().unwrap();
-    assert!(delay_s.abs() <= 0.1, "{}", ran.stdout);
-    assert!(!ran.stderr.contains("reference"), "{}", ran.stderr);
+    let place = recorded_on(&drive, MODEL);
+    let fuse = "fuse rec/imu.csv rec/gnss.csv imu.toml --gnss-delay 80 -o out";
+    let ran = place.ends(fuse, 3);
+    assert!(delays(&ran.stdout)[0].abs() <= 0.1, "{}", ran.stdout);
 }

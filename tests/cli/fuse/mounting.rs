@@ -1,109 +1,44 @@
-//! `fuse --mounting auto`: found, said so that it can be pasted, kept in the summary, or refused.
+//! `fuse --mounting auto`: found, said so that it can be pasted, kept in the summary.
 
-use super::recorded;
-use crate::common::drive::{MODEL, done, nav_sim, place_with};
-use std::fs;
+use super::{recorded_on, summary};
+use crate::common::drive::*;
 
 /// An IMU whose axes are those of the vehicle: the drive shows it.
 #[test]
 fn a_mounting_is_found_and_can_be_pasted() {
-    let drive = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/trajectories/land_vehicle.toml"
-    );
-    let place = place_with(&fs::read_to_string(drive).unwrap(), MODEL);
-    done(
-        place.path(),
-        "trajectory record drive.toml imu.toml --seed 3 -o rec",
-    );
-    let fuse = |options: &str| {
-        let command = format!(
-            "fuse rec/imu.csv rec/gnss.csv imu.toml --reference rec/reference.csv {options} -o out"
-        );
-        let ran = done(place.path(), &command);
-        let text = fs::read_to_string(place.path().join("out/summary.json")).unwrap();
-        (
-            ran,
-            serde_json::from_str::<serde_json::Value>(&text).unwrap(),
-        )
-    };
-    let (ran, summary) = fuse("--mounting auto");
+    let drive = format!("{ROOT}/trajectories/land_vehicle.toml");
+    let place = recorded_on(&std::fs::read_to_string(drive).unwrap(), MODEL);
+    let reference = "--reference rec/reference.csv";
+    let fuse = format!("fuse rec/imu.csv rec/gnss.csv imu.toml {reference} --mounting auto -o out");
+    let ran = place.done(&fuse);
+    let found = place.json("out/summary.json");
     let line = ran
         .stdout
         .lines()
-        .find(|line| line.starts_with("mounting found: "))
+        .find_map(|line| line.strip_prefix("mounting found: "))
         .unwrap();
     let paste = line
         .split(' ')
-        .find(|word| word.starts_with("--mounting="))
-        .unwrap();
-    let mounting = &summary["mounting"];
-    let number = |value: &serde_json::Value| value.as_f64().unwrap();
-    let sigma: Vec<f64> = mounting["sigma_deg"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(number)
-        .collect();
-    let angles = ["roll_deg", "pitch_deg", "yaw_deg"].map(|key| number(&mounting[key]));
-    for (i, off) in angles.into_iter().enumerate() {
+        .find(|word| word.split('=').next() == Some("--mounting"));
+    let sigma = numbers(&found, "/mounting/sigma_deg");
+    assert_eq!(sigma.len(), 3);
+    for (sigma, angle) in sigma.into_iter().zip(["roll", "pitch", "yaw"]) {
+        let off = number(&found, &format!("/mounting/{angle}_deg"));
         assert!(
-            off.abs() < 3.0 * sigma[i] && sigma[i] < 3.0,
-            "{angles:?} {sigma:?}"
+            off.abs() < 3.0 * sigma && sigma < 3.0,
+            "{angle}: {off} {sigma}"
         );
     }
-    assert!(
-        mounting["how"].as_str().unwrap().contains("gravity"),
-        "{mounting}"
-    );
-    let page = fs::read_to_string(place.path().join("out/report.html")).unwrap();
-    assert!(page.contains("mounting found: "), "the page");
+    assert!(found["mounting"]["how"].is_string());
+    assert!(place.read("out/report.html").contains("mounting found: "));
 
     // the same solution, as sure of itself
-    let (_, given) = fuse(paste);
-    let rmse = |summary: &serde_json::Value| number(&summary["reference"]["horizontal_rmse_m"]);
-    assert!(
-        (rmse(&given) / rmse(&summary) - 1.0).abs() < 0.05,
-        "{} {}",
-        rmse(&given),
-        rmse(&summary)
-    );
-    let nees = |summary: &serde_json::Value| number(&summary["reference"]["nees_mean"]);
-    assert!(
-        (nees(&given) / nees(&summary) - 1.0).abs() < 0.05,
-        "{} {}",
-        nees(&given),
-        nees(&summary)
-    );
-    assert!(given.get("mounting").is_none());
-}
-
-/// Too short, and a word that is none.
-#[test]
-fn a_drive_that_does_not_show_it_is_refused_with_a_remedy() {
-    let place = recorded();
-    let ran = nav_sim(
-        place.path(),
-        "fuse rec/imu.csv rec/gnss.csv imu.toml --mounting auto -o out",
-    );
-    let said = [
-        "error: the mounting is not found: ",
-        "have a course",
-        "hint: give --mounting ROLL,PITCH,YAW",
-    ];
-    assert!(
-        ran.code == 2 && said.iter().all(|part| ran.stderr.contains(part)),
-        "{}",
-        ran.stderr
-    );
-    assert!(!place.path().join("out").exists());
-    let ran = nav_sim(
-        place.path(),
-        "fuse rec/imu.csv rec/gnss.csv imu.toml --mounting found -o out",
-    );
-    assert!(
-        ran.code == 2 && ran.stderr.contains("flu, rfu, auto"),
-        "{}",
-        ran.stderr
-    );
+    let given = summary(&place, &format!("{reference} {}", paste.unwrap()));
+    for key in ["/reference/horizontal_rmse_m", "/reference/nees_mean"] {
+        assert!(
+            off(number(&given, key), number(&found, key)) < 0.05,
+            "{key}"
+        );
+    }
+    assert!(given["mounting"].is_null());
 }

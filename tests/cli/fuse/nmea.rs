@@ -1,9 +1,6 @@
 //! `fuse` on the NMEA sentences of a drive.
 
-use super::{recorded, table};
-use crate::common::drive::{done, nav_sim};
-use std::fs;
-use std::path::Path;
+use super::recorded;
 
 fn sentence(body: &str) -> String {
     format!(
@@ -54,113 +51,80 @@ fn log(rows: &[Vec<f64>], begin_s: f64, has_gst: bool) -> String {
     text
 }
 
-/// The same times on another clock.
-fn shifted(text: &str, by_s: f64) -> String {
-    let mut lines = text.lines();
-    let header = lines.next().unwrap().to_owned();
-    let row = |line: &str| {
-        let (time, rest) = line.split_once(',').unwrap();
-        format!("\n{:.4},{rest}", time.parse::<f64>().unwrap() + by_s)
-    };
-    header + &lines.map(row).collect::<String>()
-}
-
-fn fused(place: &Path, imu: &str, gnss: &str, options: &str) -> (Vec<f64>, String) {
-    let ran = done(
-        place,
-        &format!("fuse {imu} {gnss} imu.toml {options} -o out"),
-    );
-    (
-        table(&place.join("out/solution.csv")).pop().unwrap(),
-        ran.stderr,
-    )
-}
-
 /// A drive over midnight: the sentences give the solution of the table with the same horizontal velocities, in seconds of the day
 /// and in Unix time, whichever the IMU has.
 #[test]
 fn sentences_give_the_solution_of_the_table() {
     let place = recorded();
-    let at = |name: &str| place.path().join(name);
-    let gnss = table(&at("rec/gnss.csv"));
+    let gnss = place.table("rec/gnss.csv");
     let begin_s = 86_350.0;
-    let imu = fs::read_to_string(at("rec/imu.csv")).unwrap();
-    fs::write(at("day.csv"), shifted(&imu, begin_s)).unwrap();
     // 2024-02-28 00:00 UTC
-    fs::write(at("unix.csv"), shifted(&imu, begin_s + 1_709_078_400.0)).unwrap();
-    fs::write(at("log.nmea"), log(&gnss, begin_s, true)).unwrap();
-    fs::write(at("bare.txt"), log(&gnss, begin_s, false)).unwrap();
+    for (name, by_s) in [
+        ("day.csv", begin_s),
+        ("unix.csv", begin_s + 1_709_078_400.0),
+    ] {
+        place.edit("rec/imu.csv", name, |k, line| match line.split_once(',') {
+            Some((time, rest)) if k > 0 => {
+                format!("{:.4},{rest}", time.parse::<f64>().unwrap() + by_s)
+            }
+            _ => line.to_owned(),
+        });
+    }
+    place.write("log.nmea", log(&gnss, begin_s, true));
+    place.write("bare.txt", log(&gnss, begin_s, false));
     // the table with a vertical velocity that says nothing
     let head = "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m,v_n_m_s,v_e_m_s,v_d_m_s,sd_vn_m_s,sd_ve_m_s,sd_vd_m_s";
     let row = |r: &Vec<f64>| {
         let cells: Vec<String> = r[1..9].iter().map(f64::to_string).collect();
         format!("\n{},{},0,0.04,0.04,1000", r[0] + begin_s, cells.join(","))
     };
-    fs::write(
-        at("table.csv"),
+    place.write(
+        "table.csv",
         head.to_owned() + &gnss.iter().map(row).collect::<String>(),
-    )
-    .unwrap();
+    );
 
-    let (expected, _) = fused(place.path(), "day.csv", "table.csv", "");
-    let near = |found: &[f64], late_s: f64| {
-        // positions to 1e-8 degrees (1 mm), others to 1e-3: the digits of the sentences
-        let differ =
-            |(i, x): (usize, &f64)| (x - expected[i]).abs() > if i < 3 { 1e-8 } else { 1e-3 };
-        let wrong = found
-            .iter()
-            .enumerate()
-            .skip(1)
-            .position(|(i, x)| differ((i, x)));
-        assert!(
-            wrong.is_none() && (found[0] - expected[0] - late_s).abs() < 1e-6,
-            "{wrong:?} {found:?} {expected:?}"
-        );
+    let fused = |files: &str| {
+        let ran = place.done(&format!("fuse {files} imu.toml -o out"));
+        (place.table("out/solution.csv").pop().unwrap(), ran.stderr)
     };
-    let (day, said) = fused(place.path(), "day.csv", "log.nmea", "--gnss-sigma 9:0.04");
-    assert!(
-        said.contains("NMEA sentences: 100 fixes, times are seconds of the day"),
-        "{said}"
-    );
-    assert!(
-        said.contains("log.nmea: NMEA sentences") && !said.contains("warning: log.nmea"),
-        "{said}"
-    );
-    near(&day, 0.0);
-    let (unix, said) = fused(place.path(), "unix.csv", "log.nmea", "--gnss-sigma 9:0.04");
-    assert!(said.contains("times are Unix time"), "{said}");
-    near(&unix, 1_709_078_400.0);
-    let same = format!(
+    let (expected, _) = fused("day.csv table.csv");
+    let sigma = format!(
         "--gnss-sigma {},{},{}:0.04",
         gnss[0][4], gnss[0][5], gnss[0][6]
     );
-    let (given, said) = fused(place.path(), "day.csv", "bare.txt", &same);
-    assert!(
-        said.contains("as given where the file states none"),
-        "{said}"
-    );
-    near(&given, 0.0);
-
-    let (_, said) = fused(place.path(), "day.csv", "log.nmea", "");
-    assert!(
-        said.contains("speed and course are not used") && said.contains("--gnss-sigma"),
-        "{said}"
-    );
-    let ran = nav_sim(place.path(), "fuse day.csv bare.txt imu.toml -o none");
-    assert!(
-        ran.code == 2 && ran.stderr.contains("a fix without standard deviations"),
-        "{}",
-        ran.stderr
-    );
-    let ran = nav_sim(place.path(), "fuse rec/imu.csv log.nmea imu.toml -o none");
-    assert!(
-        ran.code == 2 && ran.stderr.contains("clocks do not overlap"),
-        "{}",
-        ran.stderr
-    );
-    assert!(
-        done(place.path(), "check log.nmea")
-            .stdout
-            .contains("100 GNSS fixes")
-    );
+    for (files, late_s, note) in [
+        (
+            "day.csv log.nmea --gnss-sigma 9:0.04",
+            0.0,
+            "100 fixes, times are seconds of the day",
+        ),
+        (
+            "unix.csv log.nmea --gnss-sigma 9:0.04",
+            1_709_078_400.0,
+            "times are Unix time",
+        ),
+        (
+            &format!("day.csv bare.txt {sigma}"),
+            0.0,
+            "as given where the file states none",
+        ),
+    ] {
+        let (found, notes) = fused(files);
+        assert!(notes.contains(note), "{notes}");
+        assert!((found[0] - expected[0] - late_s).abs() < 1e-6);
+        assert_eq!(found.len(), expected.len());
+        // positions to 1e-8 degrees (1 mm), others to 1e-3: the digits of the sentences
+        for i in 1..found.len() {
+            let allowed = if i < 3 { 1e-8 } else { 1e-3 };
+            assert!(
+                (found[i] - expected[i]).abs() <= allowed,
+                "{i}: {found:?} {expected:?}"
+            );
+        }
+    }
+    let (_, notes) = fused("day.csv log.nmea");
+    assert!(notes.contains("speed and course are not used"), "{notes}");
+    place.ends("fuse rec/imu.csv log.nmea imu.toml -o none", 2);
+    let found = place.done("check log.nmea").stdout;
+    assert!(found.contains("100 GNSS fixes"), "{found}");
 }

@@ -1,53 +1,43 @@
 //! `fuse --smooth` as a user runs it.
 
-use super::{recorded, table};
-use crate::common::drive::{done, nav_sim, place_with};
-use std::fs;
+use super::{recorded, recorded_on, summary};
+use crate::common::drive::*;
 
 #[test]
 fn a_smoothed_fusion_lies_beside_the_filter_s_and_is_the_same_on_any_number_of_threads() {
     let place = recorded();
-    let read = |name: &str| fs::read_to_string(place.path().join(name)).unwrap();
     let fuse =
         "fuse rec/imu.csv rec/gnss.csv imu.toml --reference rec/reference.csv --outage 60:75";
-    done(place.path(), &format!("{fuse} -o plain"));
-    let one = done(place.path(), &format!("{fuse} --smooth -j 1 -o one"));
-    done(place.path(), &format!("{fuse} --smooth -j 3 -o three"));
-    for name in [
+    for options in ["-o plain", "--smooth -j 1 -o one", "--smooth -j 3 -o three"] {
+        place.done(&format!("{fuse} {options}"));
+    }
+    let assert_equal = |a: &str, b: &str, names: &[&str]| {
+        for name in names {
+            assert!(
+                place.read(&format!("{a}/{name}")) == place.read(&format!("{b}/{name}")),
+                "{name}"
+            );
+        }
+    };
+    let smoothed = [
         "smoothed.csv",
         "errors_smoothed.csv",
         "smoothed.kml",
         "summary.json",
-    ] {
-        assert_eq!(
-            read(&format!("one/{name}")),
-            read(&format!("three/{name}")),
-            "{name}"
-        );
-    }
-    for name in [
+    ];
+    assert_equal("one", "three", &smoothed);
+    let filtered = [
         "solution.csv",
         "errors.csv",
         "innovations.csv",
         "solution.kml",
-    ] {
-        assert_eq!(
-            read(&format!("plain/{name}")),
-            read(&format!("one/{name}")),
-            "{name}"
-        );
-    }
-    let row = one
-        .stdout
-        .lines()
-        .find(|l| l.contains("horizontal RMSE"))
-        .unwrap();
-    assert_eq!(row.split_whitespace().count(), 5, "{row}");
-    let header = |name: &str| read(name).lines().next().unwrap().to_owned();
+    ];
+    assert_equal("plain", "one", &filtered);
+    let header = |name: &str| place.read(name).lines().next().unwrap().to_owned();
     assert_eq!(header("one/smoothed.csv"), header("one/solution.csv"));
     let (filter, smoothed) = (
-        table(&place.path().join("one/solution.csv")),
-        table(&place.path().join("one/smoothed.csv")),
+        place.table("one/solution.csv"),
+        place.table("one/smoothed.csv"),
     );
     assert_eq!(
         (filter.len(), filter.last()),
@@ -55,56 +45,41 @@ fn a_smoothed_fusion_lies_beside_the_filter_s_and_is_the_same_on_any_number_of_t
     );
     assert!(filter.iter().zip(&smoothed).all(|(f, s)| f[0] == s[0]));
     // in the middle of the outage the horizontal deviation is far below that of its end
-    let summary: serde_json::Value = serde_json::from_str(&read("one/summary.json")).unwrap();
-    let outage = &summary["smoothed"]["outages"][0];
-    assert!(
-        outage["sigma_max_m"].as_f64().unwrap()
-            < 0.7 * outage["sigma_max_filter_m"].as_f64().unwrap(),
-        "{outage}"
-    );
-    let nees = summary["smoothed"]["reference"]["nees_mean"]
-        .as_f64()
-        .unwrap();
+    let found = place.json("one/summary.json");
+    let [own, filter] =
+        ["", "_filter"].map(|of| number(&found, &format!("/smoothed/outages/0/sigma_max{of}_m")));
+    assert!(own < 0.7 * filter, "{own} {filter}");
+    let nees = number(&found, "/smoothed/reference/nees_mean");
     assert!((0.5..36.0).contains(&nees), "{nees}");
     // nothing of an earlier fusion is left beside a later one that was not smoothed
-    done(place.path(), &format!("{fuse} -o one"));
-    assert!(
-        !place.path().join("one/smoothed.csv").exists()
-            && !place.path().join("one/smoothed.kml").exists()
-    );
+    place.done(&format!("{fuse} -o one"));
+    assert_eq!(place.entries("one"), place.entries("plain"));
 }
 
 /// Fixes believed better than they are make smoothed standard deviations too small, fixes and an IMU believed worse too
 /// large: said, in which state and by how much.
 #[test]
 fn a_smoothed_solution_has_a_verdict_by_the_reference() {
-    let shipped =
-        |name: &str| fs::read_to_string(format!("{}/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
-    let place = place_with(
-        &shipped("trajectories/land_vehicle.toml"),
-        &shipped("calib_data/tactical.toml"),
-    );
-    done(
-        place.path(),
-        "trajectory record drive.toml imu.toml --seed 3 -o rec",
-    );
-    let start = "--initial rec/initial.toml --reference rec/reference.csv";
-    let worse = concat!(env!("CARGO_MANIFEST_DIR"), "/calib_data/consumer_mems.toml");
+    let shipped = |name: &str| std::fs::read_to_string(format!("{ROOT}/{name}")).unwrap();
+    let drive = shipped("trajectories/land_vehicle.toml");
+    let place = recorded_on(&drive, &shipped("calib_data/tactical.toml"));
+    let worse = format!("{ROOT}/calib_data/consumer_mems.toml");
     for (model, factor, verdict) in [
         ("imu.toml", 1.0, "undecided"),
         ("imu.toml", 0.3, "overconfident"),
-        (worse, 10.0, "underconfident"),
+        (&worse, 10.0, "underconfident"),
     ] {
-        let fuse = format!(
-            "fuse rec/imu.csv rec/gnss.csv {model} {start} --outage 300:360 --smooth -o out"
+        place.judged(&format!(
+            "fuse rec/imu.csv rec/gnss.csv {model} --initial rec/initial.toml --reference rec/reference.csv \
+             --outage 300:360 --smooth -o out --gnss-sigma x{factor}"
+        ));
+        let found = place.json("out/summary.json");
+        assert_eq!(
+            found["smoothed"]["reference"]["verdict"]["kind"], verdict,
+            "{factor}: {found}"
         );
-        nav_sim(place.path(), &format!("{fuse} --gnss-sigma x{factor}"));
-        let summary = fs::read_to_string(place.path().join("out/summary.json")).unwrap();
-        let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
-        let judged = &summary["smoothed"]["reference"]["verdict"];
-        assert_eq!(judged["kind"], verdict, "{factor}: {summary}");
     }
-    let page = fs::read_to_string(place.path().join("out/report.html")).unwrap();
+    let page = place.read("out/report.html");
     // nine panels of errors, each with zero inside
     let panels: Vec<&str> = page.split("<svg class=\"chart small\"").skip(1).collect();
     assert_eq!(panels.len(), 9);
@@ -112,28 +87,14 @@ fn a_smoothed_solution_has_a_verdict_by_the_reference() {
         let ticks = panel.split("<g class=\"ticks\">").nth(1).unwrap();
         assert!(ticks.contains(">0</text>"), "{ticks:.600}");
     }
-    assert!(
-        page.contains("/smoothed/outages/0/sigma_max_m") && page.len() < 350_000,
-        "{}",
-        page.len()
-    );
+    assert!(page.contains("/smoothed/outages/0/sigma_max_m") && page.len() < 350_000);
 }
 
 #[test]
 fn without_outages_or_a_reference_it_says_what_it_knows() {
-    let place = recorded();
-    let ran = nav_sim(
-        place.path(),
-        "fuse rec/imu.csv rec/gnss.csv imu.toml --filter 21 --smooth  -o out",
-    );
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
-    let line = ran
-        .stdout
-        .lines()
-        .find(|l| l.contains("horizontal 1 σ"))
-        .unwrap();
+    let found = summary(&recorded(), "--filter 21 --smooth");
     assert!(
-        line.split_whitespace().count() > 6 && !ran.stdout.contains("RMSE"),
-        "{line}"
+        found["smoothed"].is_object() && found["smoothed"]["reference"].is_null(),
+        "{found}"
     );
 }
