@@ -728,10 +728,10 @@ mod transition_tests {
     use crate::earth::GravityModel;
     use crate::ekf::tests::{gauss_markov_model, manoeuvre, predict};
     use crate::ekf::{Belief, FilterStates, InitialSettings, UnknownKind, settle};
-    use crate::frames::NavState;
     use crate::imu::Sensor;
     use crate::strapdown::Strapdown;
-    use glam::{DQuat, DVec3};
+    use crate::tests::state;
+    use glam::DVec3;
 
     /// A covariance as large as this one, with correlations all over.
     fn correlated(p: &DMatrix<f64>) -> DMatrix<f64> {
@@ -757,13 +757,7 @@ mod transition_tests {
             UnknownKind::Drift,
             DVec3::new(1e-6, 2e-6, 3e-6),
         );
-        let start = NavState {
-            lat: 0.8,
-            lon: 0.1,
-            h: 400.0,
-            v_n: DVec3::new(150.0, -50.0, 0.5),
-            q_b_n: DQuat::from_scaled_axis(DVec3::new(0.05, -0.1, 1.0)),
-        };
+        let start = state([150.0, -50.0, 0.5]);
         let nominal = Strapdown::new(&start, GravityModel::Wgs84);
         let mut filters =
             [0, 1].map(|_| Ekf::new(nominal, &belief, &start, &InitialSettings::default()));

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::earth::GravityModel;
-use crate::ekf::tests::{error_of, generator, random_case};
+use crate::ekf::tests::{error_of, fix_at_nominal, generator, random_case};
 use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings, advance, update};
 use crate::frames::NavState;
 use crate::imu::ImuSample;
@@ -116,9 +116,7 @@ fn small_innovations_are_used_alike() {
                 lon: Lanes::splat(here.lon - scale * 2e-5),
                 h: Lanes::splat(here.h + scale * 30.0),
                 v_n: Some(Vec3::splat(here.v_n + DVec3::new(3.0, -4.0, 1.0) * scale)),
-                pos_sigma_m: DVec3::splat(2.0),
-                vel_sigma_m_s: DVec3::splat(0.05),
-                lever_arm_b: DVec3::ZERO,
+                ..fix_at_nominal(&ekf, 2.0, 0.05)
             };
             update(&mut ekf, &fix);
             ekf.nominal.lane(0)

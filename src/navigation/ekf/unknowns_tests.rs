@@ -4,8 +4,8 @@
 use super::belief::BiasGroup;
 use super::covariance::{EarthTerms, PSI, V};
 use super::tests::{
-    Matrix15, continuous_f, continuous_q, error_of, fix_at_nominal, gauss_markov_model, generator,
-    manoeuvre, measurement_rows, predict, random_case,
+    Matrix15, T_CORR_S, certain_start, continuous_f, continuous_q, ekf, error_of, fix_at_nominal,
+    gauss_markov_model, generator, manoeuvre, measurement_rows, predict, random_case, start,
 };
 use super::{Belief, Ekf, FilterStates, InitialSettings, UnknownKind, settle, update};
 use crate::earth::{self, GravityModel};
@@ -32,26 +32,6 @@ fn belief() -> Belief {
     }
     assert_eq!((belief.states, 3 * belief.blocks()), (DIM, DIM));
     belief
-}
-
-fn start() -> NavState {
-    let q_b_n = DQuat::from_scaled_axis(DVec3::new(0.05, -0.1, 1.0));
-    NavState {
-        lat: 0.8,
-        lon: 0.1,
-        h: 400.0,
-        v_n: DVec3::new(15.0, -5.0, 0.5),
-        q_b_n,
-    }
-}
-
-fn ekf(belief: &Belief, state: &NavState, initial: &InitialSettings) -> Ekf {
-    Ekf::new(
-        Strapdown::new(state, GravityModel::Wgs84),
-        belief,
-        state,
-        initial,
-    )
 }
 
 /// Squares of the deviations, of attitude those of roll, pitch and yaw of a level vehicle.
@@ -191,12 +171,7 @@ fn numeric_column(
 #[test]
 fn columns_of_unknowns_agree_with_central_differences() {
     let mut g = generator("unknowns");
-    let exact = InitialSettings {
-        pos_sigma_m: [0.0; 3],
-        vel_sigma_m_s: [0.0; 3],
-        att_sigma_deg: [0.0; 3],
-        ..InitialSettings::default()
-    };
+    let exact = certain_start();
     let mut silent = belief();
     silent.white = [DVec3::ZERO; 2];
     silent.groups = [vec![BiasGroup::default()], vec![BiasGroup::default()]];
@@ -305,31 +280,19 @@ fn samples_are_corrected_by_what_is_estimated() {
     );
 }
 
-/// exp(F dt) by its series: F dt is below 0.2, the seventh power 1e-9 of it.
-fn exponential(f: &DMatrix<f64>, dt: f64) -> DMatrix<f64> {
-    let mut term = DMatrix::identity(DIM, DIM);
-    let mut sum = term.clone();
-    for k in 1..8 {
-        term = &term * f * (dt / f64::from(k));
-        sum += &term;
-    }
-    sum
-}
-
 /// The dense covariance through one sample: biases first, then exp(F dt) with the noise by Simpson's rule.
-fn dense_step(p: &DMatrix<f64>, f: &DMatrix<f64>, filter: &Ekf, dt: f64) -> DMatrix<f64> {
+fn dense_step(p: &DMatrix<f64>, f: &DMatrix<f64>, dt: f64) -> DMatrix<f64> {
     let mut decay = DMatrix::identity(DIM, DIM);
     let mut q = DMatrix::zeros(DIM, DIM);
-    for (g, step) in filter.steps.iter().enumerate() {
-        for axis in 0..3 {
-            let i = 9 + 3 * g + axis;
-            (decay[(i, i)], q[(i, i)]) = (step.phi[axis], step.innovation[axis]);
-        }
+    for i in 9..15 {
+        let sensor = i / 3 - 3;
+        let phi = (-dt / T_CORR_S[sensor]).exp();
+        (decay[(i, i)], q[(i, i)]) = (phi, [9e-4, 1e-8][sensor] * (1.0 - phi * phi));
     }
     let p = &decay * p * decay.transpose() + q;
     let mut white = DMatrix::zeros(DIM, DIM);
     white.view_mut((0, 0), (15, 15)).copy_from(&continuous_q());
-    let (whole, half) = (exponential(f, dt), exponential(f, 0.5 * dt));
+    let (whole, half) = ((f * dt).exp(), (f * (0.5 * dt)).exp());
     let spread = |phi: &DMatrix<f64>| phi * &white * phi.transpose();
     let noise = (&white + spread(&half) * 4.0 + spread(&whole)) * (dt / 6.0);
     &whole * p * whole.transpose() + noise
@@ -367,7 +330,6 @@ fn covariance_agrees_with_dense_matrices_over_a_run() {
         p = dense_step(
             &p,
             &dense_f(&continuous_f(&terms, &c, f), [age, f, age, omega]),
-            &filters[0],
             0.01,
         );
         if (k + 1) % 100 != 0 {

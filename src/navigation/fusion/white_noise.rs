@@ -124,10 +124,10 @@ fn cost(solution: &Solution) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::vehicle_tests::settings;
+    use super::super::vehicle_tests::{settings, start_of, without_aids};
     use super::*;
     use crate::scenario::aiding_tests::{consumer, scenario, town};
-    use crate::sensors::aiding::AidingSettings;
+
     use crate::sensors::imu::Truth;
     use crate::simulation::{Plan, record};
 
@@ -136,7 +136,7 @@ mod tests {
     /// Where the noise is the model's, motion proposes nothing; the fixes decide for the right one of two beliefs.
     #[test]
     fn noise_of_the_recording_is_found_and_told_from_motion() {
-        let (trajectory, model, plain) = (town(), consumer(), scenario(AidingSettings::default()));
+        let (trajectory, model, plain) = (town(), consumer(), scenario(""));
         let with_white = |times: f64| {
             let mut model = model.clone();
             for axis in &mut model.axes {
@@ -160,17 +160,7 @@ mod tests {
                 let off = noise.times_model / times.sqrt() - 1.0;
                 assert!(off.abs() < 0.1, "{noise:?}");
             }
-            let start = Start {
-                t_s: 0.0,
-                state: recording.start,
-                sigma: plain.initial.clone(),
-                found: None,
-            };
-            let recorded = Recorded {
-                imu: &recording.imu,
-                gnss: &recording.gnss,
-                aids: &[],
-            };
+            let (recorded, start) = (without_aids(&recording), start_of(&recording));
             let as_well = predicts_as_well(&recorded, [&larger, &stated], &start, &settings());
             assert_eq!(as_well, found == 2, "{times}");
         }

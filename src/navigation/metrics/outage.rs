@@ -285,17 +285,9 @@ mod tests {
         assert!((metrics.rmse_end.0[4] - (35.0_f64 / 3.0).sqrt()).abs() < 1e-15);
         assert_eq!((metrics.asee_end.0[1], metrics.nees_end), (6.0, 27.0));
         assert_eq!(metrics.log_density_end, -3.0);
-        assert_eq!(
-            (
-                metrics.horizontal_error_end_m.p50,
-                metrics.horizontal_error_end_m.max
-            ),
-            (3.0, 5.0)
-        );
-        assert_eq!(
-            (metrics.reconvergence_s.p50, metrics.reconvergence_s.never),
-            (2.0, Some(1))
-        );
+        let (horizontal, back) = (&metrics.horizontal_error_end_m, &metrics.reconvergence_s);
+        assert_eq!((horizontal.p50, horizontal.max), (3.0, 5.0));
+        assert_eq!((back.p50, back.never), (2.0, Some(1)));
     }
 
     /// Two tilts of 1° that stand still for 100 s: g·(1°)²·100 s = 0.2987 m/s, against 0.3 of a standard deviation.
@@ -358,6 +350,7 @@ mod epoch_tests {
         }
     }
 
+    /// The accuracy of a run is the mean of its epochs.
     #[test]
     fn an_epoch_of_two_runs_in_closed_form() {
         let e = EpochMetrics::of(&two_runs(), None);
@@ -377,18 +370,12 @@ mod epoch_tests {
             (e.nees.value, e.nees.std_error, e.coverage),
             (10.0, 2.0, 0.5)
         );
-    }
-
-    #[test]
-    fn accuracy_is_the_mean_of_standard_deviations() {
-        let mut later = two_runs();
-        later.see = [12.0; REPORTED];
-        later.error_sq = [2.0 * 81.0; REPORTED];
-        let all = [
-            EpochMetrics::of(&two_runs(), None),
-            EpochMetrics::of(&later, None),
-        ];
-        let accuracy = AccuracySummary::over(all.iter());
+        let later = EpochSums {
+            see: [12.0; REPORTED],
+            error_sq: [2.0 * 81.0; REPORTED],
+            ..two_runs()
+        };
+        let accuracy = AccuracySummary::over([e, EpochMetrics::of(&later, None)].iter());
         assert_eq!(
             (accuracy.asee_mean.0[0], accuracy.rmse_mean.0[8]),
             (4.0, 7.0)
