@@ -69,3 +69,6 @@ pub use outcome::{
 pub use pipeline::{calibrate, calibrate_telling, fit_curve, infer, infer_telling};
 pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};
 pub use uncertainty::{ALIKE_LEVEL, Scattering, WIDEST, derived_interval, figures_with_intervals};
+
+#[cfg(test)]
+pub(crate) mod tests;

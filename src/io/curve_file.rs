@@ -210,6 +210,7 @@ mod tests {
     use super::*;
     use crate::io::tests::{answers, told};
     use crate::report::json as to_json;
+    use approx::assert_abs_diff_eq;
 
     #[test]
     fn a_table_of_scales() {
@@ -258,7 +259,7 @@ mod tests {
         );
         // Medians of chi²/n for n = 20 and 10, 19.3374/20 and 9.3418/10 (tables), within the error of the cube root.
         for (found, exact) in read[0].curve.log_bias.iter().zip([-0.033693, -0.068086]) {
-            assert!((found - exact).abs() < 1e-3, "{found}");
+            assert_abs_diff_eq!(*found, exact, epsilon = 1e-3);
         }
     }
 

@@ -11,7 +11,7 @@ use crate::simulation::lincov::{FilterPass, Judged, Track, TruthSide};
 use crate::tests::{drive, gauss_markov};
 use crate::trajectory::Trajectory;
 use crate::units::DEG;
-use approx::assert_relative_eq;
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 
 const RATE_HZ: f64 = 50.0;
 pub(crate) const OUTAGE: Outage = Outage {
@@ -190,7 +190,7 @@ fn a_state_for_the_wheel_keeps_a_filter_honest() {
             format!("odometer.truth.scale_sigma = 0.02\nodometer.scale_sigma = {scale_sigma}");
         both(&scenario(&odometer), 1).0.consistency().nees
     };
-    assert!((nees(0.02) - 9.0).abs() < 1e-6, "{}", nees(0.02));
+    assert_abs_diff_eq!(nees(0.02), 9.0, epsilon = 1e-6);
     assert!(nees(0.0) > 20.0, "{}", nees(0.0));
 }
 

@@ -2,6 +2,7 @@ use super::*;
 use crate::io::model_file;
 use crate::io::tests::{Files, answers, told};
 use crate::io::toml_file::Source;
+use approx::assert_relative_eq;
 use nav_sim_signal::noise::practical::Minimum;
 use std::path::Path;
 
@@ -37,11 +38,19 @@ fn densities_are_where_the_allan_deviation_is_read() {
     // 128 samples a second: 1 s is 2^7 samples, level 8
     let made = sheet.model_file(128.0).unwrap().file.model;
     let density = 0.15 / 60.0 * std::f64::consts::PI / 180.0;
-    assert!((allan_deviation(&made.axes[3], 8) / density - 1.0).abs() < 1e-12);
+    assert_relative_eq!(
+        allan_deviation(&made.axes[3], 8),
+        density,
+        max_relative = 1e-12
+    );
     // K² τ/3 in continuous time; sampled, a share 1/(2·128²) more
     let walk = 1e-6 * 9.806_65;
     let expected = walk * (1.0_f64 / 3.0).sqrt();
-    assert!((allan_deviation(&made.axes[0], 8) / expected - 1.0).abs() < 1e-4);
+    assert_relative_eq!(
+        allan_deviation(&made.axes[0], 8),
+        expected,
+        max_relative = 1e-4
+    );
 }
 
 /// The figure is the lowest point of the Allan deviation (IEEE 952), for every entry of the catalogue: over averages of 1 s
@@ -110,7 +119,11 @@ fn provenance_holds_every_figure_as_given() {
     assert_eq!(given, ["0.3 °/√h", "0.1 deg/s", "300 ppm"]);
     assert_eq!(provenance["estimator"].as_str(), Some("datasheet"));
     let sigma = 0.1 * std::f64::consts::PI / 180.0;
-    assert!((file.turn_on.unwrap().gyro_rad_s.unwrap()[2] / sigma - 1.0).abs() < 1e-14);
+    assert_relative_eq!(
+        file.turn_on.unwrap().gyro_rad_s.unwrap()[2],
+        sigma,
+        max_relative = 1e-14
+    );
     assert_eq!(file.missing.len(), 3);
 }
 
@@ -218,10 +231,7 @@ fn figures_of_kalibr_are_where_it_reads_them() {
     let of =
         |axis: usize, process: usize| Composite::new(vec![model.axes[axis].processes[process]]);
     let near = |value: f64, expected: f64, error: f64| {
-        assert!(
-            (value / expected - 1.0).abs() < error,
-            "{value:e} {expected:e}"
-        );
+        assert_relative_eq!(value, expected, max_relative = error);
     };
     near(of(0, 0).allan_variance(256).sqrt(), 0.0025, 1e-12);
     near(of(3, 0).allan_variance(256).sqrt(), 0.00019, 1e-12);
@@ -292,7 +302,7 @@ fn a_turn_on_bias_is_by_grade_where_a_sheet_has_none() {
         Some(2e-3 * 9.806_65)
     );
     let gyro = sheet.value(Sensor::Gyro, Figure::TurnOn).unwrap();
-    assert!((gyro / (10.0_f64.to_radians() / 3600.0) - 1.0).abs() < 1e-12);
+    assert_relative_eq!(gyro, 10.0_f64.to_radians() / 3600.0, max_relative = 1e-12);
     let lacking = [
         "accel noise",
         "gyro noise",

@@ -482,6 +482,7 @@ fn of_log(path: &Path, topic: Option<&str>, imu_s: Option<(f64, f64)>) -> Result
 mod fix_tests {
     use super::*;
     use crate::io::tests::Files;
+    use approx::assert_abs_diff_eq;
     use glam::DVec2;
 
     /// Text of Inertial Explorer: units in a line of their own, week and second, velocities up. The IMU ran in seconds of the
@@ -497,7 +498,7 @@ mod fix_tests {
         let (fixes, notes) = read_gnss(&path, None, Some((462_000.0, 463_000.0)), None).unwrap();
         let fix = &fixes[0];
         assert_eq!((fix.t_s, fix.h), (462_797.3, 18.0));
-        assert!((fix.lat - 30.53 * DEG).abs() < 1e-15);
+        assert_abs_diff_eq!(fix.lat, 30.53 * DEG, epsilon = 1e-15);
         assert_eq!(fix.pos_sigma_n, DVec3::new(0.012, 0.01, 0.037));
         let velocity = fix.velocity.unwrap();
         assert_eq!(velocity.horizontal, DVec2::new(1.11, 1.92));
@@ -517,10 +518,14 @@ mod fix_tests {
         let (fixes, _) = read_gnss(&path, None, None, None).unwrap();
         let sum = |of: fn(&GnssFix) -> f64| fixes.iter().map(of).sum::<f64>();
         assert_eq!(fixes.len(), 4);
-        assert!((sum(|f| f.lat) / DEG - 186.000_007_999_999_98).abs() < 1e-11);
-        assert!((sum(|f| f.lon) / DEG - 26.399_984).abs() < 1e-11);
-        assert!((sum(|f| f.h) - 1_601.022_578_849_756).abs() < 1e-9);
-        assert!((sum(|f| f.pos_sigma_n.z) - 4.8).abs() < 1e-12);
+        assert_abs_diff_eq!(
+            sum(|f| f.lat) / DEG,
+            186.000_007_999_999_98,
+            epsilon = 1e-11
+        );
+        assert_abs_diff_eq!(sum(|f| f.lon) / DEG, 26.399_984, epsilon = 1e-11);
+        assert_abs_diff_eq!(sum(|f| f.h), 1_601.022_578_849_756, epsilon = 1e-9);
+        assert_abs_diff_eq!(sum(|f| f.pos_sigma_n.z), 4.8, epsilon = 1e-12);
     }
 }
 

@@ -2,6 +2,7 @@ use super::*;
 use crate::io::Failure;
 use crate::io::tests::{answers, told};
 use crate::io::toml_file::Source;
+use approx::assert_abs_diff_eq;
 use nav_sim_signal::imu::{Axis, Sensor};
 use nav_sim_signal::noise::{Composite, Law, Process, Variation};
 
@@ -220,7 +221,11 @@ fn turn_on_biases_are_one_or_three_standard_deviations() {
     let of_accel = (turn_on.sigma(Sensor::Accel), turn_on.axes(Sensor::Accel));
     assert_eq!(of_accel, (None, None));
     // the variances 9, 0 and 16 (1e-6) have the mean 25/3
-    assert!((turn_on.sigma(Sensor::Gyro).unwrap().powi(2) / 25e-6 - 1.0 / 3.0).abs() < 1e-15);
+    assert_abs_diff_eq!(
+        turn_on.sigma(Sensor::Gyro).unwrap().powi(2) / 25e-6,
+        1.0 / 3.0,
+        epsilon = 1e-15
+    );
     assert_eq!(read("accel_m_s2 = 0.1").accel_m_s2, Some([0.1; 3]));
 }
 

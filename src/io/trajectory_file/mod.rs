@@ -917,6 +917,7 @@ mod import_tests {
     use super::*;
     use crate::io::fusion_files::WEEK_S;
     use crate::io::tests::{answers, told};
+    use approx::assert_abs_diff_eq;
     use nav_sim_navigation::frames::RollPitchYaw;
     use nav_sim_navigation::trajectory::Trajectory;
 
@@ -947,7 +948,7 @@ mod import_tests {
         assert!(warnings.is_empty(), "{warnings:?}");
         assert_eq!((t.start_s(), t.end_s()), (604_798.5, 604_802.5));
         let v_n = t.state(604_800.0).v_n;
-        assert!((v_n.y - 19.2).abs() < 0.02, "{v_n}");
+        assert_abs_diff_eq!(v_n.y, 19.2, epsilon = 0.02);
     }
 
     #[test]

@@ -3,6 +3,7 @@ mod profiles;
 use super::*;
 use crate::io::tests::{Files, answers, told};
 use crate::io::toml_file::Source;
+use approx::assert_abs_diff_eq;
 use glam::DVec3;
 use nav_sim_navigation::frames::RollPitchYaw;
 use nav_sim_signal::units::DEG;
@@ -80,7 +81,7 @@ fn headings_to_360_longitudes_across_180_and_other_names_mean_the_same() {
     let head = "# made by hand\n\"time_s\"; latitude; longitude_deg; alt_m; roll_deg; pitch_deg; heading_deg\n";
     let (t, warnings) = read(&(head.to_owned() + &text)).unwrap();
     assert!(warnings.is_empty(), "{warnings:?}");
-    assert!((t.state(7.0).lon / DEG - 179.9996).abs() < 1e-9);
+    assert_abs_diff_eq!(t.state(7.0).lon / DEG, 179.9996, epsilon = 1e-9);
     assert!((RollPitchYaw::from_quat(t.state(4.0).q_b_n).yaw / DEG + 95.0).abs() < 1e-9);
 }
 
@@ -217,7 +218,7 @@ fn local_coordinates_need_and_use_an_origin() {
         state.v_n
     );
     // 12.5 m away the plane is 12.5²/2R = 1e-5 m above the ellipsoid.
-    assert!((state.h - 102.0).abs() < 2e-5, "{}", state.h);
+    assert_abs_diff_eq!(state.h, 102.0, epsilon = 2e-5);
 }
 
 #[test]

@@ -731,6 +731,7 @@ mod transition_tests {
     use crate::imu::Sensor;
     use crate::strapdown::Strapdown;
     use crate::tests::state;
+    use approx::assert_abs_diff_eq;
     use glam::DVec3;
 
     /// A covariance as large as this one, with correlations all over.
@@ -779,10 +780,7 @@ mod transition_tests {
         assert_eq!(found.nrows(), 27);
         for (i, j) in (0..27).flat_map(|i| (0..27).map(move |j| (i, j))) {
             let scale = ((p[(i, i)] + q[(i, i)]) * (p[(j, j)] + q[(j, j)])).sqrt();
-            assert!(
-                (found[(i, j)] - expected[(i, j)]).abs() <= 1e-12 * scale,
-                "({i}, {j})"
-            );
+            assert_abs_diff_eq!(found[(i, j)], expected[(i, j)], epsilon = 1e-12 * scale);
         }
         assert_eq!(filters[0].take_transition(), DMatrix::identity(27, 27));
     }

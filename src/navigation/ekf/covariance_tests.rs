@@ -1,7 +1,7 @@
 //! The blocks of the covariance against dense products.
 
 use super::*;
-use approx::assert_relative_eq;
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 use nalgebra::{DMatrix, DVector};
 
 /// A covariance with the same positive definite matrix in all lanes, and that matrix.
@@ -27,7 +27,7 @@ fn scalar_update_agrees_with_the_dense_kalman_update() {
     let expected_s = (h.transpose() * &m * &h)[0] + 0.25;
     let k = &m * &h / expected_s;
     let expected = &m - &k * h.transpose() * &m;
-    assert!((s[3] - expected_s).abs() < 1e-13);
+    assert_abs_diff_eq!(s[3], expected_s, epsilon = 1e-13);
     assert!((p.lane(2) - expected).abs().max() < 1e-13);
 }
 

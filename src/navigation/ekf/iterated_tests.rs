@@ -8,6 +8,7 @@ use crate::frames::NavState;
 use crate::imu::ImuSample;
 use crate::lanes::Vec3;
 use crate::noise::Model;
+use approx::assert_abs_diff_eq;
 use glam::DQuat;
 use rand::RngExt;
 
@@ -58,12 +59,7 @@ fn what_is_carried_is_the_derivative_of_the_retraction() {
 fn coefficients_of_small_angles_go_on_into_those_of_large_ones() {
     let [below, above] = [SMALL * (1.0 - 1e-12), SMALL].map(coefficients);
     for (k, bound) in [1e-12, 1e-12, 2e-9, 3e-10].into_iter().enumerate() {
-        assert!(
-            (below[k] - above[k]).abs() < bound,
-            "{k}: {} {}",
-            below[k],
-            above[k]
-        );
+        assert_abs_diff_eq!(below[k], above[k], epsilon = bound);
     }
 }
 
@@ -125,5 +121,5 @@ fn small_innovations_are_used_alike() {
         error.iter().map(|x| x * x).sum::<f64>().sqrt()
     };
     let (whole, half) = (difference(0.02), difference(0.01));
-    assert!((whole / half - 4.0).abs() < 0.2, "{whole} {half}");
+    assert_abs_diff_eq!(whole / half, 4.0, epsilon = 0.2);
 }

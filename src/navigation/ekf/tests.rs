@@ -14,6 +14,7 @@ use crate::noise::Model;
 use crate::rng::Generator;
 use crate::strapdown::Strapdown;
 use crate::tests::{gauss_markov, key, state};
+use approx::assert_abs_diff_eq;
 use glam::{DQuat, DVec3};
 use nalgebra::{DMatrix, Matrix3, SMatrix};
 use rand::RngExt;
@@ -358,7 +359,7 @@ fn every_vector_unit_computes_the_same() {
     let (p, q) = (portable.p.lane(3), avx2.p.lane(3));
     for (i, j) in (0..15).flat_map(|i| (0..15).map(move |j| (i, j))) {
         let scale = (p[(i, i)] * p[(j, j)]).sqrt();
-        assert!((p[(i, j)] - q[(i, j)]).abs() <= 1e-9 * scale, "({i}, {j})");
+        assert_abs_diff_eq!(p[(i, j)], q[(i, j)], epsilon = 1e-9 * scale);
     }
     let (a, b) = (portable.nominal.lane(3), avx2.nominal.lane(3));
     let difference = error_of(&a, &b);

@@ -14,6 +14,7 @@ use crate::imu::Sensor;
 use crate::lanes::{Lanes, Level, Vec3};
 use crate::noise::{Composite, Model, Process};
 use crate::strapdown::Strapdown;
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 use glam::{DQuat, DVec3};
 use nalgebra::DMatrix;
 
@@ -51,10 +52,10 @@ fn the_covariance_at_the_start_is_what_is_believed() {
     let angles = initial.att_sigma_deg.map(f64::to_radians);
     let sigmas = [initial.pos_sigma_m, initial.vel_sigma_m_s, angles].concat();
     for (i, sigma) in sigmas.iter().enumerate() {
-        assert!(
-            (p[(i, i)] - sigma * sigma).abs() < 1e-15 * (1.0 + p[(i, i)]),
-            "{i}: {}",
-            p[(i, i)]
+        assert_abs_diff_eq!(
+            p[(i, i)],
+            sigma * sigma,
+            epsilon = 1e-15 * (1.0 + p[(i, i)])
         );
     }
 }
@@ -72,10 +73,7 @@ fn flicker_noise_starts_with_its_variance() {
     )
     .unwrap();
     let variance: f64 = belief.groups[0].iter().map(|group| group.initial.x).sum();
-    assert!(
-        (variance / noise.initial_variance() - 1.0).abs() < 1e-12,
-        "{variance}"
-    );
+    assert_relative_eq!(variance, noise.initial_variance(), max_relative = 1e-12);
 }
 
 /// A turn-on bias has a state beside the processes of the model, which stay; a second one adds its variance to the first, and
@@ -106,10 +104,7 @@ fn a_turn_on_bias_is_beside_what_wanders() {
             constant.phi.x == 1.0 && constant.innovation.x == 0.0,
             "{constant:?}"
         );
-        assert!(
-            (constant.initial.x - 0.05 * 0.05).abs() < 1e-15,
-            "{constant:?}"
-        );
+        assert_abs_diff_eq!(constant.initial.x, 0.05 * 0.05, epsilon = 1e-15);
     }
 }
 
@@ -365,16 +360,12 @@ fn covariance_agrees_with_dense_matrices_over_a_run() {
     for sensor in Sensor::ALL {
         let first = if sensor == Sensor::Accel { 18 } else { 24 };
         let sigma = filters[0].p.variances(first / 3).lane(0).y.sqrt();
-        assert!((sigma / p[(first + 1, first + 1)].sqrt() - 1.0).abs() < 1e-4);
+        assert_relative_eq!(sigma, p[(first + 1, first + 1)].sqrt(), max_relative = 1e-4);
         // bias and drift of an axis together: c = (1, age)
         let (bias, drift) = (9 + 3 * sensor as usize, first - 3);
         let sum = p[(bias, bias)] + 2.0 * 6000.0 * p[(bias, drift)] + 3.6e7 * p[(drift, drift)];
         let got = filters[0].bias_sigma(sensor).lane(0).x;
-        assert!(
-            (got / sum.sqrt() - 1.0).abs() < 2e-3,
-            "{got} {}",
-            sum.sqrt()
-        );
+        assert_relative_eq!(got, sum.sqrt(), max_relative = 2e-3);
     }
 }
 

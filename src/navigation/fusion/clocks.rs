@@ -285,6 +285,7 @@ mod tests {
     use super::*;
     use crate::earth::moved;
     use crate::tests::key;
+    use approx::assert_abs_diff_eq;
     use rand::RngExt;
 
     /// A drive of ten minutes at 10 m/s whose course turns by `rate(t)`, an IMU at 50 Hz in any attitude, and so many fixes a
@@ -363,7 +364,7 @@ mod tests {
     fn the_difference_of_the_clocks_is_found_with_its_sign() {
         for (fixes, late_s) in [(1, 18.0), (1, -18.0), (1, 2.0), (1, -0.7), (10, 2.0)] {
             let apart = turns_apart(&drive(fixes, late_s, winding)).unwrap();
-            assert!((apart.delay_s - late_s).abs() < 0.5 * STEP_S, "{apart:?}");
+            assert_abs_diff_eq!(apart.delay_s, late_s, epsilon = 0.5 * STEP_S);
         }
     }
 

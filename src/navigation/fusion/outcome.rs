@@ -659,6 +659,7 @@ mod assessment_tests {
     use super::VerdictKind::*;
     use super::*;
     use crate::fusion::outcome;
+    use approx::assert_relative_eq;
     use statrs::distribution::{ChiSquared, ContinuousCDF};
 
     /// A fix a second of three components with this NIS per component.
@@ -733,7 +734,11 @@ mod assessment_tests {
                 .retain(|f| f.t_s % 60.0 >= 59.0 || f.t_s % 60.0 < 30.0);
             let outcome = outcome(&all, &[]);
             assert_eq!(outcome.ends.unwrap().count, 10);
-            assert!((outcome.ends.unwrap().error_over_sigma / ratio - 1.0).abs() < 1e-12);
+            assert_relative_eq!(
+                outcome.ends.unwrap().error_over_sigma,
+                ratio,
+                max_relative = 1e-12
+            );
             assess(&weighed(&all), &outcome, &[], None)
                 .findings
                 .into_iter()

@@ -373,6 +373,7 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
 mod standstill_tests {
     use super::*;
     use crate::tests::normals;
+    use approx::assert_abs_diff_eq;
 
     const RATE_HZ: f64 = 100.0;
     const N: usize = 50;
@@ -429,7 +430,7 @@ mod standstill_tests {
         );
         let fresh = at_rest(4000, 2);
         let missed = 4000 - stands(&found, &fresh);
-        assert!((missed as f64 - 40.0).abs() < 28.0, "{missed}");
+        assert_abs_diff_eq!(missed as f64, 40.0, epsilon = 28.0);
     }
 
     /// A car that sways by 0.3 m/s² and turns by 2 deg/s never stands.

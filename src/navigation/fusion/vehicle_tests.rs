@@ -17,7 +17,7 @@ use crate::simulation::lincov::{FilterPass, TruthSide};
 use crate::simulation::{Plan, Recording, record};
 use crate::tests::{assert_chi_square, normals};
 use crate::trajectory::Trajectory;
-use approx::assert_relative_eq;
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 use glam::{DQuat, DVec3};
 
 pub(super) fn settings() -> Settings {
@@ -208,15 +208,12 @@ fn the_constraint_holds_drift_as_the_covariance_analysis_says() {
     for (found, expected) in [(&free, of_free), (&held, of_held)] {
         let (rms, stated) = ((found.errors / n).sqrt(), (found.stated / n).sqrt());
         assert_relative_eq!(stated, expected, max_relative = 0.05);
-        assert!(
-            (rms / expected - 1.0).abs() < 4.0 / (2.0 * n).sqrt(),
-            "{rms} {expected}"
-        );
+        assert_relative_eq!(rms, expected, max_relative = 4.0 / (2.0 * n).sqrt());
         assert_chi_square(found.nis, 2.0 * n, 2e-4);
         assert_chi_square(found.smoothed, 9.0 * n, 2e-4);
     }
     let factor = (free.errors / held.errors).sqrt() / (of_free / of_held);
-    assert!((factor - 1.0).abs() < 4.0 / n.sqrt(), "{factor}");
+    assert_abs_diff_eq!(factor, 1.0, epsilon = 4.0 / n.sqrt());
 }
 
 #[test]

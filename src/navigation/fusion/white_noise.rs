@@ -127,6 +127,7 @@ mod tests {
     use super::super::vehicle_tests::{settings, start_of, without_aids};
     use super::*;
     use crate::scenario::aiding_tests::{consumer, scenario, town};
+    use approx::assert_relative_eq;
 
     use crate::sensors::imu::Truth;
     use crate::simulation::{Plan, record};
@@ -175,10 +176,10 @@ mod tests {
             (stated(&white, 1.0) - 2.0).abs() < 1e-9 && (stated(&white, 0.1) - 2.0).abs() < 1e-9
         );
         let fast = Composite::new(vec![Process::ar1(0.5, 1.0).unwrap()]);
-        assert!((stated(&fast, 0.01) / 4.0 - 1.0).abs() < 0.01);
+        assert_relative_eq!(stated(&fast, 0.01), 4.0, max_relative = 0.01);
         // the autocovariances of an AR1, φ^k/(1 − φ²), under the fourth difference
         let weights = [70.0, 2.0 * -56.0, 2.0 * 28.0, 2.0 * -8.0, 2.0];
         let sum: f64 = (0..5).map(|k| weights[k as usize] * 0.5_f64.powi(k)).sum();
-        assert!((stated(&fast, 1.0) / (sum / 0.75 / 70.0) - 1.0).abs() < 1e-9);
+        assert_relative_eq!(stated(&fast, 1.0), sum / 0.75 / 70.0, max_relative = 1e-9);
     }
 }

@@ -542,17 +542,13 @@ mod tests {
         // 1, 2, 3, 6: mean 3, sample variance 14/3
         let mean = Estimate::mean_of([1.0, 2.0, 3.0, 6.0].into_iter(), None);
         assert_eq!(mean.value, 3.0);
-        assert!((mean.std_error - (14.0_f64 / 12.0).sqrt()).abs() < 1e-15);
+        assert_abs_diff_eq!(mean.std_error, (14.0_f64 / 12.0).sqrt(), epsilon = 1e-15);
         // squares 1, 4, 9, 36: mean 12.5, sample variance 769/3
         let rms =
             Estimate::mean_of([1.0_f64, -2.0, 3.0, -6.0].into_iter().map(|x| x * x), None).root();
-        assert!((rms.value - 12.5_f64.sqrt()).abs() < 1e-15);
+        assert_abs_diff_eq!(rms.value, 12.5_f64.sqrt(), epsilon = 1e-15);
         let expected = (769.0_f64 / 12.0).sqrt() / (2.0 * 12.5_f64.sqrt());
-        assert!(
-            (rms.std_error - expected).abs() < 1e-14,
-            "{} {expected}",
-            rms.std_error
-        );
+        assert_abs_diff_eq!(rms.std_error, expected, epsilon = 1e-14);
     }
 
     /// Every value twice: the mean of half as many independent ones, its standard error theirs; one value has none.
@@ -652,6 +648,7 @@ mod consistency_tests {
 mod quadratic_form_tests {
     use super::*;
     use crate::tests::normals;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
     use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
     fn form_of(terms: impl IntoIterator<Item = (f64, f64)>) -> QuadraticForm {
@@ -691,11 +688,7 @@ mod quadratic_form_tests {
         for x in [1e-3, 0.1, 1.0, 10.0, 60.0] {
             let beyond = |w: f64| w * (-0.5 * x / w).exp();
             let expected = 1.0 - (beyond(a) - beyond(b)) / (a - b);
-            assert!(
-                (form.cdf(x) - expected).abs() < 1e-12,
-                "{x}: {} {expected}",
-                form.cdf(x)
-            );
+            assert_abs_diff_eq!(form.cdf(x), expected, epsilon = 1e-12);
         }
     }
 
@@ -745,18 +738,15 @@ mod quadratic_form_tests {
         for p in [0.01, 0.1, 0.5, 0.9, 0.95, 0.999] {
             let x = form.quantile(p);
             let share = draws.iter().filter(|q| **q <= x).count() as f64 / f64::from(n);
-            assert!(
-                (share - p).abs() < 5.0 * (p * (1.0 - p) / f64::from(n)).sqrt(),
-                "{p}: {share}"
+            assert_abs_diff_eq!(
+                share,
+                p,
+                epsilon = 5.0 * (p * (1.0 - p) / f64::from(n)).sqrt()
             );
         }
         let root = draws.iter().map(|q| q.sqrt()).sum::<f64>() / f64::from(n);
         let error = ((form.mean() - root * root) / f64::from(n)).sqrt();
-        assert!(
-            (root - form.mean_root()).abs() < 5.0 * error,
-            "{root} {}",
-            form.mean_root()
-        );
+        assert_abs_diff_eq!(root, form.mean_root(), epsilon = 5.0 * error);
     }
 
     #[test]
@@ -772,11 +762,7 @@ mod quadratic_form_tests {
             (sure.cdf(24.9), sure.cdf(25.1), sure.quantile(0.5)),
             (0.0, 1.0, 25.0)
         );
-        assert!(
-            (sure.mean_root() / 5.0 - 1.0).abs() < 1e-8,
-            "{}",
-            sure.mean_root()
-        );
+        assert_relative_eq!(sure.mean_root(), 5.0, max_relative = 1e-8);
         // z² beside a certain 4: χ² of one degree of freedom from there on
         let mut half = DMatrix::zeros(2, 2);
         half[(0, 0)] = 1.0;

@@ -247,6 +247,7 @@ impl Serialize for Budget {
 mod tests {
     use super::*;
     use crate::simulation::{EpochSums, RunRecord};
+    use approx::assert_abs_diff_eq;
 
     fn run(run: u64, value: f64, diverged: bool) -> RunRecord {
         let record = OutageRecord {
@@ -282,7 +283,11 @@ mod tests {
         };
         let metrics = &outages(&result, &[])[0];
         assert_eq!(metrics.asee_mean.0[1], 3.0);
-        assert!((metrics.rmse_end.0[4] - (35.0_f64 / 3.0).sqrt()).abs() < 1e-15);
+        assert_abs_diff_eq!(
+            metrics.rmse_end.0[4],
+            (35.0_f64 / 3.0).sqrt(),
+            epsilon = 1e-15
+        );
         assert_eq!((metrics.asee_end.0[1], metrics.nees_end), (6.0, 27.0));
         assert_eq!(metrics.log_density_end, -3.0);
         let (horizontal, back) = (&metrics.horizontal_error_end_m, &metrics.reconvergence_s);
@@ -332,6 +337,7 @@ mod tests {
 mod epoch_tests {
     use super::*;
     use crate::simulation::REPORTED;
+    use approx::assert_abs_diff_eq;
 
     /// Two runs of SEE 1 and 3, errors 1 and −7: ASEE is the mean 2 (not the root mean square √5), its standard
     /// error √2/√2; RMSE √25, bias −3; NEES 8 and 12.
@@ -358,14 +364,10 @@ mod epoch_tests {
             (e.asee.0[3].value, e.rmse.0[3].value, e.bias.0[3].value),
             (2.0, 5.0, -3.0)
         );
-        assert!((e.asee.0[3].std_error - 1.0).abs() < 1e-15);
+        assert_abs_diff_eq!(e.asee.0[3].std_error, 1.0, epsilon = 1e-15);
         assert_eq!(e.bias_asee, [0.25; BIASES]);
         // squares 1 and 49: standard deviation 24 √2, of their mean 24, of its root 24/(2·5)
-        assert!(
-            (e.rmse.0[3].std_error - 2.4).abs() < 1e-14,
-            "{:?}",
-            e.rmse.0[3]
-        );
+        assert_abs_diff_eq!(e.rmse.0[3].std_error, 2.4, epsilon = 1e-14);
         assert_eq!(
             (e.nees.value, e.nees.std_error, e.coverage),
             (10.0, 2.0, 0.5)

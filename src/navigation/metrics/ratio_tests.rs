@@ -119,9 +119,10 @@ fn paired_intervals_cover_at_their_level() {
         covered += u32::from(((ratio - 1.2) * 100.0).abs() <= half);
     }
     let share = f64::from(covered) / f64::from(repetitions);
-    assert!(
-        (share - 0.95).abs() < 5.0 * (0.95_f64 * 0.05 / 4000.0).sqrt(),
-        "{share}"
+    assert_abs_diff_eq!(
+        share,
+        0.95,
+        epsilon = 5.0 * (0.95_f64 * 0.05 / 4000.0).sqrt()
     );
 }
 

@@ -107,10 +107,7 @@ fn each_outage_has_a_verdict_of_its_own() {
 fn a_small_difference_is_no_verdict() {
     let verdict = Verdict::of(&runs(20_000, 1, 3, [1.05; 9]), 1, None);
     assert_eq!(verdict.kind, Consistent);
-    assert!(
-        (verdict.nees / 9.0 - 1.05 * 1.05).abs() < 0.02,
-        "{verdict:?}"
-    );
+    assert_abs_diff_eq!(verdict.nees / 9.0, 1.05 * 1.05, epsilon = 0.02);
 }
 
 /// The same hundred runs, worth 3 of them: nothing can be told any more from a state 1.5 times off.
@@ -217,13 +214,13 @@ fn what_never_changes_is_one_sample() {
     let constant = || std::iter::repeat_n(0.7, 1000);
     let size =
         |all: Vec<Vec<f64>>| SampleSize::of_series(all.into_iter().map(Vec::into_iter)).independent;
-    assert!((size(vec![constant().collect()]) - 1.0).abs() < 1e-9);
+    assert_abs_diff_eq!(size(vec![constant().collect()]), 1.0, epsilon = 1e-9);
     let white: Vec<f64> = (0..1024)
         .map(|k| if k % 2 == 0 { 1.0 } else { -1.0 })
         .collect();
     // all of its energy is at the finest scale, which has half as many coefficients
-    assert!((size(vec![white.clone()]) - 512.0).abs() < 1e-9);
-    assert!((size(vec![white.clone(), white]) - 512.0).abs() < 1e-9);
+    assert_abs_diff_eq!(size(vec![white.clone()]), 512.0, epsilon = 1e-9);
+    assert_abs_diff_eq!(size(vec![white.clone(), white]), 512.0, epsilon = 1e-9);
 }
 
 /// Drives of 400 correlation times tell errors 1.0, 1.25 and 0.8 times the stated ones: at most two of 40 wrong, and the same
@@ -277,6 +274,10 @@ fn states_whose_errors_are_the_same_are_one() {
         .collect();
     let verdict = Verdict::of_drive(&alike, &[]).unwrap().verdict;
     let one = SampleSize::of_series([alike.iter().map(|e| e.over_sigma[0])].into_iter());
-    assert!((verdict.independent_samples * 3.0 / one.independent - 1.0).abs() < 1e-9);
+    assert_relative_eq!(
+        verdict.independent_samples * 3.0,
+        one.independent,
+        max_relative = 1e-9
+    );
     assert!(Verdict::of_drive(&[], &[]).is_none());
 }

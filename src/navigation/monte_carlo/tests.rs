@@ -169,7 +169,7 @@ fn the_iterated_update_is_more_consistent_after_a_long_outage() {
             .sum::<f64>()
             / pairs
     };
-    assert!((end(&once[0]) / end(&iterated[0]) - 1.0).abs() < 0.01);
+    assert_relative_eq!(end(&once[0]), end(&iterated[0]), max_relative = 0.01);
 }
 
 /// Outages change which fixes are used and no random number: before the outage nothing differs.

@@ -1,4 +1,5 @@
 use super::*;
+use approx::assert_abs_diff_eq;
 
 fn outage(start_s: f64, end_s: f64) -> Outage {
     Outage { start_s, end_s }
@@ -172,9 +173,10 @@ fn random_outages_occur_at_the_stated_rate_and_repeat_with_the_seed() {
     // E N(T) = T/m + (s² + m²)/(2m²) − E[first]/m, m = 630 s, s = E[first] = 600 s.
     let (m, s, t) = (630.0, 600.0, span.1);
     let expected = t / m + (s * s + m * m) / (2.0 * m * m) - s / m;
-    assert!(
-        (mean - expected).abs() < 5.0 * (variance / seeds as f64).sqrt(),
-        "{mean} {expected}"
+    assert_abs_diff_eq!(
+        mean,
+        expected,
+        epsilon = 5.0 * (variance / seeds as f64).sqrt()
     );
     assert_eq!(plan.windows(span, 7), plan.windows(span, 7));
     assert_ne!(plan.windows(span, 7), plan.windows(span, 8));

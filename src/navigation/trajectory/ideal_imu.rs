@@ -139,6 +139,7 @@ mod tests {
     use crate::frames::RollPitchYaw;
     use crate::tests::samples;
     use crate::units::DEG;
+    use approx::assert_abs_diff_eq;
     use glam::DQuat;
 
     const WGS84: GravityModel = GravityModel::Wgs84;
@@ -220,7 +221,7 @@ mod tests {
                 let expected = DVec3::new(0.0, -angle.sin(), -angle.cos()) * g * sinc;
                 // the spline's error
                 assert!((s.f_ib_b - expected).length() < 1e-7 * g);
-                assert!((s.omega_ib_b.x - omega - OMEGA_IE).abs() < 1e-6);
+                assert_abs_diff_eq!(s.omega_ib_b.x - omega, OMEGA_IE, epsilon = 1e-6);
             }
         }
     }

@@ -62,7 +62,7 @@ fn acceleration_keeps_its_limit_and_reaches_its_speed() {
     assert_abs_diff_eq!(feel(&t, 23.5).0, 25.0, epsilon = 1e-5);
     assert_abs_diff_eq!(feel(&t, t.end_s()).0, 5.0, epsilon = 1e-5);
     // Beside the curvature of the Earth, v²/R = 1e-4 m/s², all of it is along the track.
-    assert!((largest(&t, |s| feel(&t, s).1.x) - 2.0).abs() < 1e-4);
+    assert_abs_diff_eq!(largest(&t, |s| feel(&t, s).1.x), 2.0, epsilon = 1e-4);
     assert!(largest(&t, |s| feel(&t, s).1.y.abs()) < 2e-4);
 }
 
@@ -93,8 +93,12 @@ fn height_changes_by_what_was_asked_and_pitch_is_the_slope() {
         10.0,
         "{ kind = 'straight', duration_s = 20, climb_m = -15 }",
     );
-    assert!((t.state(t.end_s()).h - 385.0).abs() < 1e-8);
-    assert!((largest(&t, |s| feel(&t, s).2.pitch.abs()).sin() - 15.0 / 200.0 / 0.95).abs() < 1e-6);
+    assert_abs_diff_eq!(t.state(t.end_s()).h, 385.0, epsilon = 1e-8);
+    assert_abs_diff_eq!(
+        largest(&t, |s| feel(&t, s).2.pitch.abs()).sin(),
+        15.0 / 200.0 / 0.95,
+        epsilon = 1e-6
+    );
     for s in [12.0, 17.7, 25.0] {
         let (speed, _, rpy) = feel(&t, s);
         assert!(
@@ -113,7 +117,11 @@ fn coordinated_turns_bank() {
     (p.bank, p.ramp_s) = (Bank::Coordinated, 3.0);
     let t = p.build().unwrap();
     let middle = 0.5 * (t.start_s() + t.end_s());
-    assert!((feel(&t, middle).2.roll - (40.0 * 10.0 * DEG / STANDARD_GRAVITY).atan()).abs() < 1e-6);
+    assert_abs_diff_eq!(
+        feel(&t, middle).2.roll,
+        (40.0 * 10.0 * DEG / STANDARD_GRAVITY).atan(),
+        epsilon = 1e-6
+    );
     let lateral = largest(&t, |s| {
         let (_, a_b, _) = feel(&t, s);
         let state = t.state(s);

@@ -1,6 +1,7 @@
 //! The clock of a recording: gaps, rates, units.
 
 use super::*;
+use approx::assert_abs_diff_eq;
 use nav_sim_signal::rng::Generator;
 use rand::{RngExt, SeedableRng};
 
@@ -214,7 +215,7 @@ fn counters_that_start_again_are_counted_on() {
         let text = stamped(name, 100, |k| format!("{:.6}", at(k)));
         let (_files, path) = Files::with("a.csv", text);
         let (recordings, report) = read(&[path], &ReadOptions::default()).unwrap();
-        assert!((recordings[0].rate_hz - 100.0).abs() < 0.01);
+        assert_abs_diff_eq!(recordings[0].rate_hz, 100.0, epsilon = 0.01);
         assert_eq!(
             report.files[0].assumptions[0],
             format!("column \"{name}\" starts again 1 times: counted on")

@@ -1,6 +1,7 @@
 //! Facts that no noise explains: none in clean recordings, and what becomes of those that have some.
 
 use super::*;
+use approx::assert_relative_eq;
 use nav_sim_signal::noise::{Composite, Kind, Model, Process, VirtualImu};
 use nav_sim_signal::rng::Generator;
 use rand::{RngExt, SeedableRng};
@@ -139,7 +140,7 @@ fn shared_noise_and_drift_are_told() {
     let words: Vec<&str> = said.split(' ').collect();
     let slope: f64 = words[3].parse().unwrap();
     assert_eq!((words[0], words[4]), ("gyro.y", "deg/h"));
-    assert!((slope * DEG / 3600.0_f64.powi(2) / 4e-5 - 1.0).abs() < 0.4);
+    assert_relative_eq!(slope * DEG / 3600.0_f64.powi(2), 4e-5, max_relative = 0.4);
 }
 
 /// Rows of white noise of six axes at 100 Hz about gravity, 2 cm/s² and 2 mrad/s.
@@ -231,7 +232,7 @@ fn rows_that_are_no_measurements_are_left_out_and_counted() {
     );
     for recording in [&copied, &lost, &frozen, &repeated] {
         let (sigma, _) = level(recording);
-        assert!((sigma / 0.02 - 1.0).abs() < 0.03, "{sigma}");
+        assert_relative_eq!(sigma, 0.02, max_relative = 0.03);
     }
 }
 

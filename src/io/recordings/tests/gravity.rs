@@ -1,6 +1,7 @@
 //! What gravity tells of units and axes.
 
 use super::*;
+use approx::assert_abs_diff_eq;
 
 fn six_axes(scale: f64, unit: &str) -> String {
     let row = |k: usize| {
@@ -50,7 +51,11 @@ fn exchanged_sensors_are_refused() {
 fn gravity_tells_units_that_are_not_said() {
     for scale in [1.0, 1.0 / STANDARD_GRAVITY, 1000.0 / STANDARD_GRAVITY] {
         let r = read_one("a.csv", six_axes(scale, ""), &at(100.0)).unwrap();
-        assert!((r.signals[2].mean - STANDARD_GRAVITY).abs() < 1e-9 * scale.max(1.0));
+        assert_abs_diff_eq!(
+            r.signals[2].mean,
+            STANDARD_GRAVITY,
+            epsilon = 1e-9 * scale.max(1.0)
+        );
     }
 }
 

@@ -5,7 +5,7 @@ use super::*;
 use crate::ekf::update::{body_velocity_rows, yaw_row as row_of_yaw};
 use crate::frames::{RollPitchYaw, wrap_angle};
 use crate::noise::{Composite, Process};
-use approx::assert_relative_eq;
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 
 #[test]
 fn lever_arm_rows_agree_with_central_differences() {
@@ -103,10 +103,7 @@ fn a_height_is_worth_its_variance() {
     let height = filter.nominal.h;
     update_height(&mut filter, &height, 0.5);
     let after = filter.p.get::<Lanes>(2, 2)[0];
-    assert!(
-        (after * (1.0 / before + 1.0 / 0.25) - 1.0).abs() < 1e-12,
-        "{before} {after}"
-    );
+    assert_abs_diff_eq!(after * (1.0 / before + 1.0 / 0.25), 1.0, epsilon = 1e-12);
 }
 
 /// Rows of the velocity along the body's axes and of yaw, against central differences of both.
