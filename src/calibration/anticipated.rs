@@ -262,37 +262,43 @@ fn in_order(composite: &Composite) -> Composite {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::{Process, Variation, VirtualImu};
-    use crate::{Pool, calibrate, grouped, replicates};
+    use crate::calibrate;
+    use crate::imu::Channel;
+    use crate::noise::{Law, Variation};
+    use crate::tests::{imu, inferred, recorded, settings, white_and_walk};
+    use approx::assert_relative_eq;
 
     const RECORDINGS: usize = 4;
     const SAMPLES: usize = 2048;
 
     fn model() -> Model {
-        let white = Process::white(1.0).unwrap();
-        let walk = Process::random_walk(1e-3).unwrap();
-        let axis = Composite::new(vec![white, walk]);
+        let axis = white_and_walk(1.0, 1e-3);
         Model::pooled(1.0, &axis, &axis)
     }
 
-    fn settings() -> Settings {
-        Settings {
-            estimators: vec![Estimator::Awv],
-            model: ModelChoice::Given("WN+RW".parse().unwrap()),
-            ..Settings::default()
+    /// Parameters that differ from recording to recording, on each axis for itself.
+    fn spread(parameters: &[(&str, &str)], law: Law) -> Spread {
+        let axis = model().axes[0].clone();
+        let variation = |(p, key): &(&str, &str)| Variation::new(&axis, p, key, law).unwrap();
+        let laws: Vec<Variation> = parameters.iter().map(variation).collect();
+        Spread {
+            axes: std::array::from_fn(|_| laws.clone()),
         }
+    }
+
+    /// Half the width of the logarithm of an interval.
+    fn half(outcome: &Outcome) -> f64 {
+        let interval = &outcome.inference.as_ref().unwrap().intervals[0];
+        0.5 * (interval.high / interval.low).ln()
     }
 
     /// Standard deviations of the logarithms of sigma2 and gamma2.
     fn scatter(composites: &[Composite]) -> [f64; 2] {
         std::array::from_fn(|i| {
-            let logs: Vec<f64> = composites
-                .iter()
-                .map(|c| c.processes[i].values()[0].ln())
-                .collect();
-            let mean = logs.iter().sum::<f64>() / logs.len() as f64;
-            (logs.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (logs.len() as f64 - 1.0))
-                .sqrt()
+            let logs = composites.iter().map(|c| c.processes[i].values()[0].ln());
+            let n = composites.len() as f64;
+            let mean = logs.clone().sum::<f64>() / n;
+            (logs.map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt()
         })
     }
 
@@ -308,7 +314,7 @@ mod tests {
             draws: 400,
             seed: 1,
         };
-        plan.outcomes(Estimator::Awv, &settings(), scattering, bootstrap)
+        plan.outcomes(Estimator::Awv, &settings("WN+RW"), scattering, bootstrap)
             .unwrap()
             .remove(0)
     }
@@ -318,53 +324,30 @@ mod tests {
     #[test]
     fn fits_scatter_as_those_of_recordings_that_are_made() {
         let model = model();
+        let settings = settings("WN+RW");
         let made = |seed: u64| {
-            let imu = VirtualImu {
-                model: &model,
-                spread: None,
-                contamination: None,
-                seed,
-            };
-            let accel = Channel::named("accel");
-            let mut signals = Vec::new();
-            for run in 1..=RECORDINGS as u64 {
-                let recording = imu.recording(run, &accel, SAMPLES).unwrap();
-                signals.extend(replicates(&recording, None, &settings().tuning).unwrap());
-            }
-            calibrate(&grouped(signals, Pool::Sensor), &settings())
+            let (imu, accel) = (imu(&model, None, seed), Channel::named("accel"));
+            let groups = recorded(&imu, RECORDINGS as u64, &accel, SAMPLES, &settings);
+            calibrate(&groups, &settings)
                 .unwrap()
                 .remove(0)
                 .fit
                 .composite
         };
         let forced = scatter(&(0..150).map(made).collect::<Vec<_>>());
-        let drawn = scatter(
-            &anticipated(None, SAMPLES, Scattering::All)
-                .inference
-                .unwrap()
-                .drawn,
-        );
-        for (drawn, forced) in drawn.into_iter().zip(forced) {
-            assert!((drawn / forced - 1.0).abs() < 0.27, "{drawn} {forced}");
-        }
+        let planned = anticipated(None, SAMPLES, Scattering::All);
+        let drawn = scatter(&planned.inference.unwrap().drawn);
+        assert_relative_eq!(drawn[..], forced[..], max_relative = 0.27);
     }
 
     /// A white noise that differs by 10 % from recording to recording, on each axis for itself: the mean of 12 is known to
     /// 0.1/√12 = 2.9 %, however long they are; 400 draws know that to 3.5 %, four times.
     #[test]
     fn endless_recordings_leave_what_they_differ_by() {
-        let law = crate::noise::Law::Normal { sd: 0.1 };
-        let axis = model().axes[0].clone();
-        let vary = || vec![Variation::new(&axis, "WN", "sigma2", law).unwrap()];
-        let spread = Spread {
-            axes: std::array::from_fn(|_| vary()),
-        };
+        let spread = spread(&[("WN", "sigma2")], Law::Normal { sd: 0.1 });
         let endless = anticipated(Some(&spread), 1 << 16, Scattering::BetweenRecordings);
         let deviation = scatter(&endless.inference.unwrap().drawn)[0];
-        assert!(
-            (deviation / (0.1 / 12.0_f64.sqrt()) - 1.0).abs() < 0.14,
-            "{deviation}"
-        );
+        assert_relative_eq!(deviation, 0.1 / 12.0_f64.sqrt(), max_relative = 0.14);
     }
 
     /// Where four recordings differ at every scale, their differences are known to 3 degrees of freedom: an interval is t₀.₉₇₅(3) = 3.1824 deviations
@@ -372,30 +355,14 @@ mod tests {
     /// above, 0.0816; the ends by 400 draws are known to √(p(1 − p)/400)/f(z) = 0.134 deviations, half their distance to 4.8 %.
     #[test]
     fn few_recordings_widen_intervals_by_students_law() {
-        let law = crate::noise::Law::Normal { sd: 0.1 };
-        let axis = model().axes[0].clone();
-        let vary = || {
-            [("WN", "sigma2"), ("RW", "gamma2")]
-                .map(|(p, key)| Variation::new(&axis, p, key, law).unwrap())
-        };
-        let spread = Spread {
-            axes: std::array::from_fn(|_| vary().to_vec()),
-        };
+        let both = [("WN", "sigma2"), ("RW", "gamma2")];
+        let spread = spread(&both, Law::Normal { sd: 0.1 });
         let endless = anticipated(Some(&spread), 1 << 16, Scattering::BetweenRecordings);
-        let inference = endless.inference.unwrap();
         let stretch = 3.182_446 / 1.959_964 * (2.365_974_f64 / 3.0).sqrt();
-        assert!(
-            (inference.stretch / stretch - 1.0).abs() < 0.02,
-            "{} {stretch}",
-            inference.stretch
-        );
-        let interval = &inference.intervals[0];
-        let half = 0.5 * (interval.high / interval.low).ln();
+        let found = endless.inference.as_ref().unwrap().stretch;
+        assert_relative_eq!(found, stretch, max_relative = 0.02);
         let expected = 1.959_964 * stretch * 0.1 / 12.0_f64.sqrt();
-        assert!(
-            (half / expected - 1.0).abs() < 4.0 * 0.048,
-            "{half} {expected}"
-        );
+        assert_relative_eq!(half(&endless), expected, max_relative = 4.0 * 0.048);
     }
 
     /// Half widths of the logarithm of sigma2: anticipated, and in the median of 120 laboratories of 4 recordings of three axes whose
@@ -403,55 +370,23 @@ mod tests {
     /// by 1.25·42 %/√120 = 5 %; the ends by 400 draws by 7 %: twice both are 17 %.
     #[test]
     fn laboratories_state_what_was_anticipated() {
-        let law = crate::noise::Law::Lognormal {
+        let law = Law::Lognormal {
             median: 1.0,
             sd: 0.3,
             median_ci95: None,
             sd_ci95: None,
         };
-        let axis = model().axes[0].clone();
-        let vary = || vec![Variation::new(&axis, "WN", "sigma2", law).unwrap()];
-        let spread = Spread {
-            axes: std::array::from_fn(|_| vary()),
-        };
-        let half = |outcome: &Outcome| {
-            let interval = &outcome.inference.as_ref().unwrap().intervals[0];
-            0.5 * (interval.high / interval.low).ln()
-        };
+        let spread = spread(&[("WN", "sigma2")], law);
         let planned = half(&anticipated(Some(&spread), SAMPLES, Scattering::All));
         let model = model();
         let laboratory = |seed: u64| {
-            let imu = VirtualImu {
-                model: &model,
-                spread: Some(&spread),
-                contamination: None,
-                seed,
-            };
-            let signals = (1..=RECORDINGS as u64).flat_map(|run| {
-                let recording = imu
-                    .recording(run, &Channel::named("accel"), SAMPLES)
-                    .unwrap();
-                replicates(&recording, None, &settings().tuning).unwrap()
-            });
-            let groups = grouped(signals.collect(), Pool::Sensor);
-            let mut outcomes = calibrate(&groups, &settings()).unwrap();
-            crate::infer(
-                &groups,
-                &mut outcomes,
-                &settings(),
-                Bootstrap {
-                    draws: 100,
-                    seed: 1,
-                },
-            );
-            half(&outcomes[0])
+            let (imu, accel) = (imu(&model, Some(&spread), seed), Channel::named("accel"));
+            let settings = settings("WN+RW");
+            let groups = recorded(&imu, RECORDINGS as u64, &accel, SAMPLES, &settings);
+            half(&inferred(&groups, &settings, 100, 1))
         };
         let mut stated: Vec<f64> = (0..120).into_par_iter().map(laboratory).collect();
         stated.sort_by(f64::total_cmp);
-        assert!(
-            (planned / stated[60] - 1.0).abs() < 0.17,
-            "{planned} {}",
-            stated[60]
-        );
+        assert_relative_eq!(planned, stated[60], max_relative = 0.17);
     }
 }

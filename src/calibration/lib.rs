@@ -71,3 +71,6 @@ pub use outcome::{
 pub use pipeline::{calibrate, calibrate_with_progress, fit_curve, infer, infer_with_progress};
 pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};
 pub use uncertainty::{ALIKE_LEVEL, Scattering, WIDEST, derived_interval, figures_with_intervals};
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -592,6 +592,7 @@ mod departure_tests {
     use crate::fit::score;
     use crate::pipeline::fit_given;
     use crate::wavelet::Curve;
+    use approx::assert_abs_diff_eq;
     use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
     /// Twelve scales that are off by one deviation each are what chance brings: P(chi-square of 12 > 12) = 0.4457 (tables). Off by
@@ -664,10 +665,7 @@ mod departure_tests {
                     -normal.inverse_cdf(law.sf(ratio * edof))
                 };
                 if exact.abs() < 5.0 {
-                    assert!(
-                        (score(ratio, edof) - exact).abs() < 0.1,
-                        "{edof} {ratio}: {exact}"
-                    );
+                    assert_abs_diff_eq!(score(ratio, edof), exact, epsilon = 0.1);
                 }
             }
         }

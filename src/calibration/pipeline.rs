@@ -179,32 +179,17 @@ mod tests {
     use crate::imu::Sensor;
     use crate::noise::{Composite, Process};
     use crate::outcome::FitRange;
+    use crate::tests::{exact, white_and_walk};
     use approx::assert_relative_eq;
 
     /// White noise and random walk of which the middle scales are without a root, their classical variances a tenth of the model's
     /// at one of them: the fit counts that scale, and no other that bounds it from far above.
     #[test]
     fn a_scale_without_a_root_bounds_the_fit() {
-        let model = Composite::new(vec![
-            Process::white(1.0).unwrap(),
-            Process::random_walk(1e-4).unwrap(),
-        ]);
-        let levels: Vec<u32> = (1..=12).collect();
-        let wv = levels.iter().map(|l| {
-            model.haar_wv(*l)
-                * match l {
-                    6 => 0.1,
-                    7 => 10.0,
-                    _ => 1.0,
-                }
-        });
-        let curve = Curve {
-            wv: wv.collect(),
-            edof: vec![1e3; 12],
-            ignored: vec![6, 7],
-            levels,
-            ..Curve::default()
-        };
+        let mut curve = exact(&white_and_walk(1.0, 1e-4), 12, |_| 1e3);
+        curve.ignored = vec![6, 7];
+        curve.wv[5] *= 0.1;
+        curve.wv[6] *= 10.0;
         let outcome = fit_given(curve, "WN+RW", Settings::default().rate_hz);
         assert_eq!(outcome.curve.ignored, [7]);
     }
@@ -218,24 +203,12 @@ mod tests {
             Process::ar1(0.99, 1e-3).unwrap(),
             Process::random_walk(1e-7).unwrap(),
         ]);
-        let levels: Vec<u32> = (1..=16).collect();
+        let mut whole = exact(&model, 16, |level| 1e6 / f64::from(level).exp2());
         // Off by a few per cent from scale to scale, and by a factor of two at the first one.
-        let off =
-            |level: u32| 1.0 + 0.03 * f64::from(level).sin() + f64::from(u8::from(level == 1));
-        let wv = levels
-            .iter()
-            .map(|level| model.haar_wv(*level) * off(*level))
-            .collect();
-        let edof = levels
-            .iter()
-            .map(|level| 1e6 / f64::from(*level).exp2())
-            .collect();
-        let whole = Curve {
-            levels,
-            wv,
-            edof,
-            ..Curve::default()
-        };
+        whole.wv[0] *= 2.0;
+        for (k, nu) in whole.wv.iter_mut().enumerate() {
+            *nu *= 1.0 + 0.03 * (k as f64 + 1.0).sin();
+        }
         let part = |values: &[f64]| values[1..13].to_vec();
         let short = Curve {
             levels: (2..=13).collect(),
@@ -261,20 +234,11 @@ mod tests {
             ..Settings::default()
         };
         let fit = |curve: &Curve, range| {
-            fit_curve(
-                &group,
-                Estimator::Given,
-                curve.clone(),
-                &settings(range),
-                &|_| {},
-            )
-            .unwrap()
+            let (curve, settings) = (curve.clone(), settings(range));
+            fit_curve(&group, Estimator::Given, curve, &settings, &|_| {}).unwrap()
         };
-        let (ranged, shortened, all) = (
-            fit(&whole, Some(range)),
-            fit(&short, None),
-            fit(&whole, None),
-        );
+        let ranged = fit(&whole, Some(range));
+        let (shortened, all) = (fit(&short, None), fit(&whole, None));
         assert_eq!(
             (ranged.counted_levels().len(), ranged.departure().scales),
             (12, 12)
@@ -292,9 +256,11 @@ mod tests {
                 .map(|(_, x)| x)
                 .collect::<Vec<_>>()
         };
-        for (a, b) in values(&ranged).into_iter().zip(values(&shortened)) {
-            assert_relative_eq!(a, b, max_relative = 1e-6);
-        }
+        assert_relative_eq!(
+            values(&ranged)[..],
+            values(&shortened)[..],
+            max_relative = 1e-6
+        );
         assert!(all.fit.objective > 10.0 * ranged.fit.objective);
     }
 }

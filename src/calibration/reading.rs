@@ -90,28 +90,19 @@ fn slopes(outcome: &Outcome, rate_hz: f64) -> Option<Outcome> {
 
 #[cfg(test)]
 mod tests {
-    use crate::noise::{Composite, Process};
+    use crate::noise::Process;
     use crate::outcome::Outcome;
     use crate::pipeline::fit_given;
-    use crate::wavelet::Curve;
+    use crate::tests::{exact, white_and_walk};
+    use approx::assert_abs_diff_eq;
 
     /// White noise and random walk, exact but for a vibration at these levels.
     fn outcome(vibrating: &[u32]) -> Outcome {
-        let model = Composite::new(vec![
-            Process::white(1.0).unwrap(),
-            Process::random_walk(1e-5).unwrap(),
-        ]);
-        let levels: Vec<u32> = (1..=16).collect();
-        let factor = |level: &u32| if vibrating.contains(level) { 50.0 } else { 1.0 };
-        let curve = Curve {
-            wv: levels
-                .iter()
-                .map(|l| model.haar_wv(*l) * factor(l))
-                .collect(),
-            edof: levels.iter().map(|l| 1e6 / f64::from(*l).exp2()).collect(),
-            levels,
-            ..Curve::default()
-        };
+        let noise = white_and_walk(1.0, 1e-5);
+        let mut curve = exact(&noise, 16, |level| 1e6 / f64::from(level).exp2());
+        vibrating
+            .iter()
+            .for_each(|level| curve.wv[*level as usize - 1] *= 50.0);
         fit_given(curve, "WN+RW", 100.0)
     }
 
@@ -122,11 +113,8 @@ mod tests {
         let read = vibrating.for_navigation();
         assert_eq!(read.counted_levels(), (6..=16).collect::<Vec<_>>());
         let amplitudes = read.fit.composite.processes.iter().map(Process::amplitude);
-        for (found, exact) in amplitudes.zip([1.0, 0.0, 0.0, 1e-5]) {
-            assert!(
-                (found - exact).abs() <= 1e-3 * exact.max(1e-6),
-                "{found} {exact}"
-            );
+        for (found, exact) in amplitudes.zip([1.0_f64, 0.0, 0.0, 1e-5]) {
+            assert_abs_diff_eq!(found, exact, epsilon = 1e-3 * exact.max(1e-6));
         }
         assert_eq!(outcome(&[]).reading, None);
     }

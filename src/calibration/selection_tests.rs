@@ -4,33 +4,25 @@ use super::*;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Composite, Process, Synthesizer};
 use crate::rng::StreamKey;
-use crate::wavelet::{Tuning, both};
-use crate::{
-    Bootstrap, FitRange, ModelChoice, Outcome, Pool, Replicate, Trim, Weighting, calibrate,
-    grouped, infer,
-};
+use crate::tests::{inferred, measured, plain_settings, white_and_walk};
+use crate::{FitRange, ModelChoice, Outcome, Pool, Weighting, calibrate, grouped};
 
 fn settings() -> Settings {
     Settings {
-        estimators: vec![Estimator::Awv],
         model: ModelChoice::Auto,
-        trim: Trim::Count(0),
-        tuning: Tuning::new(0.6).unwrap(),
-        weighting: Weighting::Edof,
-        fit_range: None,
-        rate_hz: 1.0,
+        ..plain_settings("WN")
     }
 }
 
 fn outcome(set: u64, noise: &Composite) -> Outcome {
     let settings = settings();
-    calibrate(&[recordings(set, |_| noise.clone(), &settings)], &settings)
+    calibrate(&[recordings(set, |_| noise.clone())], &settings)
         .unwrap()
         .remove(0)
 }
 
 /// Four recordings, each of its own noise.
-fn recordings(set: u64, noise: impl Fn(u64) -> Composite, settings: &Settings) -> Group {
+fn recordings(set: u64, noise: impl Fn(u64) -> Composite) -> Group {
     let channel = Channel {
         sensor: Sensor::Gyro,
         axis: Axis::X,
@@ -45,20 +37,7 @@ fn recordings(set: u64, noise: impl Fn(u64) -> Composite, settings: &Settings) -
         };
         let mut signal = vec![0.0; 4096];
         Synthesizer::new(&noise(run), key).fill(&mut signal);
-        let (classical, robust) = both(&signal, 9, &settings.tuning).unwrap();
-        (
-            channel,
-            Replicate {
-                name: format!("run{run}"),
-                axis: None,
-                samples: 4096,
-                classical,
-                robust,
-                coverage: Vec::new(),
-                trend: f64::NAN,
-                mean: f64::NAN,
-            },
-        )
+        (channel, measured(format!("run{run}"), &signal, 9))
     };
     grouped((0..4).map(replicate).collect(), Pool::Axes).remove(0)
 }
@@ -85,12 +64,8 @@ fn chosen_as_often_as_said(sets: u64, least: usize) {
     let correlated = Process::ar1(0.95, 0.05).unwrap();
     for truth in [vec![white], vec![white, walk], vec![white, correlated]] {
         let noise = Composite::new(truth);
-        let name = noise
-            .processes
-            .iter()
-            .map(Process::code)
-            .collect::<Vec<_>>()
-            .join("+");
+        let codes: Vec<&str> = noise.processes.iter().map(Process::code).collect();
+        let name = codes.join("+");
         let chosen: Vec<String> = (0..sets)
             .map(|set| outcome(set, &noise).spec.to_string())
             .collect();
@@ -102,17 +77,8 @@ fn chosen_as_often_as_said(sets: u64, least: usize) {
 
 #[test]
 fn candidates_are_ranked() {
-    let noise = Composite::new(vec![
-        Process::white(1.0).unwrap(),
-        Process::random_walk(1e-3).unwrap(),
-    ]);
-    let ranking = outcome(3, &noise).ranking.unwrap();
-    assert!(
-        ranking
-            .candidates
-            .windows(2)
-            .all(|c| c[0].wvic() <= c[1].wvic())
-    );
+    let ranking = outcome(3, &white_and_walk(1.0, 1e-3)).ranking.unwrap();
+    assert!(ranking.candidates.is_sorted_by(|a, b| a.wvic() <= b.wvic()));
     let chosen = &ranking.candidates[ranking.chosen];
     assert!(
         chosen.optimism > 0.0 && chosen.objective > 0.0,
@@ -158,44 +124,22 @@ fn a_rejected_model_is_not_preferred_to_one_that_passes() {
 /// seed the probability scatters by √(0.05·0.95/199) = 0.015 about the 5 % of the choice; two and a half of these below.
 #[test]
 fn the_chosen_model_passes_the_test_of_its_own_fit() {
-    let noise = |run: u64| {
-        let gamma2 = [3e-7, 1e-6, 3e-6, 3e-4][run as usize];
-        Composite::new(vec![
-            Process::white(1.0).unwrap(),
-            Process::random_walk(gamma2).unwrap(),
-        ])
-    };
+    let noise = |run: u64| white_and_walk(1.0, [3e-7, 1e-6, 3e-6, 3e-4][run as usize]);
     let settings = Settings {
         weighting: Weighting::Model,
         ..settings()
     };
     for set in 0..3 {
-        let groups = [recordings(set, noise, &settings)];
-        let mut outcomes = calibrate(&groups, &settings).unwrap();
-        infer(
-            &groups,
-            &mut outcomes,
-            &settings,
-            Bootstrap {
-                draws: 199,
-                seed: 7,
-            },
-        );
-        let ranking = outcomes[0].ranking.as_ref().unwrap();
+        let outcome = inferred(&[recordings(set, noise)], &settings, 199, 7);
+        let ranking = outcome.ranking.unwrap();
         if ranking.candidates[ranking.chosen].is_rejected() {
             continue;
         }
-        let goodness = outcomes[0]
-            .inference
-            .as_ref()
-            .unwrap()
-            .goodness
-            .as_ref()
-            .unwrap();
+        let goodness = outcome.inference.unwrap().goodness.unwrap();
         assert!(
             goodness.p_value > 0.0125,
             "set {set}: {} {goodness:?}",
-            outcomes[0].spec
+            outcome.spec
         );
     }
 }
@@ -212,16 +156,10 @@ fn candidates_are_sums_that_the_counted_scales_can_carry() {
         ..settings()
     };
     let white = Composite::new(vec![Process::white(1.0).unwrap()]);
-    let outcome = calibrate(&[recordings(1, |_| white.clone(), &settings)], &settings)
+    let outcome = calibrate(&[recordings(1, |_| white.clone())], &settings)
         .unwrap()
         .remove(0);
     assert_eq!(outcome.counted_levels().len(), 6);
-    assert!(
-        outcome
-            .ranking
-            .unwrap()
-            .candidates
-            .iter()
-            .all(|c| c.spec.parameters() < 6)
-    );
+    let candidates = outcome.ranking.unwrap().candidates;
+    assert!(candidates.iter().all(|c| c.spec.parameters() < 6));
 }

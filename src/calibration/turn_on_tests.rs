@@ -2,11 +2,11 @@
 
 use super::*;
 use crate::curve::{Pool, grouped, replicates};
-use crate::noise::{Composite, Model, Process, VirtualImu};
-use crate::outcome::{ModelChoice, Settings};
+use crate::imu::Recording;
+use crate::noise::{Composite, Model, Process};
+use crate::outcome::Settings;
 use crate::pipeline::calibrate;
-use crate::rng::StreamKey;
-use rand_distr::{Distribution, StandardNormal};
+use crate::tests::{generator, imu, normal, settings};
 use rayon::prelude::*;
 
 const RECORDINGS: usize = 6;
@@ -23,42 +23,48 @@ fn white() -> Process {
 
 /// The gyroscopes of six recordings, their biases of a standard deviation; fitted with a sum of processes.
 fn laboratory(noise: &Model, bias: f64, spec: &str, seed: u64) -> TurnOnSpread {
-    let imu = VirtualImu {
-        model: noise,
-        spread: None,
-        contamination: None,
+    let gyros = Channel::named("gyro");
+    let mut found = spreads(
+        noise,
         seed,
-    };
-    let gyros: Vec<Channel> = Channel::ALL
-        .into_iter()
-        .filter(|c| c.sensor == Sensor::Gyro)
-        .collect();
+        RECORDINGS as u64,
+        &gyros,
+        spec,
+        |run, recording| {
+            let mut generator = generator(seed, run);
+            for signal in &mut recording.signals {
+                signal.mean += 1e-3 + bias * normal(&mut generator);
+            }
+        },
+    );
+    assert_eq!(found.len(), 1);
+    found.remove(0)
+}
+
+/// What is found in recordings that are changed.
+fn spreads(
+    noise: &Model,
+    seed: u64,
+    recordings: u64,
+    channels: &[Channel],
+    spec: &str,
+    change: impl Fn(u64, &mut Recording),
+) -> Vec<TurnOnSpread> {
     let settings = Settings {
-        model: ModelChoice::Given(spec.parse().unwrap()),
-        ..Settings::default()
+        estimators: Settings::default().estimators,
+        ..settings(spec)
     };
     let mut signals = Vec::new();
-    for replicate in 1..=RECORDINGS as u64 {
-        let mut recording = imu.recording(replicate, &gyros, SAMPLES).unwrap();
-        let key = StreamKey {
-            seed,
-            scenario: "",
-            run: replicate,
-            source: "gyro",
-            process: "turn_on",
-        };
-        let mut generator = key.generator();
-        for signal in &mut recording.signals {
-            let normal: f64 = StandardNormal.sample(&mut generator);
-            signal.mean += 1e-3 + bias * normal;
-        }
+    for run in 1..=recordings {
+        let mut recording = imu(noise, None, seed)
+            .recording(run, channels, SAMPLES)
+            .unwrap();
+        change(run, &mut recording);
         signals.extend(replicates(&recording, None, &settings.tuning).unwrap());
     }
     let groups = grouped(signals, Pool::Sensor);
     let outcomes = calibrate(&groups, &settings).unwrap();
-    let found = turn_on(&groups, &outcomes.iter().collect::<Vec<_>>());
-    assert_eq!(found.len(), 1);
-    found[0].clone()
+    turn_on(&groups, &outcomes.iter().collect::<Vec<_>>())
 }
 
 fn laboratories(count: u64, noise: &Model, bias: f64, spec: &str) -> Vec<TurnOnSpread> {
@@ -120,29 +126,9 @@ fn another_mounting_is_no_bias_and_means_removed_are_none() {
         laboratory(&noise, 0.3, "WN", 1).finding,
         TurnOnFinding::Moved
     );
-    let (imu, settings) = (
-        VirtualImu {
-            model: &noise,
-            spread: None,
-            contamination: None,
-            seed: 1,
-        },
-        {
-            Settings {
-                model: ModelChoice::Given("WN".parse().unwrap()),
-                ..Settings::default()
-            }
-        },
-    );
-    let mut signals = Vec::new();
-    for replicate in 1..=3 {
-        let mut recording = imu.recording(replicate, &Channel::ALL, SAMPLES).unwrap();
+    let found = spreads(&noise, 1, 3, &Channel::ALL, "WN", |_, recording| {
         recording.signals.iter_mut().for_each(|s| s.mean = 0.0);
-        signals.extend(replicates(&recording, None, &settings.tuning).unwrap());
-    }
-    let groups = grouped(signals, Pool::Axes);
-    let outcomes = calibrate(&groups, &settings).unwrap();
-    let found = turn_on(&groups, &outcomes.iter().collect::<Vec<_>>());
+    });
     assert!(
         found.len() == 2 && found.iter().all(|f| f.finding == TurnOnFinding::Removed),
         "{found:?}"

@@ -214,77 +214,58 @@ fn table_kind(text: &str) -> FileKind {
 mod tests {
     use super::*;
 
-    fn of_toml(text: &str) -> FileKind {
-        toml_kind(&text.parse().unwrap_or_default())
-    }
-
     #[test]
     fn contents_tell_the_kind() {
-        assert_eq!(of_toml("[accel]\nprocesses = []"), FileKind::Model);
-        assert_eq!(
-            of_toml("[unit]\nname = 'a'\n[gyro]\nnoise = {}"),
-            FileKind::CatalogueEntry
-        );
-        assert_eq!(of_toml("start = {}\nsegment = []"), FileKind::Trajectory);
-        assert_eq!(
-            of_toml("[run]\nruns = 3\n[vary]\nmodel = ['a', 'b']"),
-            FileKind::Study
-        );
-        assert_eq!(of_toml("[run]\nruns = 3"), FileKind::Scenario);
-        assert_eq!(
-            of_toml("[[accel]]\noperation = 'ar1'"),
-            FileKind::Contamination
-        );
-        assert_eq!(
-            table_kind("$GPGGA,123519,4807.038,N,01131.000,E,1"),
-            FileKind::Gnss
-        );
-        assert_eq!(table_kind("tau_samples,wv,edof"), FileKind::Curve);
-        assert_eq!(
-            of_toml("t_s = 0\nlat_deg = 46\nyaw_deg = 3"),
-            FileKind::Initial
-        );
-        assert_eq!(
-            table_kind("t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m"),
-            FileKind::Gnss
-        );
-        assert_eq!(
-            table_kind("t_s,lat_deg,lon_deg,h_m,yaw_deg,sd_yaw_deg"),
-            FileKind::Trajectory
-        );
-        assert_eq!(table_kind("1 30.5 114.2 20 1 1 2\n"), FileKind::Gnss);
-        assert_eq!(
-            table_kind("1 30.5 114.2 20 0 0 0 1 1 2 0.1 0.1 0.1\n"),
-            FileKind::Gnss
-        );
-        assert_eq!(
-            table_kind("1 1e-5 2e-5 -1e-5 0.01 0.02 -0.098\n"),
-            FileKind::Imu
-        );
-        for text in [
-            "0,46.5,6.5,400,2,2,4\n",
-            "0,46.5,6.5,400\n",
-            "0,0 46,5 6,5 400,0 2,0 2,0 4,0\n",
-            "t_s,lat_deg,lon_deg,h_m,status",
-            "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m,yaw_deg",
+        for (text, kind) in [
+            ("[accel]\nprocesses = []", FileKind::Model),
+            (
+                "[unit]\nname = 'a'\n[gyro]\nnoise = {}",
+                FileKind::CatalogueEntry,
+            ),
+            ("start = {}\nsegment = []", FileKind::Trajectory),
+            (
+                "[run]\nruns = 3\n[vary]\nmodel = ['a', 'b']",
+                FileKind::Study,
+            ),
+            ("[run]\nruns = 3", FileKind::Scenario),
+            ("[[accel]]\noperation = 'ar1'", FileKind::Contamination),
+            ("t_s = 0\nlat_deg = 46\nyaw_deg = 3", FileKind::Initial),
+            ("= broken", FileKind::Scenario),
         ] {
-            assert_eq!(table_kind(text), FileKind::Gnss, "{text}");
+            assert_eq!(toml_kind(&text.parse().unwrap_or_default()), kind, "{text}");
         }
-        for text in [
-            "0,9.79,0.1,0.2,1e-3,2e-3,1e-3\n",
-            "0.007,1.011,0.038,-0.160\n0.01,7,1.011,0.038,-0.1,0.1,33\n",
+        for (text, kind) in [
+            ("$GPGGA,123519,4807.038,N,01131.000,E,1", FileKind::Gnss),
+            ("tau_samples,wv,edof", FileKind::Curve),
+            (
+                "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m",
+                FileKind::Gnss,
+            ),
+            (
+                "t_s,lat_deg,lon_deg,h_m,yaw_deg,sd_yaw_deg",
+                FileKind::Trajectory,
+            ),
+            ("1 30.5 114.2 20 1 1 2\n", FileKind::Gnss),
+            ("1 30.5 114.2 20 0 0 0 1 1 2 0.1 0.1 0.1\n", FileKind::Gnss),
+            ("1 1e-5 2e-5 -1e-5 0.01 0.02 -0.098\n", FileKind::Imu),
+            ("0,46.5,6.5,400,2,2,4\n", FileKind::Gnss),
+            ("0,46.5,6.5,400\n", FileKind::Gnss),
+            ("0,0 46,5 6,5 400,0 2,0 2,0 4,0\n", FileKind::Gnss),
+            ("t_s,lat_deg,lon_deg,h_m,status", FileKind::Gnss),
+            (
+                "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m,yaw_deg",
+                FileKind::Gnss,
+            ),
+            ("0,9.79,0.1,0.2,1e-3,2e-3,1e-3\n", FileKind::Other),
+            (
+                "0.007,1.011,0.038,-0.160\n0.01,7,1.011,0.038,-0.1,0.1,33\n",
+                FileKind::Other,
+            ),
+            ("# origin\nt_s, lat_deg, lon_deg", FileKind::Trajectory),
+            ("t_s,accel_x_m_s2,gyro_z_rad_s", FileKind::Recording),
         ] {
-            assert_eq!(table_kind(text), FileKind::Other, "{text}");
+            assert_eq!(table_kind(text), kind, "{text}");
         }
-        assert_eq!(of_toml("= broken"), FileKind::Scenario);
-        assert_eq!(
-            table_kind("# origin\nt_s, lat_deg, lon_deg"),
-            FileKind::Trajectory
-        );
-        assert_eq!(
-            table_kind("t_s,accel_x_m_s2,gyro_z_rad_s"),
-            FileKind::Recording
-        );
     }
 
     #[test]

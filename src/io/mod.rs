@@ -10,8 +10,6 @@ pub(crate) mod fusion_files;
 pub(crate) mod input;
 pub mod logs;
 pub mod model_file;
-#[cfg(test)]
-mod property_tests;
 pub mod recordings;
 pub(crate) mod run_tables;
 pub(crate) mod scenario_file;
@@ -22,3 +20,8 @@ pub(crate) mod toml_file;
 pub mod trajectory_file;
 
 pub(crate) use crate::failure::{Failure, Place, help};
+
+#[cfg(test)]
+mod property_tests;
+#[cfg(test)]
+mod tests;

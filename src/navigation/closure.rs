@@ -126,60 +126,17 @@ fn damp(ins: &mut Strapdown, truth: &NavState, dt: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::profile::{
-        Acceleration, Bank, Length, Profile, ProfileStart, Segment, SegmentKind, Turning,
-    };
     use glam::{DQuat, DVec3};
 
     /// Ten hours of a car at 10 Hz: rounding alone would have left the ground by e^90.
     #[test]
     fn ten_hours_close() {
-        let cycle = [
-            SegmentKind::Accelerate {
-                to_speed: 15.0,
-                by: Acceleration::Duration(20.0),
-            },
-            SegmentKind::Straight(Length::Duration(820.0)),
-            SegmentKind::Turn {
-                angle: 1.5,
-                by: Turning::Duration(20.0),
-            },
-            SegmentKind::Accelerate {
-                to_speed: 8.0,
-                by: Acceleration::Duration(20.0),
-            },
-            SegmentKind::Turn {
-                angle: -1.4,
-                by: Turning::Duration(20.0),
-            },
-        ];
-        let segment = |kind: &SegmentKind| Segment {
-            kind: kind.clone(),
-            climb_m: 0.0,
-            ramp_s: None,
-        };
-        let segments = cycle
-            .iter()
-            .cycle()
-            .take(40 * cycle.len())
-            .map(segment)
-            .collect();
-        let start = ProfileStart {
-            t_s: 0.0,
-            lat: 0.8,
-            lon: 0.1,
-            h: 0.0,
-            heading: 0.7,
-            speed: 0.0,
-        };
-        let drive = Profile {
-            start,
-            bank: Bank::None,
-            ramp_s: 2.0,
-            segments,
-        }
-        .build()
-        .unwrap();
+        let cycle = "{ kind = 'accelerate', to_speed_m_s = 15, duration_s = 20 },
+            { kind = 'straight', duration_s = 820 },
+            { kind = 'turn', angle_deg = 86, duration_s = 20 },
+            { kind = 'accelerate', to_speed_m_s = 8, duration_s = 20 },
+            { kind = 'turn', angle_deg = -80, duration_s = 20 },";
+        let drive = crate::tests::drive(0.0, &cycle.repeat(40));
         let closure = Closure::new(&drive, 10.0, GravityModel::default()).unwrap();
         assert!(
             closure.duration_s >= 36_000.0 && closure.within(&Bounds::default()),
@@ -190,13 +147,7 @@ mod tests {
     /// A navigation that became NaN, at any epoch, is the largest error there is.
     #[test]
     fn what_is_not_finite_is_never_within_bounds() {
-        let state = NavState {
-            lat: 0.8,
-            lon: 0.1,
-            h: 400.0,
-            v_n: DVec3::ZERO,
-            q_b_n: DQuat::IDENTITY,
-        };
+        let state = crate::tests::state([0.0; 3]);
         let lost = NavState {
             h: f64::NAN,
             v_n: DVec3::NAN,

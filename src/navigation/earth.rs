@@ -242,15 +242,24 @@ pub fn e_to_n(lat: f64, lon: f64, v_e: DVec3) -> DVec3 {
 mod tests {
     use super::*;
     use crate::units::DEG;
+    use approx::assert_abs_diff_eq;
 
     /// WGS-84 report, table 3.4 and 3.5: derived geometric and physical constants.
     #[test]
     fn derived_constants_of_wgs84() {
         let polar = radii(1.0);
-        assert!((polar.transverse - 6_399_593.625_8).abs() < 1e-3);
-        assert!((gravity_down(GravityModel::Wgs84, 1.0, 0.0) - 9.832_184_937_8).abs() < 1e-9);
-        assert!((gravity_down(GravityModel::Wgs84, 0.0, 0.0) - 9.780_325_335_9).abs() < 1e-12);
-        assert!((E2 - 6.694_379_990_141e-3).abs() < 1e-15);
+        assert_abs_diff_eq!(polar.transverse, 6_399_593.625_8, epsilon = 1e-3);
+        assert_abs_diff_eq!(
+            gravity_down(GravityModel::Wgs84, 1.0, 0.0),
+            9.832_184_937_8,
+            epsilon = 1e-9
+        );
+        assert_abs_diff_eq!(
+            gravity_down(GravityModel::Wgs84, 0.0, 0.0),
+            9.780_325_335_9,
+            epsilon = 1e-12
+        );
+        assert_abs_diff_eq!(E2, 6.694_379_990_141e-3, epsilon = 1e-15);
     }
 
     /// The free-air series against the exact normal field, evaluated independently: gravitation of the
@@ -268,11 +277,7 @@ mod tests {
         let gamma = |u: f64| MU / (u * u + e * e) - OMEGA_IE.powi(2) * a * a / 3.0 * dq(u) / q(b);
         for h in [0.0, 1000.0, 10_000.0] {
             let series = gravity_down(GravityModel::Wgs84, 1.0, h);
-            assert!(
-                (series - gamma(b + h)).abs() < 2e-6,
-                "h = {h}: {series} against {}",
-                gamma(b + h)
-            );
+            assert_abs_diff_eq!(series, gamma(b + h), epsilon = 2e-6);
         }
     }
 

@@ -100,6 +100,7 @@ pub fn wrap_angle(angle: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::units::DEG;
+    use approx::assert_abs_diff_eq;
 
     #[test]
     fn euler_angles_rotate_in_the_order_yaw_pitch_roll() {
@@ -141,7 +142,7 @@ mod tests {
                 .into_iter()
                 .enumerate()
             {
-                assert!(((p - m) / 2e-6 - jacobian[row][k]).abs() < 1e-9);
+                assert_abs_diff_eq!((p - m) / 2e-6, jacobian[row][k], epsilon = 1e-9);
             }
         }
     }

@@ -32,3 +32,6 @@ pub mod metrics;
 // L9
 pub mod fusion;
 pub mod require;
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -117,12 +117,6 @@ mod tests {
         assert!(larger(f64::NAN, 1.0).is_nan() && larger(1.0, f64::NAN).is_nan());
     }
 
-    #[test]
-    fn vectors_keep_their_order() {
-        let v = DVec3::new(0.1, -0.2, 0.3);
-        assert_eq!(to_nalgebra(v).as_slice(), v.to_array());
-    }
-
     /// Numbers between −1/2 and 1/2 without pattern.
     fn scattered(rows: usize, columns: usize, seed: usize) -> DMatrix<f64> {
         let cube = |i: usize, j: usize| (i * 31 + j * 17 + seed * 7 + 3).pow(3) % 101;

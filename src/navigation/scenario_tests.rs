@@ -3,7 +3,12 @@
 use super::*;
 use crate::noise::{Composite, Process};
 use crate::simulation::lincov::FilterPass;
-use crate::trajectory::profile::{Bank, Length, Profile, ProfileStart, Segment, SegmentKind};
+use crate::tests::drive;
+
+/// Ten seconds at rest.
+fn standing() -> Trajectory {
+    drive(0.0, "{ kind = 'straight', duration_s = 10 }")
+}
 
 #[test]
 fn an_empty_file_is_the_papers_setting() {
@@ -26,6 +31,14 @@ fn an_empty_file_is_the_papers_setting() {
     assert_eq!(
         scenario.outages_on((0.0, 900.0), 1).unwrap().windows,
         Outage::PAPER
+    );
+    let without: Scenario = toml::from_str("outage = []").unwrap();
+    assert!(
+        without
+            .outages_on((0.0, 900.0), 1)
+            .unwrap()
+            .windows
+            .is_empty()
     );
 }
 
@@ -111,32 +124,6 @@ fn what_the_filter_does_not_expect_is_found_of_each_sensor() {
     assert!(coloured(0.09).is_empty() && coloured(0.11)[0].starts_with(correlated));
 }
 
-/// Ten seconds at rest.
-fn standing() -> Trajectory {
-    let start = ProfileStart {
-        t_s: 0.0,
-        lat: 0.8,
-        lon: 0.1,
-        h: 0.0,
-        heading: 0.0,
-        speed: 0.0,
-    };
-    let kind = SegmentKind::Straight(Length::Duration(10.0));
-    let segments = vec![Segment {
-        kind,
-        climb_m: 0.0,
-        ramp_s: None,
-    }];
-    Profile {
-        start,
-        bank: Bank::None,
-        ramp_s: 1.0,
-        segments,
-    }
-    .build()
-    .unwrap()
-}
-
 /// With N1 an axis has two bias states: 9 + 12, scale factors 6, turn-on biases of the gyroscope 3.
 #[test]
 fn what_is_expected_beside_the_model_adds_states_to_any_filter() {
@@ -156,17 +143,21 @@ fn what_is_expected_beside_the_model_adds_states_to_any_filter() {
             .states;
         (scenario.belief(&model, &[], &track).unwrap().states, full)
     };
-    assert_eq!(states(""), (15, 21));
-    assert_eq!(states("filter.states = 21"), (21, 27));
-    assert_eq!(
-        states("initial.gyro_bias_sigma_rad_s = 1e-4\nfilter.states = 21"),
-        (24, 30)
-    );
-    assert_eq!(
-        states("initial.gyro_scale_sigma_ppm = 0\nfilter.states = 21"),
-        (18, 24)
-    );
-    assert_eq!(states("initial.accel_scale_sigma_ppm = 100"), (18, 24));
+    for (text, expected) in [
+        ("", (15, 21)),
+        ("filter.states = 21", (21, 27)),
+        (
+            "initial.gyro_bias_sigma_rad_s = 1e-4\nfilter.states = 21",
+            (24, 30),
+        ),
+        (
+            "initial.gyro_scale_sigma_ppm = 0\nfilter.states = 21",
+            (18, 24),
+        ),
+        ("initial.accel_scale_sigma_ppm = 100", (18, 24)),
+    ] {
+        assert_eq!(states(text), expected, "{text}");
+    }
 }
 
 /// What is checked is what is simulated: a third of the IMU's rate with seven digits or more, which has every third sample.
@@ -198,11 +189,8 @@ fn a_rate_is_accepted_where_it_is_simulated() {
 fn a_drift_that_a_filter_knows_grows_with_time() {
     let (slope, rate_hz, t_s) = (1e-6, 100.0, 10.0);
     let axis = |slope: f64, white: f64| {
-        let (drift, white) = (
-            Process::drift(slope).unwrap(),
-            Process::white(white).unwrap(),
-        );
-        Composite::new(vec![white, drift])
+        let drift = Process::drift(slope).unwrap();
+        Composite::new(vec![Process::white(white).unwrap(), drift])
     };
     let model = Model::pooled(rate_hz, &axis(slope, 1e-20), &axis(1e-20, 1e-24));
     let text = "filter.states = 'full'\n[initial]\npos_sigma_m = [1e-6, 1e-6, 1e-6]\n\
@@ -218,92 +206,57 @@ fn a_drift_that_a_filter_knows_grows_with_time() {
     let n = rate_hz * t_s;
     let expected = slope * n * (n + 1.0) * (2.0 * n + 1.0) / (12.0 * rate_hz * rate_hz);
     for (i, sigma) in sigma.into_iter().enumerate().take(3) {
-        assert!(
-            (sigma / expected - 1.0).abs() < 1e-3,
-            "axis {i}: {sigma} m, {expected} m"
-        );
+        assert!((sigma / expected - 1.0).abs() < 1e-3, "axis {i}: {sigma} m");
     }
 }
 
 #[test]
-fn no_outage_may_be_asked_for() {
-    let scenario: Scenario = toml::from_str("outage = []").unwrap();
-    assert!(
-        scenario
-            .outages_on((0.0, 900.0), 1)
-            .unwrap()
-            .windows
-            .is_empty()
-    );
-}
-
-#[test]
 fn refusals_name_section_and_key() {
-    let refused = |text: &str| {
-        toml::from_str::<Scenario>(text)
-            .unwrap()
-            .validate()
-            .unwrap_err()
-            .key
-    };
-    assert_eq!(refused("run.runs = 0"), "run.runs");
-    assert_eq!(refused("run.runs = 99999999999"), "run.runs");
-    assert_eq!(refused("imu.rate_hz = 1e9"), "imu.rate_hz");
-    assert_eq!(refused("run.coverage_level = 95"), "run.coverage_level");
-    assert_eq!(refused("gnss.rate_hz = 3"), "gnss.rate_hz");
-    assert_eq!(refused("gnss.rate_hz = 200"), "gnss.rate_hz");
-    assert_eq!(refused("gnss.pos_sigma_m = [0, 1, 1]"), "gnss.pos_sigma_m");
-    assert_eq!(
-        refused("gnss.lever_arm_m = [0, 120, 0]"),
-        "gnss.lever_arm_m"
-    );
-    assert_eq!(
-        refused("imu.turn_on_bias_gyro_rad_s = 100"),
-        "imu.turn_on_bias_gyro_rad_s"
-    );
-    assert_eq!(
-        refused("imu.turn_on_bias_accel_m_s2 = 100"),
-        "imu.turn_on_bias_accel_m_s2"
-    );
-    assert_eq!(
-        refused("initial.gyro_bias_sigma_rad_s = 5"),
-        "initial.gyro_bias_sigma_rad_s"
-    );
-    assert_eq!(
-        refused("initial.accel_bias_sigma_m_s2 = 50"),
-        "initial.accel_bias_sigma_m_s2"
-    );
-    assert_eq!(
-        refused("initial.pos_sigma_m = [1e7, 1, 1]"),
-        "initial.pos_sigma_m"
-    );
-    assert_eq!(
-        refused("initial.vel_sigma_m_s = [1, 1, 5000]"),
-        "initial.vel_sigma_m_s"
-    );
-    assert_eq!(refused("imu.rate_hz = -1"), "imu.rate_hz");
-    assert_eq!(
-        refused("imu.misalignment_rad = 0.5"),
-        "imu.misalignment_rad"
-    );
-    assert_eq!(
-        refused("gnss.correlation_time_s = 0"),
-        "gnss.correlation_time_s"
-    );
-    assert_eq!(
-        refused("baro = { rate_hz = 1, sigma_m = 0 }"),
-        "baro.sigma_m"
-    );
-    assert_eq!(
-        refused("initial.att_sigma_deg = [1, 1, 180]"),
-        "initial.att_sigma_deg"
-    );
-    assert_eq!(
-        refused("baro = { rate_hz = 3, sigma_m = 1 }"),
-        "baro.rate_hz"
-    );
-    assert_eq!(
-        refused("outage = [{ start_s = 9, end_s = 3 }]"),
-        "outage[1].end_s"
-    );
+    for text in [
+        "run.runs = 0",
+        "run.runs = 99999999999",
+        "run.coverage_level = 95",
+        "imu.rate_hz = 1e9",
+        "imu.rate_hz = -1",
+        "imu.turn_on_bias_gyro_rad_s = 100",
+        "imu.turn_on_bias_gyro_rad_s = nan",
+        "imu.turn_on_bias_accel_m_s2 = 100",
+        "imu.scale_ppm_gyro = -1",
+        "imu.scale_ppm_accel = 2e5",
+        "imu.misalignment_rad = 0.5",
+        "imu.g_sensitivity_rad_s_per_m_s2 = 2",
+        "imu.vibration.rms_m_s2 = -1\nimu.vibration.rectification_s2_m = 1e-4",
+        "imu.temperature.profile_c = []",
+        "imu.temperature.profile_c = [[5, 20], [5, 30]]",
+        "gnss.rate_hz = 0",
+        "gnss.rate_hz = 3",
+        "gnss.rate_hz = 200",
+        "gnss.pos_sigma_m = [0, 1, 1]",
+        "gnss.pos_sigma_m = [2, nan, 4]",
+        "gnss.vel_sigma_m_s = [0.1, 0, 0.1]",
+        "gnss.lever_arm_m = [0, 120, 0]",
+        "gnss.lever_arm_m = [0, inf, 0]",
+        "gnss.correlation_time_s = 0",
+        "baro.sigma_m = 0\nbaro.rate_hz = 1",
+        "baro.rate_hz = 3\nbaro.sigma_m = 1",
+        "initial.pos_sigma_m = [1e7, 1, 1]",
+        "initial.pos_sigma_m = [0, 1, 1]",
+        "initial.vel_sigma_m_s = [1, 1, 5000]",
+        "initial.vel_sigma_m_s = [1, -1, 1]",
+        "initial.att_sigma_deg = [1, 1, 180]",
+        "initial.att_sigma_deg = [1, 1, 90]",
+        "initial.gyro_bias_sigma_rad_s = 5",
+        "initial.gyro_bias_sigma_rad_s = -1",
+        "initial.accel_bias_sigma_m_s2 = 50",
+        "initial.gyro_scale_sigma_ppm = 2e5",
+        "initial.accel_scale_sigma_ppm = -1",
+        "outage_periodic.duration_s = 10\noutage_periodic.every_s = 10\noutage_periodic.first_s = 0",
+        "outage_random.rate_per_hour = nan\noutage_random.duration_s = 10",
+    ] {
+        let scenario: Scenario = toml::from_str(text).unwrap();
+        let key = text.split(" = ").next().unwrap();
+        assert_eq!(scenario.validate().unwrap_err().key, key, "{text}");
+    }
+    let scenario: Scenario = toml::from_str("outage = [{ start_s = 9, end_s = 9 }]").unwrap();
+    assert_eq!(scenario.validate().unwrap_err().key, "outage[1].end_s");
 }

@@ -431,6 +431,7 @@ pub fn cholesky_solve(a: impl Fn(usize, usize) -> f64, mut b: Vector, n: usize) 
 mod tests {
     use super::*;
     use crate::rng::Generator;
+    use approx::assert_abs_diff_eq;
     use rand::{RngExt, SeedableRng};
 
     fn objective(p: &Bounded, x: &Vector) -> f64 {
@@ -489,6 +490,6 @@ mod tests {
         p.gram = [[1.0; MOST]; MOST];
         p.right = [1.0; MOST];
         let x = p.minimise();
-        assert!((x[0] + x[1] + x[2] - 1.0).abs() < 1e-12, "{x:?}");
+        assert_abs_diff_eq!(x[0] + x[1] + x[2], 1.0, epsilon = 1e-12);
     }
 }

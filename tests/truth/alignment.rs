@@ -1,26 +1,22 @@
 //! The automatic start on drives that are slow, stop and go, or go backwards, with a phone's IMU: as good as it
 //! says, and never the wrong way round.
 
-use glam::{DQuat, DVec3};
-use nav_sim::io::model_file;
-use nav_sim::navigation::earth::GravityModel;
+use crate::shared::{data, outage, shipped_model};
+use glam::DQuat;
 use nav_sim::navigation::ekf::{Belief, FilterStates};
 use nav_sim::navigation::frames::RollPitchYaw;
 use nav_sim::navigation::fusion::alignment::{Alignment, coarse};
-use nav_sim::navigation::fusion::{Finding, Recorded, Settings};
+use nav_sim::navigation::fusion::{Finding, Settings};
 use nav_sim::navigation::metrics::VerdictKind;
 use nav_sim::navigation::scenario::Scenario;
-use nav_sim::navigation::sensors::defects::ImuSettings;
-use nav_sim::navigation::sensors::gnss::GnssSettings;
 use nav_sim::navigation::sensors::imu::Truth;
-use nav_sim::navigation::sensors::outage::Outage;
-use nav_sim::navigation::simulation::{Plan, SimulatedRecording as Recording, record};
+
+use nav_sim::navigation::simulation::{Plan, SimulatedRecording, record};
 use nav_sim::navigation::trajectory::{Trajectory, TrajectorySample};
 use nav_sim::signal::imu::Sensor;
 use nav_sim::signal::noise::Model;
 use nav_sim_navigation::earth::radii;
 use nav_sim_navigation::frames::wrap_angle;
-use std::path::Path;
 
 const DEG: f64 = std::f64::consts::PI / 180.0;
 /// Turn-on biases of a phone: m/s², rad/s.
@@ -169,8 +165,7 @@ pub(crate) fn trajectory(steps: &[Step]) -> Trajectory {
 
 /// `examples/phone.toml`.
 pub(crate) fn phone() -> Model {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/phone.toml");
-    model_file::read(&path).unwrap().model
+    shipped_model("examples/phone.toml")
 }
 
 pub(crate) fn belief() -> Belief {
@@ -182,14 +177,8 @@ pub(crate) fn belief() -> Belief {
 
 pub(crate) fn settings() -> Settings {
     Settings {
-        q_s_b: DQuat::IDENTITY,
-        mounting_sigma_b: DVec3::ZERO,
-        lever_arm_b: DVec3::ZERO,
-        gravity: GravityModel::default(),
-        outages: Vec::new(),
-        gate: None,
         rows_hz: 10.0,
-        smooth: false,
+        ..crate::fusion::settings()
     }
 }
 
@@ -198,22 +187,14 @@ pub(crate) fn recorded(
     trajectory: &Trajectory,
     velocity: Option<f64>,
     runs: u64,
-    mut then: impl FnMut(u64, &Recording),
+    mut then: impl FnMut(u64, &SimulatedRecording),
 ) {
-    let scenario = Scenario {
-        gnss: GnssSettings {
-            rate_hz: 2.0,
-            pos_sigma_m: [if velocity.is_some() { 3.0 } else { 1.0 }; 3],
-            vel_sigma_m_s: velocity.map(|sigma| [sigma; 3]),
-            ..GnssSettings::default()
-        },
-        imu: ImuSettings {
-            turn_on_bias_accel_m_s2: Some(TURN_ON.0),
-            turn_on_bias_gyro_rad_s: Some(TURN_ON.1),
-            ..ImuSettings::default()
-        },
-        ..Scenario::default()
-    };
+    let mut scenario = Scenario::default();
+    scenario.gnss.rate_hz = 2.0;
+    scenario.gnss.pos_sigma_m = [if velocity.is_some() { 3.0 } else { 1.0 }; 3];
+    scenario.gnss.vel_sigma_m_s = velocity.map(|sigma| [sigma; 3]);
+    scenario.imu.turn_on_bias_accel_m_s2 = Some(TURN_ON.0);
+    scenario.imu.turn_on_bias_gyro_rad_s = Some(TURN_ON.1);
     let model = phone();
     let experiment = scenario.experiment(trajectory, Truth::Model(&model), &[], &[], 11);
     let plan = Plan::new(&experiment).unwrap();
@@ -244,22 +225,15 @@ fn every_start_is_as_good_as_it_says() {
         let trajectory = trajectory(steps);
         for velocity in [Some(0.1), Some(0.3), Some(0.6), None] {
             recorded(&trajectory, velocity, 3, |run, recording| {
-                let data = Recorded {
-                    imu: &recording.imu,
-                    gnss: &recording.gnss,
-                    aids: &[],
-                };
                 // positions alone do not always have a course
-                let Ok(alignment) = coarse(&data, &settings(), &belief()) else {
+                let Ok(alignment) = coarse(&data(recording), &settings(), &belief()) else {
                     assert!(velocity.is_none(), "{name} {velocity:?} {run}");
                     return;
                 };
                 let z = normalised(&alignment, &trajectory);
                 let how = &alignment.start.found;
-                assert!(
-                    z.iter().all(|z| z.abs() < 4.0),
-                    "{name} {velocity:?} {run}: {z:?} {how:?}"
-                );
+                let is_inside = z.iter().all(|z| z.abs() < 4.0);
+                assert!(is_inside, "{name} {velocity:?} {run}: {z:?} {how:?}");
                 (0..3).for_each(|i| sums[i] += z[i] * z[i]);
                 starts += 1.0;
             });
@@ -303,7 +277,7 @@ fn a_heading_beside_the_course_is_not_believed_as_if_it_were_the_course() {
 }
 
 /// One recording of a drive, velocities good to 0.1 m/s.
-fn one(steps: &[Step]) -> (Trajectory, Recording) {
+fn one(steps: &[Step]) -> (Trajectory, SimulatedRecording) {
     let trajectory = trajectory(steps);
     let mut found = None;
     recorded(&trajectory, Some(0.1), 1, |_, recording| {
@@ -312,21 +286,12 @@ fn one(steps: &[Step]) -> (Trajectory, Recording) {
     (trajectory, found.unwrap())
 }
 
-fn aligned(recording: &Recording, settings: &Settings) -> Alignment {
-    coarse(
-        &Recorded {
-            imu: &recording.imu,
-            gnss: &recording.gnss,
-            aids: &[],
-        },
-        settings,
-        &belief(),
-    )
-    .unwrap()
+fn aligned(recording: &SimulatedRecording, settings: &Settings) -> Alignment {
+    coarse(&data(recording), settings, &belief()).unwrap()
 }
 
 /// One recording whose velocities are turned by a right angle from 15 s to then: a start there agrees with nothing after it.
-fn turned_until(end_s: f64, steps: &[Step]) -> (Trajectory, Recording) {
+fn turned_until(end_s: f64, steps: &[Step]) -> (Trajectory, SimulatedRecording) {
     let (trajectory, mut recording) = one(steps);
     for fix in recording
         .gnss
@@ -379,36 +344,42 @@ fn a_start_that_the_next_minute_contradicts_is_given_up_for_a_later_one() {
 fn a_wrong_mounting_is_told() {
     let (_, recording) = one(DRIVES[1].1);
     let turned = |q_s_b| {
-        aligned(
-            &recording,
-            &Settings {
-                q_s_b,
-                ..settings()
-            },
-        )
-        .doubts
+        let settings = Settings {
+            q_s_b,
+            ..settings()
+        };
+        aligned(&recording, &settings).doubts
     };
     let sideways = turned(DQuat::from_rotation_z(90.0 * DEG));
-    assert!(
-        matches!(
-            sideways[0],
-            (VerdictKind::Overconfident, Finding::Start { .. })
-        ),
-        "{sideways:?}"
+    let is_told = matches!(
+        sideways[0],
+        (VerdictKind::Overconfident, Finding::Start { .. })
     );
-    let down = turned(DQuat::from_rotation_x(180.0 * DEG));
-    let is_not_level =
-        |(_, finding): &(VerdictKind, Finding)| matches!(finding, Finding::NotLevel { .. });
-    assert!(down.iter().any(is_not_level), "{down:?}");
-    let edge = turned(DQuat::from_rotation_y(-60.0 * DEG));
-    assert!(edge.iter().any(is_not_level), "{edge:?}");
+    assert!(is_told, "{sideways:?}");
+    for turn in [
+        DQuat::from_rotation_x(180.0 * DEG),
+        DQuat::from_rotation_y(-60.0 * DEG),
+    ] {
+        let doubts = turned(turn);
+        let is_not_level = doubts
+            .iter()
+            .any(|(_, f)| matches!(f, Finding::NotLevel { .. }));
+        assert!(is_not_level, "{doubts:?}");
+    }
     assert_eq!(turned(DQuat::IDENTITY), []);
 }
 
-/// Straight on at one speed nothing tells forwards from backwards: forwards, and it is said.
+/// Straight on at one speed nothing tells forwards from backwards: forwards, and it is said. Fixes that are withheld are not
+/// looked at.
 #[test]
 fn what_the_fixes_do_not_tell_is_said() {
     let (trajectory, mut recording) = one(DRIVES[0].1);
+    let withheld = Settings {
+        outages: vec![outage(10.0, 40.0)],
+        ..settings()
+    };
+    assert!(aligned(&recording, &settings()).start.t_s < 30.0);
+    assert!(aligned(&recording, &withheld).start.t_s >= 40.0);
     recording.imu.retain(|s| s.t_s > 60.0);
     recording.gnss.retain(|f| f.t_s > 60.0);
     let found = aligned(&recording, &settings());
@@ -419,27 +390,5 @@ fn what_the_fixes_do_not_tell_is_said() {
             .iter()
             .any(|(_, finding)| *finding == Finding::Direction),
         "{found:?}"
-    );
-}
-
-/// Fixes that are withheld are not looked at.
-#[test]
-fn a_withheld_fix_starts_nothing() {
-    let (_, recording) = one(DRIVES[0].1);
-    let outages = vec![Outage {
-        start_s: 10.0,
-        end_s: 40.0,
-    }];
-    assert!(aligned(&recording, &settings()).start.t_s < 30.0);
-    assert!(
-        aligned(
-            &recording,
-            &Settings {
-                outages,
-                ..settings()
-            }
-        )
-        .start
-        .t_s >= 40.0
     );
 }

@@ -1,8 +1,8 @@
 //! Fixes whose errors last: named from the innovations alone, and answered so that the solution is to be believed.
 
-use crate::fusion::{belief, recorded, settings, shipped};
+use crate::fusion::{belief, recorded, settings};
+use crate::shared::{data, shipped, shipped_model};
 use glam::DVec3;
-use nav_sim::io::model_file;
 use nav_sim::navigation::fusion::{Correlation, Recorded, fuse_correlated, outcome};
 use nav_sim::navigation::gnss::GnssVelocity;
 use nav_sim::navigation::sensors::gnss::GnssSettings;
@@ -10,7 +10,6 @@ use nav_sim::navigation::trajectory::reference::Reference;
 use nav_sim::signal::rng::Generator;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
-use std::path::Path;
 
 /// What became of drives with fixes of 3 m, white or lasting so many seconds, of which the receiver states 3 m.
 #[derive(Debug, Default)]
@@ -39,9 +38,8 @@ fn told_of([tau_s, of_velocity_s]: [f64; 2], runs: u64) -> Told {
     } else {
         receiver(3.0, 0.0)
     };
-    let tactical = Path::new(env!("CARGO_MANIFEST_DIR")).join("calib_data/tactical.toml");
-    let model = model_file::read(&tactical).unwrap().model;
-    let (belief, trajectory) = (belief(&model), shipped("land_vehicle.toml"));
+    let model = shipped_model("calib_data/tactical.toml");
+    let (belief, trajectory) = (belief(&model), shipped("land_vehicle"));
     let reference: Reference = trajectory.clone().into();
     let mut told = Told::default();
     recorded(&trajectory, &model, &receiver, runs, |recording, start| {
@@ -60,9 +58,8 @@ fn told_of([tau_s, of_velocity_s]: [f64; 2], runs: u64) -> Told {
             fix.velocity = Some(GnssVelocity::new(v_n + off, DVec3::splat(0.1)));
         }
         let data = Recorded {
-            imu: &recording.imu,
             gnss: &gnss,
-            aids: &[],
+            ..data(recording)
         };
         let asked = (Some(&reference), Correlation::Auto);
         let weighed = fuse_correlated(&data, &belief, start, &settings(), asked).unwrap();

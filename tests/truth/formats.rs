@@ -1,28 +1,20 @@
 //! The examples of `calib_data/`: one recording in every format, and the virtual IMUs.
 
+use crate::shared::root;
 use nav_sim::io::model_file;
 use nav_sim::io::recordings::{ReadOptions, read};
 use nav_sim::signal::imu::Recording;
 use nav_sim::signal::noise::Composite;
-use std::path::{Path, PathBuf};
-
-fn shipped(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("calib_data")
-        .join(name)
-}
 
 fn recording(name: &str, rate_hz: Option<f64>) -> Recording {
     let options = ReadOptions {
         rate_hz,
         ..ReadOptions::default()
     };
-    let (mut recordings, report) = read(&[shipped(name)], &options).unwrap();
-    assert!(
-        report.all_warnings().is_empty(),
-        "{name}: {:?}",
-        report.all_warnings()
-    );
+    let path = root("calib_data").join(name);
+    let (mut recordings, report) = read(&[path], &options).unwrap();
+    let warnings = report.all_warnings();
+    assert!(warnings.is_empty(), "{name}: {warnings:?}");
     assert_eq!(recordings.len(), 1, "{name}");
     recordings.remove(0)
 }
@@ -100,7 +92,7 @@ fn the_virtual_imus_are_what_they_say() {
             (0.29, 0.005),
         ),
     ] {
-        let file = model_file::read(&shipped(name)).unwrap();
+        let file = model_file::read(&root("calib_data").join(name)).unwrap();
         assert!(file.missing.is_empty());
         assert!(file.spread.unwrap().axes.iter().all(|laws| laws.len() == 7));
         let (accel, gyro) = (&file.model.axes[0], &file.model.axes[3]);

@@ -2,18 +2,15 @@
 //! be, one that does not is far too sure.
 
 use crate::common::drive::{DRIVE, MODEL, done, nav_sim, place_with};
-use nav_sim::io::trajectory_file::load;
+use crate::shared::{gauss_markov, shipped, two_sided};
 use nav_sim::navigation::ekf::Belief;
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::{NEES_DOF, RunResult};
-use nav_sim::navigation::trajectory::Trajectory;
-use nav_sim::signal::noise::{Composite, Model, Process};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use nav_sim::signal::noise::{Model, Process};
 use std::fs;
-use std::path::Path;
 
 const RUNS: u64 = 24;
 /// Where the runs are looked at (s), inside and outside of the outage.
@@ -23,31 +20,12 @@ const OUTAGES: [Outage; 1] = [Outage {
     end_s: 390.0,
 }];
 
-fn trajectory() -> Trajectory {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories/land_vehicle.toml");
-    load(&path, None).unwrap().0
-}
-
-/// White noise and Gauss-Markov processes of (standard deviation, correlation time in s), at 100 Hz.
-fn axis(sigma2: f64, biases: &[(f64, f64)]) -> Composite {
-    let ar1 = |(s, t_s): &(f64, f64)| {
-        let phi = (-0.01 / t_s).exp();
-        Process::ar1(phi, s * s * (1.0 - phi * phi)).unwrap()
-    };
-    let white = Process::white(sigma2).unwrap();
-    Composite::new(
-        std::iter::once(white)
-            .chain(biases.iter().map(ar1))
-            .collect(),
-    )
-}
-
 /// A tactical IMU whose model the filter of 15 states carries as it is.
 fn tactical() -> Model {
     Model::pooled(
         100.0,
-        &axis(1e-5, &[(5e-4, 200.0)]),
-        &axis(1e-8, &[(5e-6, 300.0)]),
+        &gauss_markov(1e-5, &[(5e-4, 200.0)]),
+        &gauss_markov(1e-8, &[(5e-6, 300.0)]),
     )
 }
 
@@ -65,7 +43,7 @@ fn run(
     seed: u64,
     runs: u64,
 ) -> Vec<RunResult> {
-    let trajectory = trajectory();
+    let trajectory = shipped("land_vehicle");
     let belief = |(model, own): &(&Model, Scenario)| {
         let track = own.track(&trajectory, model, &OUTAGES).unwrap();
         own.belief(model, &OUTAGES, &track).unwrap()
@@ -82,34 +60,27 @@ fn improbability(results: &[&RunResult]) -> (f64, f64) {
     for look in LOOKS {
         let count: u64 = results.iter().map(|r| r.epochs[look].count).sum();
         let sum: f64 = results.iter().map(|r| r.epochs[look].nees[0]).sum();
-        let p = ChiSquared::new((NEES_DOF as u64 * count) as f64)
-            .unwrap()
-            .cdf(sum);
-        smallest = smallest.min(2.0 * p.min(1.0 - p));
+        smallest = smallest.min(two_sided(sum, (NEES_DOF as u64 * count) as f64));
         mean += sum / count as f64 / LOOKS.len() as f64;
     }
     (smallest * LOOKS.len() as f64, mean)
 }
 
-fn is_inside(what: &str, result: &RunResult) {
-    let (p, mean) = improbability(&[result]);
+/// Whether runs are as their filter says, or far from it.
+#[track_caller]
+fn assert_matched(results: &[&RunResult], is_matched: bool) {
+    let (p, mean) = improbability(results);
     println!(
-        "{what}: {} states, NEES {mean:.2}, p = {p:.1e}",
-        result.filter_states
+        "{} states, NEES {mean:.2}, p = {p:.1e}",
+        results[0].filter_states
     );
-    assert!(p > 1e-3, "{what}: NEES {mean}, p = {p}");
-}
-
-fn is_outside(what: &str, result: &RunResult) {
-    let (p, mean) = improbability(&[result]);
-    println!(
-        "{what}: {} states, NEES {mean:.2}, p = {p:.1e}",
-        result.filter_states
-    );
-    assert!(
-        p < 1e-9 && mean > 1.5 * NEES_DOF as f64,
-        "{what}: NEES {mean}, p = {p}"
-    );
+    match is_matched {
+        true => assert!(p > 1e-3, "NEES {mean}, p = {p}"),
+        false => assert!(
+            p < 1e-9 && mean > 1.5 * NEES_DOF as f64,
+            "NEES {mean}, p = {p}"
+        ),
+    }
 }
 
 /// 0.02 m/s² and 1e-4 rad/s of turn-on bias: constant states hold them, with 15 states and with all.
@@ -120,8 +91,8 @@ fn a_turn_on_bias_that_is_expected_is_found() {
         format!("{bias}[initial]\naccel_bias_sigma_m_s2 = 0.02\ngyro_bias_sigma_rad_s = 1e-4\n");
     let larger = Model::pooled(
         100.0,
-        &axis(1e-5, &[(5e-4, 200.0), (1e-3, 2.0)]),
-        &axis(1e-8, &[(5e-6, 300.0), (1e-5, 5.0)]),
+        &gauss_markov(1e-5, &[(5e-4, 200.0), (1e-3, 2.0)]),
+        &gauss_markov(1e-8, &[(5e-6, 300.0), (1e-5, 5.0)]),
     );
     let full = scenario(&format!("{expected}[filter]\nstates = \"full\""));
     let (reduced, unaware) = (scenario(&expected), scenario(bias));
@@ -133,12 +104,10 @@ fn a_turn_on_bias_that_is_expected_is_found() {
         31,
         RUNS,
     );
-    is_inside("turn-on bias, 15", &found[0]);
-    is_outside("turn-on bias not expected, 15", &found[1]);
-    is_inside(
-        "turn-on bias, full",
-        &run(&larger, &unaware, &[(&larger, full)], 32, RUNS)[0],
-    );
+    assert_matched(&[&found[0]], true);
+    assert_matched(&[&found[1]], false);
+    let found = run(&larger, &unaware, &[(&larger, full)], 32, RUNS);
+    assert_matched(&[&found[0]], true);
 }
 
 /// 300 ppm on every axis: the filter of 21 states expects it, and any filter that is told.
@@ -153,9 +122,9 @@ fn scale_factors_of_300_ppm_are_found_by_21_states() {
         (&model, scenario("")),
     ];
     let found = run(&model, &imu, &filters, 33, RUNS);
-    is_inside("scale factors, 21", &found[0]);
-    is_inside("scale factors, full and told", &found[1]);
-    is_outside("scale factors, 15", &found[2]);
+    for (result, is_matched) in found.iter().zip([true, true, false]) {
+        assert_matched(&[result], is_matched);
+    }
 }
 
 /// A drift has a known magnitude; its sign is not known to the filter. The NEES is quadratic in the slopes, so
@@ -195,14 +164,9 @@ fn a_drift_is_as_uncertain_as_its_magnitude() {
         )
     };
     let results: Vec<_> = (40..).zip(HADAMARD).map(of_signs).collect();
-    for (i, name) in ["15", "full"].into_iter().enumerate() {
+    for i in [0, 1] {
         let of_filter: Vec<&RunResult> = results.iter().map(|r| &r[i]).collect();
-        let (p, mean) = improbability(&of_filter);
-        println!(
-            "drift, {name}: {} states, NEES {mean:.2}, p = {p:.1e}",
-            of_filter[0].filter_states
-        );
-        assert!(p > 1e-3, "{name}: NEES {mean}, p = {p}");
+        assert_matched(&of_filter, true);
         assert_eq!(of_filter[0].filter_states, 21);
     }
     let unaware = run(
@@ -212,7 +176,7 @@ fn a_drift_is_as_uncertain_as_its_magnitude() {
         40,
         8,
     );
-    is_outside("drift not in the model", &unaware[0]);
+    assert_matched(&[&unaware[0]], false);
 }
 
 /// A recorded drive whose IMU has scale factors of 300 ppm: the filter of 21 states is nearer to the reference.
@@ -279,38 +243,4 @@ fn a_model_with_a_drift_runs_with_any_filter() {
         let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
         assert_eq!(summary["filter_states"], number, "{states}");
     }
-}
-
-#[test]
-fn what_the_filter_does_not_expect_is_warned_of() {
-    let place = place_with(DRIVE, MODEL);
-    let path = place.path();
-    fs::write(
-        path.join("s.toml"),
-        "imu = { turn_on_bias_accel_m_s2 = 0.02, scale_ppm_gyro = 300 }\n",
-    )
-    .unwrap();
-    let command = "run drive.toml imu.toml --runs 1 --outage 30:40 --seed 1 --scenario s.toml";
-    // its errors may be large enough for a bad verdict, exit code 3
-    let said = nav_sim(path, &format!("{command} -o a")).stderr;
-    assert!(
-        said.contains("the true accel has a turn-on bias of 0.02 m/s²"),
-        "{said}"
-    );
-    assert!(
-        said.contains("the true gyro has a scale-factor error of 300 ppm"),
-        "{said}"
-    );
-    let said = done(
-        path,
-        &format!("{command} --turn-on-bias 0.02,0 --filter 21 -o b"),
-    )
-    .stderr;
-    assert!(!said.contains("the true"), "{said}");
-    let refused = nav_sim(path, "run drive.toml imu.toml --filter 16 -o c");
-    assert!(
-        refused.code == 2 && refused.stderr.contains("\"16\" is not one of 15, 21, full"),
-        "{}",
-        refused.stderr
-    );
 }

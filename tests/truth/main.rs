@@ -32,6 +32,7 @@ mod mounting;
 mod paper_section4;
 mod reduction;
 mod require;
+mod shared;
 mod smoothing;
 mod strapdown_error;
 mod trajectories;

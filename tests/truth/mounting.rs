@@ -1,17 +1,16 @@
 //! The mounting of an IMU found from the drive: as good as it says, whatever it is, or refused.
 
 use crate::alignment::{Step, belief, phone, recorded, settings, trajectory};
-use crate::fusion::shipped;
+use crate::fusion::turned;
+use crate::shared::{data, shipped};
 use glam::{DQuat, DVec3};
 use nav_sim::navigation::ekf::{Belief, FilterStates};
 use nav_sim::navigation::frames::RollPitchYaw;
 use nav_sim::navigation::fusion::alignment::coarse;
 use nav_sim::navigation::fusion::mounting::{Mounting, find};
 use nav_sim::navigation::fusion::{Recorded, Settings, fuse};
-use nav_sim::navigation::simulation::SimulatedRecording as Recording;
-use nav_sim::navigation::trajectory::Trajectory;
+use nav_sim::navigation::simulation::SimulatedRecording;
 use nav_sim::navigation::trajectory::reference::Reference;
-use nav_sim::signal::imu::ImuIncrement;
 use nav_sim::signal::units::Refused;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -42,32 +41,20 @@ fn rotation([roll, pitch, yaw]: [f64; 3]) -> DQuat {
     .to_quat()
 }
 
-/// The recording as an IMU mounted like that makes it.
-fn turned(recording: &Recording, q_s_b: DQuat) -> Vec<ImuIncrement> {
-    let into = q_s_b.inverse();
-    let turn = |s: &ImuIncrement| ImuIncrement {
-        dtheta: into * s.dtheta,
-        dv: into * s.dv,
-        ..*s
+fn found(recording: &SimulatedRecording, q_s_b: DQuat) -> Result<Mounting, Refused> {
+    found_with(recording, q_s_b, &belief())
+}
+
+fn found_with(
+    recording: &SimulatedRecording,
+    q_s_b: DQuat,
+    belief: &Belief,
+) -> Result<Mounting, Refused> {
+    let data = Recorded {
+        imu: &turned(&recording.imu, q_s_b),
+        ..data(recording)
     };
-    recording.imu.iter().map(turn).collect()
-}
-
-fn found(recording: &Recording, q_s_b: DQuat) -> Result<Mounting, Refused> {
-    let imu = turned(recording, q_s_b);
-    find(
-        &Recorded {
-            imu: &imu,
-            gnss: &recording.gnss,
-            aids: &[],
-        },
-        &settings(),
-        &belief(),
-    )
-}
-
-fn land_vehicle() -> Trajectory {
-    shipped("land_vehicle.toml")
+    find(&data, &settings(), belief)
 }
 
 /// Found less true, about the vehicle's axes (rad).
@@ -92,7 +79,7 @@ fn is_as_good_as_it_says(mounting: &Mounting, truth: DQuat) {
 /// The solution that follows is as good as it says: the sums of the NEES are below the chi-square quantile (1e-4).
 #[test]
 fn twelve_mountings_are_found_and_fused_with() {
-    let trajectory = land_vehicle();
+    let trajectory = shipped("land_vehicle");
     let reference: Reference = trajectory.clone().into();
     let looks = [200, 500, 880];
     let mut nees = [0.0; 3];
@@ -102,27 +89,21 @@ fn twelve_mountings_are_found_and_fused_with() {
         is_as_good_as_it_says(&mounting, truth);
         assert!(rotation(mounting.angles_deg()).angle_between(mounting.q_s_b) < 1e-6);
 
-        let imu = turned(recording, truth);
         let data = Recorded {
-            imu: &imu,
-            gnss: &recording.gnss,
-            aids: &[],
+            imu: &turned(&recording.imu, truth),
+            ..data(recording)
         };
         let settings = Settings {
             q_s_b: mounting.q_s_b,
             mounting_sigma_b: mounting.sigma_b,
-            gate: None,
             rows_hz: 1.0,
             ..settings()
         };
         let start = coarse(&data, &settings, &belief()).unwrap().start;
         let solution = fuse(&data, &belief(), &start, &settings, Some(&reference)).unwrap();
         for (sum, look) in nees.iter_mut().zip(looks) {
-            let row = solution
-                .rows
-                .iter()
-                .find(|row| row.t_s >= f64::from(look))
-                .unwrap();
+            let mut rows = solution.rows.iter();
+            let row = rows.find(|row| row.t_s >= f64::from(look)).unwrap();
             *sum += row.error.unwrap().nees;
         }
     });
@@ -134,7 +115,7 @@ fn twelve_mountings_are_found_and_fused_with() {
 /// From positions alone, good to 1 m: with the accelerations of their differences.
 #[test]
 fn positions_alone_show_it_less_well() {
-    recorded(&land_vehicle(), None, 2, |run, recording| {
+    recorded(&shipped("land_vehicle"), None, 2, |run, recording| {
         let truth = rotation(MOUNTINGS[7 + run as usize]);
         is_as_good_as_it_says(&found(recording, truth).unwrap(), truth);
     });
@@ -179,7 +160,7 @@ fn a_drive_that_does_not_show_it_is_refused() {
 /// An aircraft banks into its turns: its way is not that of its axes, and what is found would be wrong.
 #[test]
 fn an_aircraft_is_refused() {
-    recorded(&shipped("fixed_wing.toml"), Some(0.1), 1, |_, recording| {
+    recorded(&shipped("fixed_wing"), Some(0.1), 1, |_, recording| {
         let refusal = found(recording, rotation(MOUNTINGS[0])).unwrap_err().0;
         let bank = refusal.split_once(" banks by ").unwrap().1;
         let bank_deg: f64 = bank.split_once('°').unwrap().0.parse().unwrap();
@@ -224,18 +205,9 @@ fn some_way_backwards_does_not_matter() {
 fn a_filter_that_is_wrong_says_nothing_wrong() {
     let careless = Belief::new(&phone(), FilterStates::Reduced15, 1.0, 800.0).unwrap();
     let mut refused = 0;
-    recorded(&land_vehicle(), Some(0.1), 4, |run, recording| {
+    recorded(&shipped("land_vehicle"), Some(0.1), 4, |run, recording| {
         let truth = rotation(MOUNTINGS[6 + run as usize]);
-        let imu = turned(recording, truth);
-        match find(
-            &Recorded {
-                imu: &imu,
-                gnss: &recording.gnss,
-                aids: &[],
-            },
-            &settings(),
-            &careless,
-        ) {
+        match found_with(recording, truth, &careless) {
             Ok(mounting) => is_as_good_as_it_says(&mounting, truth),
             Err(why) => {
                 let causes = ["the fixes contradict the filter", "the filter's yaw is"];

@@ -1,22 +1,17 @@
 //! The default filter of 15 states is as sure as it should be: true RMSE over its own sigma at the ends of outages,
 //! by covariance analysis, on the shipped IMUs and trajectories.
 
-use nav_sim::io::model_file;
-use nav_sim::io::trajectory_file::load;
+use crate::shared::{outage, shipped, shipped_model, white_and_walk};
+use approx::assert_abs_diff_eq;
 use nav_sim::navigation::scenario::{Reduction, Scenario};
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{Assessment, assess};
-use nav_sim_signal::noise::{Composite, Model, Process};
-use std::path::Path;
+use nav_sim_signal::noise::Model;
 
 /// What the filter of a model does on a trajectory with outages.
 fn assessed(model: &str, trajectory: &str, outages: &[Outage], reduction: Reduction) -> Assessment {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let model = model_file::read(&root.join(format!("calib_data/{model}.toml")))
-        .unwrap()
-        .model;
-    let path = root.join(format!("trajectories/{trajectory}.toml"));
-    let (path, _) = load(&path, None).unwrap();
+    let model = shipped_model(&format!("calib_data/{model}.toml"));
+    let path = shipped(trajectory);
     let mut scenario = Scenario::default();
     scenario.filter.reduction = reduction;
     let track = scenario.track(&path, &model, outages).unwrap();
@@ -43,10 +38,7 @@ fn outages(seconds: f64) -> [Outage; 2] {
     } else {
         [300.0, 700.0]
     };
-    starts.map(|start_s| Outage {
-        start_s,
-        end_s: start_s + seconds,
-    })
+    starts.map(|start_s| outage(start_s, start_s + seconds))
 }
 
 fn is_honest([low, high, nees]: [f64; 3]) -> bool {
@@ -78,15 +70,9 @@ fn the_default_filter_is_honest_and_that_by_wavelet_variance_is_not() {
 /// White noise and a random walk an axis fit 15 states as they are: nothing is lost, and the NEES is 9 to rounding.
 #[test]
 fn a_model_of_fifteen_states_is_its_own_reduction() {
-    let axis = |white: f64, walk: f64| {
-        Composite::new(vec![
-            Process::white(white).unwrap(),
-            Process::random_walk(walk).unwrap(),
-        ])
-    };
-    let model = Model::pooled(100.0, &axis(5.4e-5, 3.3e-11), &axis(1e-8, 1e-14));
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let (path, _) = load(&root.join("trajectories/land_vehicle.toml"), None).unwrap();
+    let gyro = white_and_walk(1e-8, 1e-14);
+    let model = Model::pooled(100.0, &white_and_walk(5.4e-5, 3.3e-11), &gyro);
+    let path = shipped("land_vehicle");
     let (scenario, outages) = (Scenario::default(), outages(90.0));
     let track = scenario.track(&path, &model, &outages).unwrap();
     let end = |scenario: &Scenario| {
@@ -94,7 +80,7 @@ fn a_model_of_fifteen_states_is_its_own_reduction() {
         assess(&track, &belief, &model).outage_ends[1]
     };
     let (reduced, full) = (end(&scenario), end(&scenario.with_full_noise()));
-    assert!((reduced.nees - 9.0).abs() < 1e-6, "{reduced:?}");
+    assert_abs_diff_eq!(reduced.nees, 9.0, epsilon = 1e-6);
     assert!(
         (0..9).all(|i| (reduced.rmse[i] / full.rmse[i] - 1.0).abs() < 1e-12),
         "{reduced:?} {full:?}"
@@ -106,15 +92,11 @@ fn a_model_of_fifteen_states_is_its_own_reduction() {
 #[test]
 fn one_early_outage_does_not_give_the_drive_away() {
     for (model, trajectory, outage) in [
-        ("consumer_mems", "land_vehicle", (60.0, 90.0)),
-        ("consumer_mems", "figure_eight", (60.0, 90.0)),
-        ("tactical", "figure_eight", (120.0, 180.0)),
+        ("consumer_mems", "land_vehicle", outage(60.0, 90.0)),
+        ("consumer_mems", "figure_eight", outage(60.0, 90.0)),
+        ("tactical", "figure_eight", outage(120.0, 180.0)),
     ] {
-        let outages = [Outage {
-            start_s: outage.0,
-            end_s: outage.1,
-        }];
-        let computed = assessed(model, trajectory, &outages, Reduction::Covariance);
+        let computed = assessed(model, trajectory, &[outage], Reduction::Covariance);
         let squares = |i: usize| {
             computed
                 .reports

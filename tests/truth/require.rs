@@ -1,5 +1,7 @@
 //! The IMU that a limit needs meets it in sampled runs, and answers are monotone.
 
+use crate::shared::{outage, town, white};
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 use nav_sim::io::datasheet::{Figure, catalogued};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::require::{
@@ -10,10 +12,6 @@ use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::trajectory::Trajectory;
-use nav_sim::navigation::trajectory::profile::{
-    Acceleration, Bank, Length, Profile, ProfileStart as Start, Segment, SegmentKind as Kind,
-    Turning,
-};
 use nav_sim::signal::imu::Sensor;
 use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::simulation::REPORTED;
@@ -24,67 +22,36 @@ const OUTAGE: Outage = Outage {
     end_s: 190.0,
 };
 
-/// Three minutes of town traffic.
-fn trajectory() -> Trajectory {
-    let faster = |to_speed: f64| Kind::Accelerate {
-        to_speed,
-        by: Acceleration::Duration(10.0),
-    };
-    let turn = |deg: f64| Kind::Turn {
-        angle: deg.to_radians(),
-        by: Turning::Duration(9.0),
-    };
-    let block = [
-        faster(14.0),
-        Kind::Straight(Length::Duration(14.0)),
-        turn(90.0),
-        faster(6.0),
-        turn(-60.0),
-    ];
-    let segments = block.into_iter().cycle().take(20);
-    let segments = segments
-        .map(|kind| Segment {
-            kind,
-            climb_m: 0.0,
-            ramp_s: None,
-        })
-        .collect();
-    let start = Start {
-        t_s: 0.0,
-        lat: 0.8,
-        lon: 0.1,
-        h: 0.0,
-        heading: 0.7,
-        speed: 0.0,
-    };
-    Profile {
-        start,
-        bank: Bank::None,
-        ramp_s: 1.0,
-        segments,
-    }
-    .build()
-    .unwrap()
-}
-
 fn limit(quantity: LimitQuantity, most: f64) -> [Limit; 1] {
     [Limit { quantity, most }]
+}
+
+/// Three minutes of town traffic, the default scenario on it.
+fn setting() -> (Scenario, Trajectory) {
+    (Scenario::default(), town(4))
+}
+
+fn need<'a>(
+    course: &'a OutagePlacements<'a>,
+    scenario: &'a Scenario,
+    limits: &'a [Limit],
+) -> ImuSearch<'a> {
+    ImuSearch {
+        course,
+        scenario,
+        limits,
+        t_corr_s: 300.0,
+    }
 }
 
 /// 400 runs of the filter with all states: the share within the 95 % quantile that was asked for is 0.95 within four
 /// standard errors of a binomial share, 4 √(0.95·0.05/400) = 0.044.
 #[test]
 fn the_imu_that_is_named_meets_the_limit_in_sampled_runs() {
-    let (scenario, trajectory) = (Scenario::default(), trajectory());
+    let (scenario, trajectory) = setting();
     let course = OutagePlacements::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
     let limits = limit(LimitQuantity::P95, 12.0);
-    let need = ImuSearch {
-        course: &course,
-        scenario: &scenario,
-        limits: &limits,
-        t_corr_s: 300.0,
-    };
-    let imu = need.allocated().unwrap();
+    let imu = need(&course, &scenario, &limits).allocated().unwrap();
     let model = imu.model(scenario.imu.rate_hz);
     let full = scenario.with_full_noise();
     let track = scenario.track(&trajectory, &model, &[OUTAGE]).unwrap();
@@ -110,18 +77,13 @@ fn the_imu_that_is_named_meets_the_limit_in_sampled_runs() {
 /// A tighter limit needs a better IMU in every intensity; one intensity alone may be larger than beside others.
 #[test]
 fn answers_are_monotone() {
-    let (scenario, trajectory) = (Scenario::default(), trajectory());
+    let (scenario, trajectory) = setting();
     let course = OutagePlacements::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
     let limits = [
         limit(LimitQuantity::P95, 30.0),
         limit(LimitQuantity::P95, 10.0),
     ];
-    let need = |k: usize| ImuSearch {
-        course: &course,
-        scenario: &scenario,
-        limits: &limits[k],
-        t_corr_s: 300.0,
-    };
+    let need = |k: usize| need(&course, &scenario, &limits[k]);
     let [loose, tight] = [0, 1].map(|k| need(k).allocated().unwrap());
     assert!(
         loose.values.iter().zip(tight.values).all(|(l, t)| *l > t),
@@ -144,16 +106,11 @@ fn answers_are_monotone() {
 
 #[test]
 fn what_gnss_alone_misses_is_refused() {
-    let (scenario, trajectory) = (Scenario::default(), trajectory());
+    let (scenario, trajectory) = setting();
     let course = OutagePlacements::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
     let limits = limit(LimitQuantity::Rmse, 0.05);
-    let need = ImuSearch {
-        course: &course,
-        scenario: &scenario,
-        limits: &limits,
-        t_corr_s: 300.0,
-    };
-    let Err(RequireError::Floor { value, .. }) = need.allocated() else {
+    let allocated = need(&course, &scenario, &limits).allocated();
+    let Err(RequireError::Floor { value, .. }) = allocated else {
         panic!("an IMU for 5 cm")
     };
     assert!(value > 0.05);
@@ -163,22 +120,14 @@ fn what_gnss_alone_misses_is_refused() {
 /// holds for all.
 #[test]
 fn the_imu_that_is_named_keeps_the_limit_at_every_beginning() {
-    let (scenario, trajectory) = (Scenario::default(), trajectory());
-    let begins = |start_s: u32| Outage {
-        start_s: start_s.into(),
-        end_s: f64::from(start_s) + 20.0,
-    };
-    let outages: Vec<Outage> = (60..=160).map(begins).collect();
+    let (scenario, trajectory) = setting();
+    let begins = |start_s| outage(start_s, start_s + 20.0);
+    let outages: Vec<Outage> = (60..=160).map(|s| begins(f64::from(s))).collect();
     let course = OutagePlacements::new(&scenario, &trajectory, &outages).unwrap();
     for most in [3.0, 10.0] {
         let limits = limit(LimitQuantity::P95, most);
-        let need = ImuSearch {
-            course: &course,
-            scenario: &scenario,
-            limits: &limits,
-            t_corr_s: 300.0,
-        };
-        let model = need.allocated().unwrap().model(scenario.imu.rate_hz);
+        let imu = need(&course, &scenario, &limits).allocated().unwrap();
+        let model = imu.model(scenario.imu.rate_hz);
         let drifts = course.drifts(&scenario, &model).unwrap();
         let (place, worst) = Drift::largest(&drifts, LimitQuantity::P95).unwrap();
         assert!(
@@ -199,21 +148,13 @@ fn the_imu_that_is_named_keeps_the_limit_at_every_beginning() {
 /// The search takes steps of up to a second, `run` of a fifth: what the steps leave is less than the reserve.
 #[test]
 fn the_imu_that_is_named_keeps_the_limit_in_the_steps_of_a_run() {
-    let (scenario, trajectory) = (Scenario::default(), trajectory());
+    let (scenario, trajectory) = setting();
     for (start_s, length_s) in [(133.0, 5.0), (120.0, 10.0), (100.0, 20.0), (150.0, 40.0)] {
-        let outages = [Outage {
-            start_s,
-            end_s: start_s + length_s,
-        }];
+        let outages = [outage(start_s, start_s + length_s)];
         let course = OutagePlacements::new(&scenario, &trajectory, &outages).unwrap();
         let limits = limit(LimitQuantity::Rmse, 1.0 + 0.005 * length_s * length_s);
-        let need = ImuSearch {
-            course: &course,
-            scenario: &scenario,
-            limits: &limits,
-            t_corr_s: 300.0,
-        };
-        let model = need.allocated().unwrap().model(scenario.imu.rate_hz);
+        let imu = need(&course, &scenario, &limits).allocated().unwrap();
+        let model = imu.model(scenario.imu.rate_hz);
         let track = scenario.track(&trajectory, &model, &outages).unwrap();
         let end = end_of_outage(&scenario, &trajectory, &model, &outages, &track);
         let share = end[0].hypot(end[1]) / limits[0].most;
@@ -224,17 +165,13 @@ fn the_imu_that_is_named_keeps_the_limit_in_the_steps_of_a_run() {
 /// White noise in a step of a second is the sum of that in its parts, to rounding.
 #[test]
 fn white_noise_does_not_know_the_length_of_steps() {
-    let (scenario, trajectory) = (Scenario::default(), trajectory());
-    let white = |sigma2| Composite::new(vec![Process::white(sigma2).unwrap()]);
+    let (scenario, trajectory) = setting();
     let model = Model::pooled(scenario.imu.rate_hz, &white(1e-3), &white(1e-7));
-    let outages = [Outage {
-        start_s: 133.0,
-        end_s: 138.0,
-    }];
+    let outages = [outage(133.0, 138.0)];
     let track = scenario.track(&trajectory, &model, &outages).unwrap();
     let at_end = |track: &Track| end_of_outage(&scenario, &trajectory, &model, &outages, track);
     for (fine, merged) in at_end(&track).into_iter().zip(at_end(&track.merged())) {
-        assert!((merged / fine - 1.0).abs() < 1e-9, "{fine} {merged}");
+        assert_relative_eq!(merged, fine, max_relative = 1e-9);
     }
 }
 
@@ -263,7 +200,7 @@ fn end_of_outage(
 fn outages_beside_one_another_are_as_each_alone() {
     let settings = "gnss.rate_hz = 5\nbaro = { rate_hz = 1, sigma_m = 0.5 }";
     for scenario in [Scenario::default(), toml::from_str(settings).unwrap()] {
-        let trajectory = trajectory();
+        let trajectory = town(4);
         let axis = Composite::new(vec![
             Process::white(1e-5).unwrap(),
             Process::ar1(0.9999, 1e-10).unwrap(),
@@ -271,13 +208,12 @@ fn outages_beside_one_another_are_as_each_alone() {
         let model = Model::pooled(scenario.imu.rate_hz, &axis, &axis);
         let end_s = trajectory.end_s();
         let outages = [
-            (150.0, 190.0),
-            (100.5, 130.25),
-            (140.0, 170.0),
-            (0.5, 30.0),
-            (end_s - 20.0, end_s),
+            outage(150.0, 190.0),
+            outage(100.5, 130.25),
+            outage(140.0, 170.0),
+            outage(0.5, 30.0),
+            outage(end_s - 20.0, end_s),
         ];
-        let outages = outages.map(|(start_s, end_s)| Outage { start_s, end_s });
         let drifts = OutagePlacements::new(&scenario, &trajectory, &outages)
             .unwrap()
             .drifts(&scenario, &model)
@@ -294,13 +230,7 @@ fn outages_beside_one_another_are_as_each_alone() {
                 drift.angles_deg[2],
             ];
             let expected = [alone[0].hypot(alone[1]), alone[6], alone[8]];
-            assert!(
-                found
-                    .iter()
-                    .zip(expected)
-                    .all(|(f, e)| (f / e - 1.0).abs() < 1e-9),
-                "{outage:?} {drift:?}"
-            );
+            assert_relative_eq!(found[..], expected[..], max_relative = 1e-9);
         }
     }
 }
@@ -309,26 +239,18 @@ fn outages_beside_one_another_are_as_each_alone() {
 /// of an outage meets it in the curve.
 #[test]
 fn a_curve_holds_the_ends_of_all_shorter_outages() {
-    let (scenario, trajectory) = (Scenario::default(), trajectory());
+    let (scenario, trajectory) = setting();
     let limits = limit(LimitQuantity::P95, 20.0);
     let course = |end_s: f64| {
         OutagePlacements::new(&scenario, &trajectory, &[Outage { end_s, ..OUTAGE }]).unwrap()
     };
     let at_end = course(170.0);
-    let need = ImuSearch {
-        course: &at_end,
-        scenario: &scenario,
-        limits: &limits,
-        t_corr_s: 300.0,
-    };
-    let model = need.allocated().unwrap().model(scenario.imu.rate_hz);
+    let imu = need(&at_end, &scenario, &limits).allocated().unwrap();
+    let model = imu.model(scenario.imu.rate_hz);
     let end = at_end.drifts(&scenario, &model).unwrap()[0].value(LimitQuantity::P95);
     let curve = &course(190.0).curves(&scenario, &model).unwrap()[0];
     let short = curve.iter().find(|drift| drift.after_s == 20.0).unwrap();
-    assert!(
-        (short.value(LimitQuantity::P95) / end - 1.0).abs() < 1e-9,
-        "{short:?} {end}"
-    );
+    assert_relative_eq!(short.value(LimitQuantity::P95), end, max_relative = 1e-9);
     assert!(curve.last().is_some_and(|drift| drift.after_s == 40.0) && curve.len() == 40);
 }
 
@@ -343,27 +265,35 @@ fn quantiles_of_a_horizontal_error_have_their_closed_forms() {
     };
     for (found, probability) in [(LimitQuantity::P50, 0.5_f64), (LimitQuantity::P95, 0.95)] {
         let rayleigh = 2.0 * (-2.0 * (1.0 - probability).ln()).sqrt();
-        assert!((drift([0.0; 2], 4.0).value(found) / rayleigh - 1.0).abs() < 1e-9);
-        assert!((drift([3.0, -4.0], 0.0).value(found) - 5.0).abs() < 1e-9);
+        assert_relative_eq!(
+            drift([0.0; 2], 4.0).value(found),
+            rayleigh,
+            max_relative = 1e-9
+        );
+        assert_abs_diff_eq!(drift([3.0, -4.0], 0.0).value(found), 5.0, epsilon = 1e-9);
         // along a mean of 500 σ it is normal; across, it adds σ²/(2·5), 1e-5 m
         let normal = [0.0, 1.644_853_627][usize::from(probability > 0.9)];
-        assert!((drift([3.0, -4.0], 1e-4).value(found) - 5.0 - 0.01 * normal).abs() < 2e-5);
+        assert_abs_diff_eq!(
+            drift([3.0, -4.0], 1e-4).value(found) - 5.0,
+            0.01 * normal,
+            epsilon = 2e-5
+        );
     }
-    assert!((drift([3.0, -4.0], 2.0).value(LimitQuantity::Rmse) - 29.0_f64.sqrt()).abs() < 1e-12);
+    assert_abs_diff_eq!(
+        drift([3.0, -4.0], 2.0).value(LimitQuantity::Rmse),
+        29.0_f64.sqrt(),
+        epsilon = 1e-12
+    );
 }
 
 /// An accelerometer bias b that no fix corrects moves a vehicle by b t²/2 in an outage; an IMU without errors leaves what
 /// GNSS and start leave.
 #[test]
 fn an_imu_without_errors_leaves_what_gnss_and_start_leave() {
-    let (mut scenario, trajectory) = (Scenario::default(), trajectory());
-    let axis = |sigma2| Composite::new(vec![Process::white(sigma2).unwrap()]);
-    let model = Model::pooled(scenario.imu.rate_hz, &axis(1e-8), &axis(1e-14));
+    let (mut scenario, trajectory) = setting();
+    let model = Model::pooled(scenario.imu.rate_hz, &white(1e-8), &white(1e-14));
     // before the first fix nothing is known of the bias: 0.1 m/s² moves by 20 m in 20 s on each axis
-    let start = [Outage {
-        start_s: 0.0,
-        end_s: 20.0,
-    }];
+    let start = [outage(0.0, 20.0)];
     let margins = |scenario: &Scenario| {
         let course = OutagePlacements::new(scenario, &trajectory, &start).unwrap();
         Margins::of(&course, scenario, &model, &limit(LimitQuantity::Rmse, 6.0)).unwrap()
@@ -377,10 +307,7 @@ fn an_imu_without_errors_leaves_what_gnss_and_start_leave() {
     ) = (Some(0.1), Some(0.1));
     let biased = margins(&scenario);
     let error = 0.1 * 20.0_f64.powi(2) / 2.0 * 2.0_f64.sqrt();
-    assert!(
-        (biased.worst.value / error - 1.0).abs() < 0.01,
-        "{biased:?} {error}"
-    );
+    assert_relative_eq!(biased.worst.value, error, max_relative = 0.01);
     assert!(
         !biased.met && biased.without_imu_errors.margin() >= 0.0,
         "{biased:?}"
@@ -388,10 +315,8 @@ fn an_imu_without_errors_leaves_what_gnss_and_start_leave() {
     // a velocity of the start that is off by 10 m/s moves by 200 m in that time, whatever the IMU
     scenario.initial.vel_sigma_m_s = [10.0; 3];
     let fast = margins(&scenario);
-    assert!(
-        (fast.without_imu_errors.value / (200.0 * 2.0_f64.sqrt()) - 1.0).abs() < 0.01,
-        "{fast:?}"
-    );
+    let floor = fast.without_imu_errors.value;
+    assert_relative_eq!(floor, 200.0 * 2.0_f64.sqrt(), max_relative = 0.01);
     assert!(fast.without_imu_errors.margin() < 0.0, "{fast:?}");
 }
 
@@ -428,7 +353,7 @@ fn flicker_noise(density: f64, floor: f64) -> Composite {
 /// process the same figures gave little more than half the drift.)
 #[test]
 fn a_datasheet_is_not_read_optimistically() {
-    let (scenario, trajectory) = (Scenario::default(), trajectory());
+    let (scenario, trajectory) = setting();
     let course = OutagePlacements::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
     let p95 = |model: &Model| course.drifts(&scenario, model).unwrap()[0].value(LimitQuantity::P95);
     for name in ["vn100", "adis16488"] {

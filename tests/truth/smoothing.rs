@@ -1,10 +1,10 @@
 //! The smoother of `fuse`: a closed form at rest, consistency over simulated recordings, and identities.
 
-use crate::common::drive::{DRIVE, MODEL, place_with};
-use crate::fusion::{belief, model, recorded, run, settings, shipped};
+use crate::fusion::{belief, model, plainly_recorded, recorded, run, settings};
+use crate::shared::{data, gauss_markov, outage, shipped, stands, two_sided, white};
+use approx::assert_relative_eq;
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
-use nav_sim::io::trajectory_file;
 use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim::navigation::fusion::{FixCounts, FusionError, Row, Settings, Start, fuse, outcome};
 use nav_sim::navigation::fusion::{Recorded, Solution};
@@ -13,11 +13,10 @@ use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::gnss::GnssSettings;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
-use nav_sim::navigation::simulation::{Plan, SimulatedRecording as Recording, record};
+use nav_sim::navigation::simulation::{Plan, record};
 use nav_sim::navigation::trajectory::Trajectory;
-use nav_sim::signal::noise::{Composite, Model, Process};
+use nav_sim::signal::noise::{Composite, Model};
 use nav_sim_navigation::earth::radii;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 const OUTAGE: Outage = Outage {
     start_s: 300.0,
@@ -47,20 +46,12 @@ fn at_rest_the_smoothed_position_is_the_closed_form_of_an_integrated_wiener_proc
     const SIGMA2: f64 = 1.0;
     const Q: f64 = SIGMA2 * 0.01;
     const ALLOWED: f64 = 2.5e-3;
-    let place = place_with(
-        "start = { lat_deg = 46.5, lon_deg = 6.5, h_m = 400, heading_deg = 40 }\n\
-         segment = [{ kind = \"straight\", duration_s = 60 }]",
-        MODEL,
-    );
-    let trajectory = trajectory_file::load(&place.path().join("drive.toml"), None)
-        .unwrap()
-        .0;
+    let trajectory = stands(60.0);
     let free = Model {
         rate_hz: 100.0,
         axes: Default::default(),
     };
-    let white = Composite::new(vec![Process::white(SIGMA2).unwrap()]);
-    let believed = Model::pooled(100.0, &white, &Composite::new(Vec::new()));
+    let believed = Model::pooled(100.0, &white(SIGMA2), &Composite::default());
     let belief = Belief::new(&believed, FilterStates::Full, 1.0, 800.0).unwrap();
     let truth = trajectory.state(trajectory.start_s());
     let sigma = InitialSettings {
@@ -97,20 +88,13 @@ fn at_rest_the_smoothed_position_is_the_closed_form_of_an_integrated_wiener_proc
         ..settings()
     };
     let mut solution = Solution::default();
-    recorded(
-        &trajectory,
-        &free,
-        &GnssSettings::default(),
-        1,
-        |recording, _| {
-            let recorded = Recorded {
-                imu: &recording.imu,
-                gnss: &gnss,
-                aids: &[],
-            };
-            solution = fuse(&recorded, &belief, &start, &smooth, Some(&reference)).unwrap();
-        },
-    );
+    plainly_recorded(&trajectory, &free, 1, |recording, _| {
+        let recorded = Recorded {
+            gnss: &gnss,
+            ..data(recording)
+        };
+        solution = fuse(&recorded, &belief, &start, &smooth, Some(&reference)).unwrap();
+    });
     // covariance of positions at two times: the start, and ∫∫ of white acceleration
     let prior = |a: f64, b: f64| {
         let (s, t) = (a.min(b), a.max(b));
@@ -144,7 +128,7 @@ struct Experiment {
     name: &'static str,
     states: FilterStates,
     scenario: &'static str,
-    biases: &'static [[(f64, f64); 2]],
+    biases: [&'static [(f64, f64)]; 2],
 }
 
 const EXPERIMENTS: [Experiment; 3] = [
@@ -152,7 +136,7 @@ const EXPERIMENTS: [Experiment; 3] = [
         name: "15",
         states: FilterStates::Reduced15,
         scenario: "gnss.lever_arm_m = [0.8, -0.3, -1.2]",
-        biases: &[[(5e-4, 200.0), (5e-6, 300.0)]],
+        biases: [&[(5e-4, 200.0)], &[(5e-6, 300.0)]],
     },
     Experiment {
         name: "21 and turn-on biases",
@@ -160,34 +144,21 @@ const EXPERIMENTS: [Experiment; 3] = [
         scenario: "imu = { turn_on_bias_accel_m_s2 = 0.02, turn_on_bias_gyro_rad_s = 1e-4, scale_ppm_accel = 300, scale_ppm_gyro = 300 }\n\
                    initial = { accel_bias_sigma_m_s2 = 0.02, gyro_bias_sigma_rad_s = 1e-4 }\n\
                    gnss.vel_sigma_m_s = \"none\"",
-        biases: &[[(5e-4, 200.0), (5e-6, 300.0)]],
+        biases: [&[(5e-4, 200.0)], &[(5e-6, 300.0)]],
     },
     Experiment {
         name: "full",
         states: FilterStates::Full,
         scenario: "",
-        biases: &[[(5e-4, 200.0), (5e-6, 300.0)], [(1e-3, 2.0), (1e-5, 5.0)]],
+        biases: [&[(5e-4, 200.0), (1e-3, 2.0)], &[(5e-6, 300.0), (1e-5, 5.0)]],
     },
 ];
-
-/// White noise and Gauss-Markov biases of these standard deviations and correlation times (s), at 100 Hz.
-fn axis(white: f64, biases: impl Iterator<Item = (f64, f64)>) -> Composite {
-    let ar1 = |(sigma, t_corr_s): (f64, f64)| {
-        let phi = (-0.01 / t_corr_s).exp();
-        Process::ar1(phi, sigma * sigma * (1.0 - phi * phi)).unwrap()
-    };
-    Composite::new(
-        std::iter::once(Process::white(white).unwrap())
-            .chain(biases.map(ar1))
-            .collect(),
-    )
-}
 
 impl Experiment {
     /// Its recordings, fused and smoothed.
     fn solutions(&self, trajectory: &Trajectory, runs: u64) -> Vec<Solution> {
-        let of = |i: usize| self.biases.iter().map(move |pair| pair[i]);
-        let model = Model::pooled(100.0, &axis(1e-5, of(0)), &axis(1e-8, of(1)));
+        let [accel, gyro] = [0, 1].map(|i| gauss_markov([1e-5, 1e-8][i], self.biases[i]));
+        let model = Model::pooled(100.0, &accel, &gyro);
         let scenario: Scenario = toml::from_str(self.scenario).unwrap();
         assert_eq!(scenario.validate(), Ok(()));
         let belief = Belief::new(&model, self.states, 1.0, 800.0)
@@ -201,22 +172,15 @@ impl Experiment {
         };
         let reference = trajectory.clone().into();
         let solution = |run: u64| {
-            let Recording {
-                imu, gnss, start, ..
-            } = record(&plan, run);
-            let sigma = scenario.initial.clone();
+            let recording = record(&plan, run);
             let start = Start {
                 t_s: trajectory.start_s(),
-                state: start,
-                sigma,
+                state: recording.start,
+                sigma: scenario.initial.clone(),
                 found: None,
             };
             fuse(
-                &Recorded {
-                    imu: &imu,
-                    gnss: &gnss,
-                    aids: &[],
-                },
+                &data(&recording),
                 &belief,
                 &start,
                 &settings,
@@ -236,23 +200,17 @@ impl Experiment {
 fn smoothed_errors_are_as_large_as_stated_and_smaller_than_the_filter_s() {
     const RUNS: u64 = 8;
     let looks = [3, 120, 320, 345, 380, 500, 700, 880];
-    let trajectory = shipped("land_vehicle.toml");
+    let trajectory = shipped("land_vehicle");
     for experiment in &EXPERIMENTS {
         let solutions = experiment.solutions(&trajectory, RUNS);
-        let inside = |sum: f64, dof: f64, what: &str, p_least: f64| {
-            let p = ChiSquared::new(dof).unwrap().cdf(sum);
-            assert!(
-                (p_least..=1.0 - p_least).contains(&p),
-                "{}, {what}: {sum} of {dof}: p = {p}",
-                experiment.name
-            );
-        };
+        let name = experiment.name;
         for look in looks {
-            let nees = solutions
+            let nees: f64 = solutions
                 .iter()
                 .map(|s| rows(s)[look].error.unwrap().nees)
-                .sum::<f64>();
-            inside(nees, 9.0 * RUNS as f64, &format!("NEES at {look} s"), 1e-4);
+                .sum();
+            let p = two_sided(nees, 9.0 * RUNS as f64);
+            assert!(p >= 2e-4, "{name}, NEES at {look} s: {nees}");
             for state in 0..9 {
                 let change = |s: &Solution| {
                     let (f, s) = (&s.rows[look], &rows(s)[look]);
@@ -260,66 +218,46 @@ fn smoothed_errors_are_as_large_as_stated_and_smaller_than_the_filter_s() {
                     moved.powi(2) / (f.sigma[state].powi(2) - s.sigma[state].powi(2))
                 };
                 let sum = solutions.iter().map(change).sum::<f64>();
-                inside(
-                    sum,
-                    RUNS as f64,
-                    &format!("change of state {state} at {look} s"),
-                    1e-5,
+                let p = two_sided(sum, RUNS as f64);
+                assert!(
+                    p >= 2e-5,
+                    "{name}, change of state {state} at {look} s: {sum}"
                 );
             }
         }
-        let mean_square = |rows: &dyn Fn(&Solution) -> Vec<Row>, of: &dyn Fn(&Row) -> f64| {
-            let all: Vec<f64> = solutions
-                .iter()
-                .flat_map(rows)
-                .map(|row| of(&row).powi(2))
-                .collect();
-            all.iter().sum::<f64>() / all.len() as f64
-        };
-        let ratio = |within: &dyn Fn(&Row) -> bool, of: &dyn Fn(&Row) -> f64| {
-            let some = |all: &[Row]| {
-                all.iter()
-                    .filter(|row| within(row))
-                    .cloned()
-                    .collect::<Vec<_>>()
+        // root mean square of smoothed over filtered, of the same rows
+        let ratio = |within: &dyn Fn(&Row) -> bool, of: &dyn Fn(&[f64; 9]) -> f64| {
+            let sum = |rows: &[Row]| -> f64 {
+                let some = rows.iter().filter(|row| within(row));
+                some.map(|row| of(&row.error.unwrap().values).powi(2)).sum()
             };
-            (mean_square(&|s| some(rows(s)), of) / mean_square(&|s| some(&s.rows), of)).sqrt()
+            let of =
+                |rows: fn(&Solution) -> &[Row]| solutions.iter().map(|s| sum(rows(s))).sum::<f64>();
+            let (smoothed, filtered) = (of(rows), of(|s| s.rows.as_slice()));
+            (smoothed / filtered).sqrt()
         };
         let ratios: Vec<f64> = (0..9)
-            .map(|i| ratio(&|_| true, &|row| row.error.unwrap().values[i]))
+            .map(|i| ratio(&|_| true, &|values| values[i]))
             .collect();
-        assert!(
-            ratios.iter().all(|r| *r < 1.0),
-            "{}: {ratios:?}",
-            experiment.name
-        );
-        let horizontal =
-            |row: &Row| row.error.unwrap().values[0].hypot(row.error.unwrap().values[1]);
-        let [within, outside] =
-            [true, false].map(|is| ratio(&|row| OUTAGE.withholds(row.t_s) == is, &horizontal));
-        assert!(within < outside, "{}: {within} {outside}", experiment.name);
-        let farthest = |rows: &[Row]| {
-            let rows = rows.iter().filter(|row| OUTAGE.withholds(row.t_s));
-            rows.max_by(|a, b| {
-                a.sigma[0]
-                    .hypot(a.sigma[1])
-                    .total_cmp(&b.sigma[0].hypot(b.sigma[1]))
+        assert!(ratios.iter().all(|r| *r < 1.0), "{name}: {ratios:?}");
+        let [within, outside] = [true, false].map(|is| {
+            ratio(&|row| OUTAGE.withholds(row.t_s) == is, &|e| {
+                e[0].hypot(e[1])
             })
-            .unwrap()
-            .t_s
+        });
+        assert!(within < outside, "{name}: {within} {outside}");
+        let farthest = |rows: &[Row]| {
+            let sigma = |row: &&Row| row.sigma[0].hypot(row.sigma[1]);
+            let rows = rows.iter().filter(|row| OUTAGE.withholds(row.t_s));
+            rows.max_by(|a, b| sigma(a).total_cmp(&sigma(b)))
+                .unwrap()
+                .t_s
         };
         for solution in &solutions {
-            assert!((OUTAGE.end_s - farthest(&solution.rows)).abs() < 1.5);
-            assert!(
-                (345.0 - farthest(rows(solution))).abs() < 15.0,
-                "{}",
-                farthest(rows(solution))
-            );
+            let [filtered, smoothed] = [&solution.rows, rows(solution)].map(farthest);
+            assert!((OUTAGE.end_s - filtered).abs() < 1.5 && (345.0 - smoothed).abs() < 15.0);
         }
-        println!(
-            "{}: RMSE smoothed over filter {ratios:.2?}; in the outage {within:.2}",
-            experiment.name
-        );
+        println!("{name}: RMSE smoothed over filter {ratios:.2?}; in the outage {within:.2}");
     }
 }
 
@@ -328,49 +266,35 @@ fn smoothed_errors_are_as_large_as_stated_and_smaller_than_the_filter_s() {
 /// nothing to smooth, to rounding.
 #[test]
 fn smoothing_changes_nothing_that_it_should_not() {
-    let trajectory = shipped("figure_eight.toml");
+    let trajectory = shipped("figure_eight");
     let gnss = GnssSettings {
         lever_arm_m: [0.8, -0.3, -1.2],
         ..GnssSettings::default()
     };
     recorded(&trajectory, &model(), &gnss, 1, |recording, start| {
-        let imu = &recording.imu[..12_000];
-        let outages = vec![Outage {
-            start_s: 60.0,
-            end_s: 80.0,
-        }];
-        let fixes = &recording.gnss;
-        let plain = Settings {
-            outages,
-            lever_arm_b: gnss.lever_arm_m.into(),
-            ..settings()
+        let solve = |rows_hz: f64, smooth: bool, outages: [Outage; 1]| {
+            let settings = Settings {
+                outages: outages.into(),
+                lever_arm_b: gnss.lever_arm_m.into(),
+                rows_hz,
+                smooth,
+                ..settings()
+            };
+            let data = Recorded {
+                imu: &recording.imu[..12_000],
+                ..data(recording)
+            };
+            run(data, start, &settings, &trajectory)
         };
-        let smooth = |rows_hz: f64, smooth: bool| {
-            run(
-                imu,
-                fixes,
-                start,
-                &Settings {
-                    gate: None,
-                    rows_hz,
-                    smooth,
-                    ..plain.clone()
-                },
-                &trajectory,
-            )
+        let short = [outage(60.0, 80.0)];
+        let (coarse, fine) = (solve(1.0, true, short), solve(5.0, true, short));
+        let filtered = Solution {
+            smoothed: None,
+            ..coarse.clone()
         };
-        let (coarse, fine) = (smooth(1.0, true), smooth(5.0, true));
-        assert_eq!(
-            Solution {
-                smoothed: None,
-                ..coarse.clone()
-            },
-            smooth(1.0, false)
-        );
-        assert_eq!(
-            (rows(&coarse).last(), rows(&coarse).len()),
-            (coarse.rows.last(), coarse.rows.len())
-        );
+        assert_eq!(filtered, solve(1.0, false, short));
+        assert_eq!(rows(&coarse).len(), coarse.rows.len());
+        assert_eq!(rows(&coarse).last(), coarse.rows.last());
         let FixCounts { used, withheld, .. } = outcome(&coarse, &[]).fixes;
         assert!(used > 70 && withheld == 20, "{used} {withheld}");
         for (filtered, smoothed) in coarse.rows.iter().zip(rows(&coarse)) {
@@ -399,25 +323,11 @@ fn smoothing_changes_nothing_that_it_should_not() {
                 let apart =
                     (row.error.unwrap().values[i] - same.error.unwrap().values[i]) / row.sigma[i];
                 assert!(apart.abs() < 1e-6, "{i} at {} s: {apart:e}", row.t_s);
-                assert!((same.sigma[i] / row.sigma[i] - 1.0).abs() < 1e-6);
+                assert_relative_eq!(same.sigma[i], row.sigma[i], max_relative = 1e-6);
             }
         }
         // without a fix there is nothing to smooth
-        let all = vec![Outage {
-            start_s: 0.0,
-            end_s: 1e4,
-        }];
-        let free = run(
-            imu,
-            fixes,
-            start,
-            &Settings {
-                smooth: true,
-                outages: all,
-                ..plain.clone()
-            },
-            &trajectory,
-        );
+        let free = solve(1.0, true, [outage(0.0, 1e4)]);
         for (filtered, smoothed) in free.rows.iter().zip(rows(&free)) {
             let apart = |of: fn(&Row) -> [f64; 9]| {
                 (0..9)
@@ -429,46 +339,32 @@ fn smoothing_changes_nothing_that_it_should_not() {
     });
 }
 
-/// A tape that does not fit is refused before the filter runs: with a row for each of a million samples, 15 states take
-/// 15² + 15·16/2 numbers a row for the links alone, 2.8 GB.
 #[test]
 fn a_tape_that_is_too_long_is_refused() {
-    let place = place_with(DRIVE, MODEL);
-    let trajectory = trajectory_file::load(&place.path().join("drive.toml"), None)
-        .unwrap()
-        .0;
-    recorded(
-        &trajectory,
-        &model(),
-        &GnssSettings::default(),
-        1,
-        |recording, start| {
-            let imu: Vec<_> = recording
-                .imu
-                .iter()
-                .cycle()
-                .take(1_000_000)
-                .copied()
-                .collect();
-            let recorded = Recorded {
-                imu: &imu,
-                gnss: &recording.gnss,
-                aids: &[],
-            };
-            let long = Settings {
-                gate: None,
-                rows_hz: 30_000.0,
-                smooth: true,
-                ..settings()
-            };
-            let refused = fuse(&recorded, &belief(&model()), start, &long, None).unwrap_err();
-            let FusionError::Memory {
-                bytes, states: 15, ..
-            } = refused
-            else {
-                panic!("{refused}")
-            };
-            assert!((2.8e9..3.5e9).contains(&bytes), "{bytes}");
-        },
-    );
+    plainly_recorded(&stands(60.0), &model(), 1, |recording, start| {
+        let imu: Vec<_> = recording
+            .imu
+            .iter()
+            .cycle()
+            .take(1_000_000)
+            .copied()
+            .collect();
+        let recorded = Recorded {
+            imu: &imu,
+            ..data(recording)
+        };
+        let long = Settings {
+            rows_hz: 30_000.0,
+            smooth: true,
+            ..settings()
+        };
+        let refused = fuse(&recorded, &belief(&model()), start, &long, None).unwrap_err();
+        let FusionError::Memory {
+            bytes, states: 15, ..
+        } = refused
+        else {
+            panic!("{refused}")
+        };
+        assert!((2.8e9..3.5e9).contains(&bytes), "{bytes}");
+    });
 }

@@ -1,6 +1,7 @@
 //! The shipped trajectories are plausible and close: their noise-free IMU samples, mechanised, return to
 //! them. And ideal samples and strapdown agree with independent truth.
 
+use crate::shared::{root, shipped};
 use glam::DVec3;
 use nav_sim::io::trajectory_file::load;
 use nav_sim::navigation::earth::GravityModel;
@@ -13,9 +14,8 @@ use nav_sim_navigation::strapdown::Strapdown;
 use nav_sim_navigation::trajectory::plausibility::examine;
 use nav_sim_signal::lanes::Vec3;
 use std::io::Read;
-use std::path::{Path, PathBuf};
 
-const SHIPPED: [&str; 3] = ["land_vehicle.toml", "figure_eight.toml", "fixed_wing.toml"];
+const SHIPPED: [&str; 3] = ["land_vehicle", "figure_eight", "fixed_wing"];
 
 /// What the shipped trajectories must meet at 100 Hz.
 const BOUNDS: Bounds = Bounds {
@@ -24,19 +24,9 @@ const BOUNDS: Bounds = Bounds {
     attitude_rad: 1e-6,
 };
 
-fn root(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
-}
-
-fn shipped(name: &str) -> Trajectory {
-    let (trajectory, warnings) = load(&root("trajectories").join(name), None).unwrap();
-    assert!(warnings.is_empty(), "{name}: {warnings:?}");
-    trajectory
-}
-
 /// A shipped profile that starts elsewhere.
 fn moved(name: &str, lat_deg: f64, lon_deg: f64) -> Trajectory {
-    let text = std::fs::read_to_string(root("trajectories").join(name)).unwrap();
+    let text = std::fs::read_to_string(root(&format!("trajectories/{name}.toml"))).unwrap();
     let start = text.find("start = { lat_deg = ").unwrap();
     let rest = start + text[start..].find(", h_m").unwrap();
     let place = format!("start = {{ lat_deg = {lat_deg}, lon_deg = {lon_deg}");
@@ -54,9 +44,9 @@ fn closure(trajectory: &Trajectory, rate_hz: f64) -> Closure {
 fn shipped_trajectories_last_900_s_and_are_plausible() {
     // Speed (m/s), acceleration (m/s²), jerk (m/s³), rate (°/s): drives stay comfortable, the aircraft banks by 33°.
     for (name, limits) in [
-        ("land_vehicle.toml", [25.1, 3.0, 5.0, 17.2]),
-        ("figure_eight.toml", [12.1, 2.2, 3.0, 11.5]),
-        ("fixed_wing.toml", [70.1, 7.0, 5.0, 20.1]),
+        ("land_vehicle", [25.1, 3.0, 5.0, 17.2]),
+        ("figure_eight", [12.1, 2.2, 3.0, 11.5]),
+        ("fixed_wing", [70.1, 7.0, 5.0, 20.1]),
     ] {
         let t = shipped(name);
         assert!(
@@ -73,20 +63,18 @@ fn shipped_trajectories_last_900_s_and_are_plausible() {
 /// The outages of the navigation study: straight in one, turning throughout the other.
 #[test]
 fn the_drive_is_straight_in_one_outage_and_turns_in_the_other() {
-    let t = shipped("land_vehicle.toml");
+    let t = shipped("land_vehicle");
     let yaw_rate = |s: f64| t.kinematics(s).omega_eb_b.z.abs();
-    assert!(
-        (0..=900)
-            .map(|k| 300.0 + 0.1 * f64::from(k))
-            .all(|s| yaw_rate(s) < 1e-5)
-    );
-    let turning = (0..900)
-        .filter(|k| yaw_rate(700.0 + 0.1 * f64::from(*k)) > 0.05)
-        .count();
+    let rates = |from: f64| {
+        (0..900)
+            .map(move |k| from + 0.1 * f64::from(k))
+            .map(yaw_rate)
+    };
+    assert!(rates(300.0).all(|rate| rate < 1e-5));
+    let turning = rates(700.0).filter(|rate| *rate > 0.05).count();
     assert!(turning > 700, "turning for {} s of 90", turning / 10);
-    let standing = (0..900)
-        .filter(|s| t.state(f64::from(*s)).v_n.length() < 1e-3)
-        .count();
+    let stands = |s: &u32| t.state(f64::from(*s)).v_n.length() < 1e-3;
+    let standing = (0..900).filter(stands).count();
     assert!((100..200).contains(&standing), "standing for {standing} s");
 }
 
@@ -100,25 +88,20 @@ fn shipped_trajectories_close_and_the_error_falls_faster_than_dt_squared() {
         }
         let falls =
             |f: fn(&Closure) -> f64| f(&slow) / f(&nominal) > 4.0 && f(&nominal) / f(&fast) > 4.0;
-        assert!(
-            falls(|c| c.position_m) && falls(|c| c.velocity_m_s),
-            "{name}: {slow:?} {nominal:?} {fast:?}"
-        );
-        assert!(
-            falls(|c| c.attitude_rad),
-            "{name}: {slow:?} {nominal:?} {fast:?}"
-        );
+        let all_fall =
+            falls(|c| c.position_m) && falls(|c| c.velocity_m_s) && falls(|c| c.attitude_rad);
+        assert!(all_fall, "{name}: {slow:?} {nominal:?} {fast:?}");
     }
 }
 
 #[test]
 fn closure_holds_in_both_hemispheres_and_across_the_antimeridian() {
     for (name, lat_deg, lon_deg) in [
-        ("land_vehicle.toml", -46.5, 179.99),
-        ("land_vehicle.toml", 70.0, 179.999),
-        ("figure_eight.toml", -0.0005, 179.9995),
-        ("fixed_wing.toml", 62.0, 179.9),
-        ("fixed_wing.toml", 0.0, 179.95),
+        ("land_vehicle", -46.5, 179.99),
+        ("land_vehicle", 70.0, 179.999),
+        ("figure_eight", -0.0005, 179.9995),
+        ("fixed_wing", 62.0, 179.9),
+        ("fixed_wing", 0.0, 179.95),
     ] {
         let t = moved(name, lat_deg, lon_deg);
         let lon: Vec<f64> = (0..900).map(|s| t.state(f64::from(s)).lon).collect();
@@ -133,20 +116,13 @@ fn closure_holds_in_both_hemispheres_and_across_the_antimeridian() {
 
 #[test]
 fn too_slow_a_rate_for_the_rotation_is_refused() {
-    let t = shipped("figure_eight.toml");
-    let e = Closure::new(&t, 0.25, GravityModel::Wgs84)
-        .unwrap_err()
-        .to_string();
-    assert!(
-        e.contains("within one sample at") && e.contains("too slow a rate for it"),
-        "{e}"
-    );
-    assert!(
-        Closure::new(&t, f64::NAN, GravityModel::Wgs84)
+    let t = shipped("figure_eight");
+    for (rate_hz, expected) in [(0.25, "too slow a rate for it"), (f64::NAN, "NaN Hz")] {
+        let e = Closure::new(&t, rate_hz, GravityModel::Wgs84)
             .unwrap_err()
-            .to_string()
-            .contains("NaN Hz")
-    );
+            .to_string();
+        assert!(e.contains(expected), "{e}");
+    }
 }
 
 /// Independent truth.

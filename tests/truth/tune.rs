@@ -1,5 +1,7 @@
 //! Tuned models are consistent: the factor of a process that is larger in truth is found, and sampled runs agree.
 
+use crate::shared::{town, white_and_walk};
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 use nav_sim::navigation::ekf::Belief;
 use nav_sim::navigation::metrics::{Estimate, Expected, VerdictKind};
 use nav_sim::navigation::monte_carlo;
@@ -7,12 +9,9 @@ use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::trajectory::Trajectory;
-use nav_sim::navigation::trajectory::profile::{
-    Acceleration, Bank, Length, Profile, ProfileStart as Start, Segment, SegmentKind as Kind,
-    Turning,
-};
+
 use nav_sim::signal::imu::Sensor;
-use nav_sim::signal::noise::{Composite, Model, Process};
+use nav_sim::signal::noise::Model;
 use nav_sim_navigation::simulation::lincov::{
     Aim, Factor, Filter, Task, Track, TrueErrors, scaled,
 };
@@ -22,58 +21,9 @@ const OUTAGES: [Outage; 1] = [Outage {
     end_s: 260.0,
 }];
 
-/// White noise and random walks of a consumer IMU, the random walks times `accel` and `gyro`.
 fn model(accel: f64, gyro: f64) -> Model {
-    let axis = |white: f64, walk: f64| {
-        Composite::new(vec![
-            Process::white(white).unwrap(),
-            Process::random_walk(walk).unwrap(),
-        ])
-    };
-    Model::pooled(100.0, &axis(1e-4, accel * 1e-10), &axis(1e-8, gyro * 1e-12))
-}
-
-/// Four minutes of town traffic.
-fn trajectory() -> Trajectory {
-    let faster = |to_speed: f64| Kind::Accelerate {
-        to_speed,
-        by: Acceleration::Duration(10.0),
-    };
-    let turn = |deg: f64| Kind::Turn {
-        angle: deg.to_radians(),
-        by: Turning::Duration(9.0),
-    };
-    let block = [
-        faster(14.0),
-        Kind::Straight(Length::Duration(14.0)),
-        turn(90.0),
-        faster(6.0),
-        turn(-60.0),
-    ];
-    let segments = block.into_iter().cycle().take(26);
-    let segments = segments
-        .map(|kind| Segment {
-            kind,
-            climb_m: 0.0,
-            ramp_s: None,
-        })
-        .collect();
-    let start = Start {
-        t_s: 0.0,
-        lat: 0.8,
-        lon: 0.1,
-        h: 0.0,
-        heading: 0.7,
-        speed: 0.0,
-    };
-    Profile {
-        start,
-        bank: Bank::None,
-        ramp_s: 1.0,
-        segments,
-    }
-    .build()
-    .unwrap()
+    let gyro = white_and_walk(1e-8, gyro * 1e-12);
+    Model::pooled(100.0, &white_and_walk(1e-4, accel * 1e-10), &gyro)
 }
 
 struct Drive {
@@ -83,7 +33,7 @@ struct Drive {
 }
 
 fn drive() -> Drive {
-    let (scenario, trajectory) = (Scenario::default().with_full_noise(), trajectory());
+    let (scenario, trajectory) = (Scenario::default().with_full_noise(), town(5));
     let track = scenario
         .track(&trajectory, &model(1.0, 1.0), &OUTAGES)
         .unwrap();
@@ -119,16 +69,20 @@ impl Drive {
         let factors = task.factors().unwrap();
         let consistency = task.consistency(filter, &factors).unwrap();
         match aim {
-            Aim::Mean => assert!(
-                (consistency.nees / 9.0 - 1.0).abs() < 5e-3,
-                "{consistency:?}"
-            ),
-            Aim::Worst => assert!(
-                (consistency.largest.ratio - 1.0).abs() < 5e-3,
-                "{consistency:?}"
-            ),
+            Aim::Mean => assert_relative_eq!(consistency.nees, 9.0, max_relative = 5e-3),
+            Aim::Worst => assert_relative_eq!(consistency.largest.ratio, 1.0, max_relative = 5e-3),
         }
         factors
+    }
+
+    /// What a filter with these factors is expected to do.
+    fn expected(&self, factors: &[Factor], truth: &Model) -> Expected {
+        let belief = self.belief(&scaled(&model(1.0, 1.0), factors));
+        let truly = Truth::Model(truth);
+        let experiment = self
+            .scenario
+            .experiment(&self.trajectory, truly, &[], &OUTAGES, 1);
+        Expected::along(&self.track, &experiment, &belief, truth).unwrap()
     }
 
     /// NEES at the outage's end of a hundred runs.
@@ -163,15 +117,12 @@ fn a_sensor_four_times_as_noisy_is_found_and_runs_agree() {
         } else {
             1.0
         };
-        assert!(
-            (factor.on_variance / expected - 1.0).abs() < 0.05,
-            "{factors:?}"
-        );
+        assert_relative_eq!(factor.on_variance, expected, max_relative = 0.05);
     }
     let before = drive.sampled_nees(drive.belief(&model(1.0, 1.0)), &truth);
     let after = drive.sampled_nees(drive.belief(&scaled(&model(1.0, 1.0), &factors)), &truth);
     let deviation = (18.0_f64 / 100.0).sqrt();
-    assert!((after.value - 9.0).abs() < 4.0 * deviation, "{after:?}");
+    assert_abs_diff_eq!(after.value, 9.0, epsilon = 4.0 * deviation);
     assert!(before.value - 9.0 > 6.0 * deviation, "{before:?}");
 }
 
@@ -192,28 +143,16 @@ fn a_model_that_is_true_needs_no_factor() {
 #[test]
 fn a_tuned_filter_is_honest_over_the_run_as_a_verdict_judges_it() {
     let drive = drive();
-    let axis = |white: f64, walk: f64| {
-        Composite::new(vec![
-            Process::white(white).unwrap(),
-            Process::random_walk(walk).unwrap(),
-        ])
-    };
-    let truth = Model::pooled(100.0, &axis(1e-4, 1e-10), &axis(1e-6, 1e-12));
+    let gyro = white_and_walk(1e-6, 1e-12);
+    let truth = Model::pooled(100.0, &white_and_walk(1e-4, 1e-10), &gyro);
     let factors = drive.factors(std::slice::from_ref(&truth), Aim::Worst);
-    let belief = drive.belief(&scaled(&model(1.0, 1.0), &factors));
-    let experiment =
-        drive
-            .scenario
-            .experiment(&drive.trajectory, Truth::Model(&truth), &[], &OUTAGES, 1);
-    let summary = Expected::along(&drive.track, &experiment, &belief, &truth)
-        .unwrap()
-        .summary;
-    assert!(
-        summary.verdict.kind != VerdictKind::Overconfident,
-        "{:?} {factors:?}",
-        summary.verdict
+    let verdict = drive.expected(&factors, &truth).summary.verdict;
+    assert_ne!(
+        verdict.kind,
+        VerdictKind::Overconfident,
+        "{verdict:?} {factors:?}"
     );
-    assert!(summary.verdict.ratio < 1.01, "{:?}", summary.verdict);
+    assert!(verdict.ratio < 1.01, "{verdict:?}");
 }
 
 /// Of two truths, each larger in another sensor, neither is underrated; and the factors are those of the two.
@@ -235,14 +174,7 @@ fn no_factor_is_larger_than_it_must_be() {
     let truth = model(9.0, 4.0);
     let factors = drive.factors(std::slice::from_ref(&truth), Aim::Worst);
     let largest = |factors: &[Factor]| {
-        let belief = drive.belief(&scaled(&model(1.0, 1.0), factors));
-        let experiment =
-            drive
-                .scenario
-                .experiment(&drive.trajectory, Truth::Model(&truth), &[], &OUTAGES, 1);
-        let record = Expected::along(&drive.track, &experiment, &belief, &truth)
-            .unwrap()
-            .record;
+        let record = drive.expected(factors, &truth).record;
         let ends = &record.outages[0];
         let at_end = (0..9).map(|i| (ends.error_end[i] / ends.see_end[i]).powi(2));
         at_end
@@ -263,10 +195,7 @@ fn no_factor_is_larger_than_it_must_be() {
         smaller(&|i| i == 0),
         smaller(&|i| i == 1),
     ] {
-        assert!(
-            largest(&factors) > 1.001,
-            "{} {factors:?}",
-            largest(&factors)
-        );
+        let largest = largest(&factors);
+        assert!(largest > 1.001, "{largest} {factors:?}");
     }
 }

@@ -633,19 +633,17 @@ mod average_tests;
 #[cfg(test)]
 mod differing_tests {
     use super::*;
-    use crate::rng::Generator;
+    use crate::tests::{generator, normal, replicate};
     use crate::wavelet::interval::edof_eta3;
     use crate::wavelet::{RobustVariance, Status};
-    use rand::{RngExt, SeedableRng};
-    use rand_distr::StandardNormal;
 
     /// 24 replicates whose variances differ by a common factor of deviation b, and by their noise √(2/eta3): b² is known to
     /// √(2/23) = 30 % of 24 (36 % of a median absolute deviation, four times within 2.5), and is far below b² where there is none.
     #[test]
     fn a_common_factor_is_found() {
         let tuning = Tuning::default();
-        let mut generator = Generator::seed_from_u64(4);
-        let mut normal = || generator.sample::<f64, _>(StandardNormal);
+        let mut generator = generator(4, 0);
+        let mut normal = || normal(&mut generator);
         let mut set = |b: f64| -> Vec<Replicate> {
             let replicate = |_| {
                 let factor = (b * normal()).exp();
@@ -658,15 +656,10 @@ mod differing_tests {
                     status: Status::Ok,
                     zeros: 0.0,
                 };
+                let robust = nu.iter().map(robust).collect();
                 Replicate {
-                    name: String::new(),
-                    axis: None,
                     samples: 1 << 16,
-                    robust: nu.iter().map(robust).collect(),
-                    classical: nu,
-                    coverage: Vec::new(),
-                    trend: f64::NAN,
-                    mean: f64::NAN,
+                    ..replicate(nu, robust)
                 }
             };
             (0..24).map(replicate).collect()
@@ -678,18 +671,5 @@ mod differing_tests {
             assert!(between(&alike, estimator, &tuning) < 0.001, "{estimator:?}");
         }
         assert_eq!(between(&different[..2], Estimator::Awv, &tuning), 0.0);
-    }
-}
-
-#[cfg(test)]
-mod robust_scale_tests {
-    use super::*;
-
-    #[test]
-    fn by_hand() {
-        assert_eq!(
-            (median(&[3.0, 1.0, 2.0]), median(&[4.0, 1.0, 2.0, 3.0])),
-            (2.0, 2.5)
-        );
     }
 }

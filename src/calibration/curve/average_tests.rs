@@ -1,6 +1,7 @@
 //! Averages of replicates, by hand and on coarse steps.
 
 use super::*;
+use crate::tests::{generator, measured, normal};
 use approx::assert_relative_eq;
 
 fn tuning() -> Tuning {
@@ -8,24 +9,14 @@ fn tuning() -> Tuning {
 }
 
 fn replicate(samples: usize, classical: f64, robust: f64) -> Replicate {
-    let robust = vec![
-        RobustVariance {
-            value: robust,
-            status: Status::Ok,
-            zeros: 0.0
-        };
-        2
-    ];
-    let (name, classical) = (String::new(), vec![classical; 2]);
+    let robust = RobustVariance {
+        value: robust,
+        status: Status::Ok,
+        zeros: 0.0,
+    };
     Replicate {
-        name,
-        axis: None,
         samples,
-        classical,
-        robust,
-        coverage: Vec::new(),
-        trend: f64::NAN,
-        mean: f64::NAN,
+        ..crate::tests::replicate(vec![classical; 2], vec![robust; 2])
     }
 }
 
@@ -44,15 +35,8 @@ fn thirty_per_cent_of_eight_is_two_at_each_end() {
     let trim = Trim::Fraction(0.3);
     assert_relative_eq!(first(&eight(), Estimator::Awv, trim), 4.5);
     assert_relative_eq!(first(&eight(), Estimator::SrAwv, trim), 45.0);
-    assert_eq!(
-        (
-            trim.count(8),
-            trim.count(10),
-            trim.count(3),
-            Trim::Count(2).count(8)
-        ),
-        (2, 3, 0, 2)
-    );
+    assert_eq!([8, 10, 3].map(|n| trim.count(n)), [2, 3, 0]);
+    assert_eq!(Trim::Count(2).count(8), 2);
     let mut abnormal = eight();
     abnormal[0] = replicate(1000, 0.0, 1e9);
     abnormal[1] = replicate(1000, 0.0, 1e-9);
@@ -122,27 +106,11 @@ fn equal_replicates_multiply_the_degrees_of_freedom() {
 /// √(2/eta), and the 1.3 % of fine steps; the first is the classical variance, with all its degrees of freedom.
 #[test]
 fn scales_that_coarse_steps_move_are_classical() {
-    use crate::wavelet::both;
-    use rand::{RngExt, SeedableRng};
-    let mut generator = crate::rng::Generator::seed_from_u64(5);
-    let mut number = || (0.3 * generator.sample::<f64, _>(rand_distr::StandardNormal)).round();
+    let mut generator = generator(5, 0);
+    let mut number = || (0.3 * normal(&mut generator)).round();
     let signal: Vec<f64> = (0..1 << 17).map(|_| number()).collect();
-    let (classical, robust) = both(&signal, 9, &tuning()).unwrap();
-    let one = Replicate {
-        samples: signal.len(),
-        classical,
-        robust,
-        ..replicate(1, 0.0, 0.0)
-    };
-    let curve = |estimator| {
-        average(
-            std::slice::from_ref(&one),
-            estimator,
-            Trim::Count(0),
-            &tuning(),
-        )
-        .unwrap()
-    };
+    let one = [measured(String::new(), &signal, 9)];
+    let curve = |estimator| average(&one, estimator, Trim::Count(0), &tuning()).unwrap();
     assert_eq!(curve(Estimator::Gmwm).ignored, [0; 0]);
     let curve = curve(Estimator::Rgmwm);
     assert!(
@@ -172,14 +140,23 @@ fn a_scale_without_a_root_is_bounded_by_the_classical_average() {
 
 #[test]
 fn what_cannot_be_averaged_is_refused() {
-    let error = |r: &[Replicate], e, t| average(r, e, t, &tuning()).unwrap_err().to_string();
-    assert_eq!(error(&[], Estimator::Awv, Trim::Count(0)), "no replicates");
-    assert_eq!(
-        error(&eight(), Estimator::DrAwv, Trim::Count(4)),
-        "a trim of 4 at each end needs 9 replicates; there are 8"
-    );
-    assert_eq!(
-        error(&eight(), Estimator::Gmwm, Trim::Count(0)),
-        "gmwm takes one recording at a time; there are 8"
-    );
+    for (replicates, estimator, trim, expected) in [
+        (0, Estimator::Awv, 0, "no replicates"),
+        (
+            8,
+            Estimator::DrAwv,
+            4,
+            "trimming 4 replicates at each end needs at least 9 replicates; there are 8",
+        ),
+        (
+            8,
+            Estimator::Gmwm,
+            0,
+            "gmwm takes one recording at a time; there are 8",
+        ),
+    ] {
+        let some = &eight()[..replicates];
+        let error = average(some, estimator, Trim::Count(trim), &tuning()).unwrap_err();
+        assert_eq!(error.to_string(), expected);
+    }
 }

@@ -602,6 +602,7 @@ mod implied_tests {
     use super::*;
     use crate::noise::Process;
     use crate::wavelet::Tuning;
+    use approx::assert_abs_diff_eq;
 
     fn model(values: [f64; 5]) -> Composite {
         Composite::new(vec![
@@ -652,10 +653,10 @@ mod implied_tests {
                     let difference = 0.5 * (up[j] - down[j]) / step;
                     // Rounding of the values over the step, and the step's square.
                     let scale = implied(&model(values), &curve)[j] / values[p];
-                    assert!(
-                        (gradients[j][p] - difference).abs()
-                            < 1e-8 * scale + 1e-6 * difference.abs(),
-                        "{j} {p}"
+                    assert_abs_diff_eq!(
+                        gradients[j][p],
+                        difference,
+                        epsilon = 1e-8 * scale + 1e-6 * difference.abs()
                     );
                 }
             }

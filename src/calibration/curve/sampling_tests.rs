@@ -3,7 +3,7 @@
 use super::*;
 use crate::noise::Process;
 use crate::wavelet::classical;
-use approx::assert_relative_eq;
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 use rand::SeedableRng;
 
 /// White noise, levels 1 and 2, by hand: W at level 1 is (x' − x)/2, with autocovariances ½, −¼ (σ² = 1),
@@ -158,10 +158,7 @@ fn simulated_signals_scatter_so() {
                 let scale =
                     (covariance(&logs[i], &logs[i]) * covariance(&logs[j], &logs[j])).sqrt();
                 let r = covariance(&logs[i], &logs[j]) / scale;
-                assert!(
-                    (r - law.correlation[(i, j)]).abs() < 4.0 * 0.041,
-                    "{i} {j}: {r}"
-                );
+                assert_abs_diff_eq!(r, law.correlation[(i, j)], epsilon = 4.0 * 0.041);
             }
         }
     }

@@ -138,6 +138,7 @@ fn out_of_place(first: f64, others: &[f64]) -> bool {
 mod tests {
     use super::*;
     use crate::rng::Generator;
+    use approx::assert_abs_diff_eq;
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
 
@@ -196,7 +197,7 @@ mod tests {
         assert_eq!(found.samples, SAMPLES / 8, "{found:?}");
         // An eighth with five times the variance at the first scale: without it 1/(1 + 4/8) = 0.67.
         let change = found.change.unwrap();
-        assert!((change - 0.67).abs() < 0.03, "{change:?}");
+        assert_abs_diff_eq!(change, 0.67, epsilon = 0.03);
     }
 
     /// What is advised is all there is to leave out.

@@ -564,6 +564,7 @@ mod tests {
     use super::*;
     use crate::curve::sampling::{SamplingLaw, variance_of_log};
     use crate::noise::{Composite, Process};
+    use approx::assert_abs_diff_eq;
     use rand::SeedableRng;
 
     fn noise(files: usize, levels: usize, edof: f64) -> Noise {
@@ -613,7 +614,7 @@ mod tests {
             furthest(&table, &noise, &[true; 8])[0].f[0]
         };
         let mean = (0..600).map(|_| f()).sum::<f64>() / 600.0;
-        assert!((mean - 18.0 / 16.0).abs() < 0.175, "{mean}");
+        assert_abs_diff_eq!(mean, 18.0 / 16.0, epsilon = 0.175);
     }
 
     #[test]

@@ -4,23 +4,17 @@ use super::*;
 use crate::curve::{Estimator, Replicate};
 use crate::imu::{Axis, Channel, Sensor};
 use crate::outcome::Settings;
-use crate::rng::{Generator, StreamKey};
-use crate::wavelet::{Tuning, both};
-use crate::{ModelChoice, Pool, Trim, Weighting, calibrate, grouped, trend};
+use crate::tests::{generator, measured, normal, plain_settings};
+use crate::{Pool, Trim, calibrate, grouped, trend};
 use rand::RngExt;
-use rand_distr::StandardNormal;
 
 mod causes;
 
-fn settings() -> Settings {
+fn settings(spec: &str) -> Settings {
     Settings {
         estimators: vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv],
-        model: ModelChoice::Given("WN+RW".parse().unwrap()),
         trim: Trim::Count(1),
-        tuning: Tuning::new(0.6).unwrap(),
-        weighting: Weighting::Edof,
-        fit_range: None,
-        rate_hz: 1.0,
+        ..plain_settings(spec)
     }
 }
 
@@ -47,18 +41,10 @@ fn set(
     change: impl Fn(usize, Axis, &mut [f64]),
 ) -> Vec<Diagnosis> {
     let recording = |file: usize| {
-        let run = file as u64;
-        let mut generator = StreamKey {
-            seed: set,
-            scenario: "",
-            run,
-            source: "",
-            process: "",
-        }
-        .generator();
-        let common = normals(&mut generator);
+        let mut generator = generator(set, file as u64);
+        let common = [0, 1].map(|_| normal(&mut generator));
         Axis::ALL.map(|axis| {
-            let own = normals(&mut generator);
+            let own = [0, 1].map(|_| normal(&mut generator));
             let factor = |i: usize| {
                 let Differences { deviation, shared } = differences;
                 (deviation * (shared.sqrt() * common[i] + (1.0 - shared).sqrt() * own[i])).exp()
@@ -66,15 +52,15 @@ fn set(
             let (sigma, gamma) = (factor(0).sqrt(), (1e-4 * factor(1)).sqrt());
             let mut walk = 0.0;
             let mut next = || {
-                walk += gamma * generator.sample::<f64, _>(StandardNormal);
-                walk + sigma * generator.sample::<f64, _>(StandardNormal)
+                walk += gamma * normal(&mut generator);
+                walk + sigma * normal(&mut generator)
             };
             let mut signal: Vec<f64> = (0..SAMPLES).map(|_| next()).collect();
             change(file, axis, &mut signal);
             signal
         })
     };
-    diagnosed((0..count).map(recording), &settings())
+    diagnosed((0..count).map(recording), &settings("WN+RW"))
 }
 
 /// Recordings of three axes of an accelerometer against one another.
@@ -85,34 +71,18 @@ fn diagnosed(
     let mut replicates = Vec::new();
     for (file, signals) in recordings.enumerate() {
         for (axis, signal) in Axis::ALL.into_iter().zip(signals) {
-            let (classical, robust) = both(&signal, LEVELS, &settings.tuning).unwrap();
-            let (name, samples, trend) = (format!("run{file}"), signal.len(), trend(&signal));
             let replicate = Replicate {
-                name,
                 axis: Some(axis),
-                samples,
-                classical,
-                robust,
-                coverage: Vec::new(),
-                trend,
-                mean: f64::NAN,
+                trend: trend(&signal),
+                ..measured(format!("run{file}"), &signal, LEVELS)
             };
-            replicates.push((
-                Channel {
-                    sensor: Sensor::Accel,
-                    axis,
-                },
-                replicate,
-            ));
+            let sensor = Sensor::Accel;
+            replicates.push((Channel { sensor, axis }, replicate));
         }
     }
     let groups = grouped(replicates, Pool::Sensor);
     let outcomes = calibrate(&groups, settings).unwrap();
     diagnose(&groups, &outcomes, settings)
-}
-
-fn normals(generator: &mut Generator) -> [f64; 2] {
-    [0, 1].map(|_| generator.sample(StandardNormal))
 }
 
 /// The finding of a cause, if there is one.
@@ -229,13 +199,8 @@ fn two_abnormal_recordings_do_not_hide_each_other() {
             }
         },
     );
-    let noisy: Vec<usize> = all
-        .iter()
-        .enumerate()
-        .filter(|(_, d)| d.verdict == RecordingVerdict::Noise)
-        .map(|(i, _)| i)
-        .collect();
-    assert_eq!(noisy, [1, 6]);
+    let noisy = (0..8).filter(|i| all[*i].verdict == RecordingVerdict::Noise);
+    assert!(noisy.eq([1, 6]));
 }
 
 /// Spikes in every recording: of 2048 samples 1 % of 8 deviations adds 0.64 to 1 at the first scales, in all alike.
@@ -263,41 +228,22 @@ fn outliers_in_all_recordings_are_told() {
 fn gaussian_quantization_noise_is_not_taken_for_outliers() {
     let found = |is_gaussian: bool, glitches: usize| {
         let signal = |file: usize, axis: Axis| {
-            let run = file as u64;
-            let mut generator = StreamKey {
-                seed: 4,
-                scenario: "",
-                run,
-                source: axis.name(),
-                process: "",
-            }
-            .generator();
+            let mut generator = generator(4, 3 * file as u64 + axis as u64);
             let mut number = || match is_gaussian {
-                true => generator.sample::<f64, _>(StandardNormal),
+                true => normal(&mut generator),
                 false => 12.0_f64.sqrt() * (generator.random::<f64>() - 0.5),
             };
             let mut numbers: Vec<f64> = (0..=16 * SAMPLES).map(|_| number()).collect();
-            numbers
-                .iter_mut()
-                .skip(50)
-                .step_by(330)
-                .take(glitches)
-                .for_each(|x| *x += 5.0);
-            let mut white = || 0.4 * generator.sample::<f64, _>(StandardNormal);
+            let glitched = numbers.iter_mut().skip(50).step_by(330).take(glitches);
+            glitched.for_each(|x| *x += 5.0);
+            let mut white = || 0.4 * normal(&mut generator);
             numbers
                 .windows(2)
                 .map(|pair| pair[1] - pair[0] + white())
                 .collect()
         };
         let recording = |file: usize| Axis::ALL.map(|axis| signal(file, axis));
-        let model = ModelChoice::Given("WN+QN".parse().unwrap());
-        diagnosed(
-            (0..4).map(recording),
-            &Settings {
-                model,
-                ..settings()
-            },
-        )
+        diagnosed((0..4).map(recording), &settings("WN+QN"))
     };
     let all = found(true, 0);
     let gaussian = of_cause(&all, CommonCause::GaussianQuantization).unwrap();

@@ -143,14 +143,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn curve(model: &Composite) -> Curve {
-        let levels: Vec<u32> = (1..=16).collect();
-        let wv = levels.iter().map(|l| model.haar_wv(*l)).collect();
-        Curve {
-            edof: levels.iter().map(|l| 1e6 / f64::from(*l).exp2()).collect(),
-            wv,
-            levels,
-            ..Curve::default()
-        }
+        crate::tests::exact(model, 16, |level| 1e6 / f64::from(level).exp2())
     }
 
     fn read(processes: Vec<Process>) -> Vec<f64> {
@@ -242,7 +235,7 @@ mod tests {
         let fit = avlr(&dipped, &"WN+QN".parse().unwrap()).unwrap();
         assert_eq!(fit.zero, [1]);
         let led = read(vec![white(), Process::quantization(40.0).unwrap()]);
-        assert!((led[1] / 40.0 - 1.0).abs() < 0.15, "{led:?}");
+        assert_relative_eq!(led[1], 40.0, max_relative = 0.15);
     }
 
     #[test]

@@ -600,6 +600,8 @@ mod tests {
     use super::*;
     use crate::noise::{Composite, Parameter, Process};
     use crate::rng::Generator;
+    use crate::tests::{exact, white_and_walk};
+    use approx::assert_relative_eq;
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
 
@@ -637,22 +639,13 @@ mod tests {
                 _ => 0.5,
             };
             let truth = Process::new(kind, shape, 0.3, 100.0).unwrap();
-            let curve = Curve {
-                wv: (1..=14).map(|level| truth.haar_wv(level)).collect(),
-                edof: vec![50.0; 14],
-                levels: (1..=14).collect(),
-                ..Curve::default()
-            };
+            let curve = exact(&Composite::new(vec![truth]), 14, |_| 50.0);
             let spec = kind.code().parse().unwrap();
             let found = fit(&curve, &spec, 100.0, Weighting::Model)
                 .unwrap()
                 .composite;
-            for (found, value) in found.processes[0].values().iter().zip(truth.values()) {
-                assert!(
-                    (found / value - 1.0).abs() < 1e-6,
-                    "{kind:?}: {found} {value}"
-                );
-            }
+            let (found, values) = (found.processes[0].values(), truth.values());
+            assert_relative_eq!(found[..], values[..], max_relative = 1e-6);
         }
     }
 
@@ -660,29 +653,16 @@ mod tests {
     /// is told to lie at the end; what is not there is told to be zero, and lies nowhere.
     #[test]
     fn a_process_at_the_end_of_its_range_is_told() {
-        let white = Process::white(1.0).unwrap();
-        let walk = Process::random_walk(1e-4).unwrap();
-        let levels: Vec<u32> = (1..=12).collect();
-        let fitted = |processes: Vec<Process>| {
-            let model = Composite::new(processes);
-            let wv = levels.iter().map(|level| model.haar_wv(*level)).collect();
-            let curve = Curve {
-                wv,
-                edof: vec![50.0; 12],
-                levels: levels.clone(),
-                ..Curve::default()
-            };
+        let fitted = |gamma2: f64| {
+            let curve = exact(&white_and_walk(1.0, gamma2), 12, |_| 50.0);
             fit(&curve, &"WN+AR1".parse().unwrap(), 1.0, Weighting::Edof).unwrap()
         };
-        let wandering = fitted(vec![white, walk]);
+        let wandering = fitted(1e-4);
         let ar1 = wandering.composite.processes[1];
         assert_eq!(ar1.kind(), Kind::Ar1);
-        assert!(
-            (-ar1.shape().ln() * 20.0 * 4096.0 - 1.0).abs() < 1e-6,
-            "{ar1:?}"
-        );
+        assert_relative_eq!(-1.0 / ar1.shape().ln(), 20.0 * 4096.0, max_relative = 1e-6);
         assert_eq!((wandering.at_end, wandering.zero), (vec![1], vec![]));
-        let still = fitted(vec![white]);
+        let still = fitted(0.0);
         assert_eq!((still.at_end, still.zero), (vec![], vec![1]));
     }
 
@@ -697,23 +677,13 @@ mod tests {
             Process::ar1(0.999, 1e-5).unwrap(),
             Process::random_walk(1e-8).unwrap(),
         ]);
-        let levels: Vec<u32> = (1..=14).collect();
         let mut generator = Generator::seed_from_u64(29);
         let mut unsettled = 0;
         for k in 0..30 {
             let noise = 0.08 + 0.22 * f64::from(k % 3) / 2.0;
-            let off = |_| (noise * generator.sample::<f64, _>(StandardNormal)).exp();
-            let wv = levels
-                .iter()
-                .map(|l| model.haar_wv(*l))
-                .zip(levels.iter().map(off))
-                .map(|(nu, off)| nu * off);
-            let curve = Curve {
-                wv: wv.collect(),
-                edof: vec![3.0 / (noise * noise); levels.len()],
-                levels: levels.clone(),
-                ..Curve::default()
-            };
+            let mut curve = exact(&model, 14, |_| 3.0 / (noise * noise));
+            let mut off = || (noise * generator.sample::<f64, _>(StandardNormal)).exp();
+            curve.wv.iter_mut().for_each(|nu| *nu *= off());
             let fit = fit(&curve, &ModelSpec::n2(), 1.0, Weighting::Model).unwrap();
             let is_converged = fit.termination == Termination::Converged;
             unsettled += u32::from(!is_converged);
@@ -726,15 +696,11 @@ mod tests {
             // the best agrees with itself; another minimum is behind it
             assert!(
                 (1..=fit.starts).contains(&fit.agreeing),
-                "curve {k}: {} of {}",
-                fit.agreeing,
-                fit.starts
+                "curve {k}: {}",
+                fit.agreeing
             );
-            assert!(
-                fit.runner_up.is_none_or(|other| other > fit.objective),
-                "curve {k}: {:?}",
-                fit.runner_up
-            );
+            let is_behind = fit.runner_up.is_none_or(|other| other > fit.objective);
+            assert!(is_behind, "curve {k}: {:?}", fit.runner_up);
         }
         // Most can be followed within the basin of either minimum.
         assert!(unsettled <= 3, "{unsettled}");

@@ -888,6 +888,7 @@ mod tests {
     use crate::Weighting;
     use crate::curve::implied;
     use crate::noise::{Composite, Kind, Process};
+    use crate::tests::exact;
     use crate::wavelet::{Curve, Tuning};
 
     /// White noise, a random walk and two AR1 to be fitted to a curve that is 10 % off at every scale.
@@ -898,15 +899,10 @@ mod tests {
             Process::ar1(0.9, 1e-2).unwrap(),
             Process::ar1(0.999, 1e-5).unwrap(),
         ]);
-        let levels: Vec<u32> = (1..=12).collect();
-        let off =
-            |level: &u32| model.haar_wv(*level) * if level.is_multiple_of(2) { 1.1 } else { 0.9 };
-        let curve = Curve {
-            wv: levels.iter().map(off).collect(),
-            edof: vec![50.0; 12],
-            levels: levels.clone(),
-            ..Curve::default()
-        };
+        let mut curve = exact(&model, 12, |_| 50.0);
+        for pair in curve.wv.chunks_exact_mut(2) {
+            (pair[0], pair[1]) = (0.9 * pair[0], 1.1 * pair[1]);
+        }
         let component = |process: &Process| Component {
             kind: process.kind(),
             coordinate: (process.kind() == Kind::Ar1).then_some(Range {
@@ -982,8 +978,8 @@ mod tests {
             .map(|k| costs[k])
             .collect();
         minima.sort_by(f64::total_cmp);
-        let started: Vec<f64> = grid
-            .starts(&choices, 55)
+        let starts = grid.starts(&choices, 55);
+        let started: Vec<f64> = starts
             .iter()
             .map(|at| objective.solve(at, None).cost())
             .collect();
@@ -999,17 +995,11 @@ mod tests {
                 Process::quantization(q2).unwrap(),
             ]);
             let quantization = Some(*Tuning::default().quantization());
-            let levels: Vec<u32> = (1..=12).collect();
-            let curve = Curve {
-                edof: vec![50.0; 12],
-                levels,
+            let mut curve = Curve {
                 quantization,
-                ..Curve::default()
+                ..exact(&model, 12, |_| 50.0)
             };
-            let curve = Curve {
-                wv: implied(&model, &curve),
-                ..curve
-            };
+            curve.wv = implied(&model, &curve);
             let component = |p: &Process| Component {
                 kind: p.kind(),
                 coordinate: None,
@@ -1033,25 +1023,8 @@ mod tests {
         let points = [1, 2, 3, 4].map(|dimensions| points_per_dimension(dimensions, 6000));
         assert_eq!(points, [POINTS, 110, 34, 21]);
         assert_eq!(points_per_dimension(5, 2), 6);
-        assert_eq!(
-            spread(
-                Range {
-                    low: -1.0,
-                    high: 1.0
-                },
-                5
-            ),
-            [-1.0, -0.5, 0.0, 0.5, 1.0]
-        );
-        assert_eq!(
-            spread(
-                Range {
-                    low: 2.0,
-                    high: 2.0
-                },
-                5
-            ),
-            [2.0]
-        );
+        let spread = |low, high| spread(Range { low, high }, 5);
+        assert_eq!(spread(-1.0, 1.0), [-1.0, -0.5, 0.0, 0.5, 1.0]);
+        assert_eq!(spread(2.0, 2.0), [2.0]);
     }
 }

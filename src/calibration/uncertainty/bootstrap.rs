@@ -347,15 +347,12 @@ mod goodness_tests;
 
 #[cfg(test)]
 mod inference_tests {
-    use super::{with_variances, *};
+    use super::*;
     use crate::imu::{Axis, Channel, Sensor};
-    use crate::noise::{Composite, Kind, Model, Process, VirtualImu};
-    use crate::wavelet::{Tuning, classical};
-    use crate::{
-        ModelChoice, Pool, Replicate, Trim, Weighting, calibrate, grouped, infer, replicates,
-    };
-    use rand::RngExt;
-    use rand_distr::StandardNormal;
+    use crate::noise::{Composite, Kind, Model, Process};
+    use crate::tests::{generator, imu, inferred, measured, normal, plain_settings, recorded};
+    use crate::{ParameterInterval, Pool, grouped};
+    use approx::assert_abs_diff_eq;
 
     const CHANNEL: Channel = Channel {
         sensor: Sensor::Gyro,
@@ -363,66 +360,20 @@ mod inference_tests {
     };
     const SAMPLES: usize = 1024;
 
-    fn settings(spec: &str) -> Settings {
-        Settings {
-            estimators: vec![Estimator::Awv],
-            model: ModelChoice::Given(spec.parse().unwrap()),
-            trim: Trim::Count(0),
-            tuning: Tuning::new(0.6).unwrap(),
-            weighting: Weighting::Edof,
-            fit_range: None,
-            rate_hz: 1.0,
-        }
-    }
-
     /// Replicates of white noise and random walk, each with its own variances.
     fn group(set: u64, replicates: &[(f64, f64)]) -> Group {
         let recording = |(run, (sigma2, gamma2)): (usize, &(f64, f64))| {
-            let run = run as u64;
-            let key = StreamKey {
-                seed: set,
-                scenario: "",
-                run,
-                source: "",
-                process: "",
-            };
-            let mut generator = key.generator();
+            let mut generator = generator(set, run as u64);
             let mut walk = 0.0;
             let mut next = || {
-                walk += gamma2.sqrt() * generator.sample::<f64, _>(StandardNormal);
-                walk + sigma2.sqrt() * generator.sample::<f64, _>(StandardNormal)
+                walk += gamma2.sqrt() * normal(&mut generator);
+                walk + sigma2.sqrt() * normal(&mut generator)
             };
             let signal: Vec<f64> = (0..SAMPLES).map(|_| next()).collect();
-            let nu = classical(&signal, 8).unwrap();
-            let template = Replicate {
-                name: String::new(),
-                axis: None,
-                samples: SAMPLES,
-                classical: vec![],
-                robust: vec![],
-                coverage: Vec::new(),
-                trend: f64::NAN,
-                mean: f64::NAN,
-            };
-            (CHANNEL, with_variances(&template, nu))
+            (CHANNEL, measured(String::new(), &signal, 8))
         };
-        grouped(
-            replicates.iter().enumerate().map(recording).collect(),
-            Pool::Axes,
-        )
-        .remove(0)
-    }
-
-    fn inferred(group: Group, settings: &Settings, draws: usize) -> Outcome {
-        let groups = [group];
-        let mut outcomes = calibrate(&groups, settings).unwrap();
-        infer(
-            &groups,
-            &mut outcomes,
-            settings,
-            Bootstrap { draws, seed: 3 },
-        );
-        outcomes.remove(0)
+        let replicates = replicates.iter().enumerate().map(recording).collect();
+        grouped(replicates, Pool::Axes).remove(0)
     }
 
     /// 150 sets of 3, 4 and 8 signals: a frequency that is really 0.95 lies within 4·√(0.95·0.05/150) = 0.071 of it; the
@@ -430,20 +381,15 @@ mod inference_tests {
     #[test]
     fn intervals_cover_and_the_j_test_keeps_its_level() {
         const SETS: u64 = 150;
-        let settings = settings("WN+RW");
-        let truth = [
-            Process::white(1.0).unwrap(),
-            Process::random_walk(1e-3).unwrap(),
-        ];
+        let settings = plain_settings("WN+RW");
+        let truth = [1.0, 1e-3];
         for replicates in [3, 4, 8] {
             let mut covered = [0_u32; 2];
             let mut rejected = 0_u32;
             for set in 0..SETS {
                 let group = group(set, &vec![(1.0, 1e-3); replicates]);
-                let outcome = inferred(group, &settings, 99);
-                let inference = outcome.inference.unwrap();
-                for (i, process) in truth.iter().enumerate() {
-                    let value = process.parameters()[0].1;
+                let inference = inferred(&[group], &settings, 99, 3).inference.unwrap();
+                for (i, value) in truth.into_iter().enumerate() {
                     let interval = &inference.intervals[i];
                     covered[i] += u32::from(interval.low < value && value < interval.high);
                 }
@@ -465,33 +411,27 @@ mod inference_tests {
     fn differences_between_replicates_widen_the_intervals() {
         let variances: Vec<(f64, f64)> = (0..8).map(|i| (0.8 + 0.06 * f64::from(i), 0.0)).collect();
         let deviation = 0.06 * 6.0_f64.sqrt(); // of 0 … 7: √6
-        let half = |inference: &Inference| {
-            0.5 * (inference.intervals[0].high - inference.intervals[0].low)
+        let half_of = |variances: &[(f64, f64)]| {
+            let groups = [group(1, variances)];
+            let found = inferred(&groups, &plain_settings("WN"), 300, 3)
+                .inference
+                .unwrap();
+            let interval = &found.intervals[0];
+            (0.5 * (interval.high - interval.low), found.spread)
         };
-        let spread = inferred(group(1, &variances), &settings("WN"), 300)
-            .inference
-            .unwrap();
-        let unit = half(&spread) / (deviation / 8.0_f64.sqrt());
+        let (half, spread) = half_of(&variances);
+        let unit = half / (deviation / 8.0_f64.sqrt());
         assert!(unit > 1.6 && unit < 3.4, "{unit}");
-        assert!(
-            spread.spread[0].between > 2.0 * spread.spread[0].within,
-            "{:?}",
-            spread.spread
-        );
-        let alike = inferred(group(1, &[(1.0, 0.0); 8]), &settings("WN"), 300)
-            .inference
-            .unwrap();
+        assert!(spread[0].between > 2.0 * spread[0].within, "{spread:?}");
+        let (alike, _) = half_of(&[(1.0, 0.0); 8]);
         // Noise alone: at least 1.96·√(2/(8·1024)) = 0.031, which maximum likelihood would reach.
-        assert!(
-            half(&alike) > 0.027 && half(&alike) < 0.06,
-            "{}",
-            half(&alike)
-        );
+        assert!((0.027..0.06).contains(&alike), "{alike}");
     }
 
     #[test]
     fn a_model_that_is_wrong_is_rejected() {
-        let outcome = inferred(group(5, &[(1.0, 1e-2); 4]), &settings("WN"), 99);
+        let groups = [group(5, &[(1.0, 1e-2); 4])];
+        let outcome = inferred(&groups, &plain_settings("WN"), 99, 3);
         assert!(outcome.inference.unwrap().goodness.unwrap().p_value < 0.05);
     }
 
@@ -509,20 +449,10 @@ mod inference_tests {
             process("RW", 2e-5),
         ]);
         let model = Model::pooled(1.0, &axis, &axis);
-        let settings = settings("WN+FN+RW");
+        let settings = plain_settings("WN+FN+RW");
         let found = |seed: u64| {
-            let imu = VirtualImu {
-                model: &model,
-                spread: None,
-                contamination: None,
-                seed,
-            };
-            let signals = (1..=4).flat_map(|run| {
-                let recording = imu.recording(run, &[CHANNEL], 1 << 13).unwrap();
-                replicates(&recording, None, &settings.tuning).unwrap()
-            });
-            let group = grouped(signals.collect(), Pool::Axes).remove(0);
-            let outcome = inferred(group, &settings, 99);
+            let groups = recorded(&imu(&model, None, seed), 4, &[CHANNEL], 1 << 13, &settings);
+            let outcome = inferred(&groups, &settings, 99, 3);
             let interval = outcome.inference.unwrap().intervals[1].clone();
             (outcome.fit.composite.processes[1].values()[0], interval)
         };
@@ -530,12 +460,9 @@ mod inference_tests {
         let n = SETS as f64;
         let mean = all.iter().map(|(b2, _)| b2).sum::<f64>() / n;
         let sd = (all.iter().map(|(b2, _)| (b2 - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-        assert!((mean - 0.05).abs() < 4.0 * sd / n.sqrt(), "{mean} {sd}");
-        let held = all
-            .iter()
-            .filter(|(_, i)| i.low < 0.05 && 0.05 < i.high)
-            .count() as f64
-            / n;
-        assert!((held - 0.95).abs() < 0.087, "{held}");
+        assert_abs_diff_eq!(mean, 0.05, epsilon = 4.0 * sd / n.sqrt());
+        let is_held = |(_, i): &&(f64, ParameterInterval)| i.low < 0.05 && 0.05 < i.high;
+        let held = all.iter().filter(is_held).count() as f64 / n;
+        assert_abs_diff_eq!(held, 0.95, epsilon = 0.087);
     }
 }

@@ -1,11 +1,10 @@
 //! The level of the test.
 
 use super::*;
-use crate::calibrate;
-use crate::curve::{Estimator, Pool, grouped, replicates};
 use crate::imu::Channel;
-use crate::noise::{Composite, Model, Process, VirtualImu};
-use crate::outcome::{Bootstrap, ModelChoice, Settings};
+use crate::noise::Model;
+use crate::tests::{imu, inferred, recorded, settings, white_and_walk};
+use approx::assert_abs_diff_eq;
 
 /// Each of 20 exchangeable statistics in its turn as the observed one: all twentieths, once each.
 #[test]
@@ -13,9 +12,10 @@ fn every_rank_has_the_same_share() {
     let all: Vec<f64> = (0..20).map(f64::from).collect();
     for (rank, observed) in all.iter().rev().enumerate() {
         let draws: Vec<f64> = all.iter().filter(|x| *x != observed).copied().collect();
-        assert!(
-            (p_value(*observed, &draws) - (rank + 1) as f64 / 20.0).abs() < 1e-15,
-            "{observed}"
+        assert_abs_diff_eq!(
+            p_value(*observed, &draws),
+            (rank + 1) as f64 / 20.0,
+            epsilon = 1e-15
         );
     }
     assert_eq!(p_value(1.0, &[1.0]), 1.0);
@@ -23,40 +23,15 @@ fn every_rank_has_the_same_share() {
 
 /// Four recordings of white noise and a random walk, calibrated so often: how often the model is rejected at 5 %.
 fn rejected(model: &str, laboratories: u64) -> usize {
-    let white = Process::white(1.0).unwrap();
-    let walk = Process::random_walk(1e-3).unwrap();
-    let axis = Composite::new(vec![white, walk]);
-    let truth = Model::pooled(1.0, &axis, &axis);
-    let settings = Settings {
-        estimators: vec![Estimator::Awv],
-        model: ModelChoice::Given(model.parse().unwrap()),
-        ..Settings::default()
-    };
+    let axis = white_and_walk(1.0, 1e-3);
+    let (truth, settings) = (Model::pooled(1.0, &axis, &axis), settings(model));
     let p_value = |seed: u64| {
-        let imu = VirtualImu {
-            model: &truth,
-            spread: None,
-            contamination: None,
-            seed,
-        };
-        let signals = (1..=4).flat_map(|run| {
-            let recording = imu.recording(run, &Channel::named("accel"), 2048).unwrap();
-            replicates(&recording, None, &settings.tuning).unwrap()
-        });
-        let groups = grouped(signals.collect(), Pool::Sensor);
-        let mut outcomes = calibrate(&groups, &settings).unwrap();
-        crate::infer(
-            &groups,
-            &mut outcomes,
-            &settings,
-            Bootstrap { draws: 99, seed },
-        );
-        outcomes[0]
+        let accel = Channel::named("accel");
+        let groups = recorded(&imu(&truth, None, seed), 4, &accel, 2048, &settings);
+        inferred(&groups, &settings, 99, seed)
             .inference
-            .as_ref()
             .unwrap()
             .goodness
-            .as_ref()
             .unwrap()
             .p_value
     };

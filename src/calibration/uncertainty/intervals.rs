@@ -386,9 +386,9 @@ mod tests {
     use super::*;
     use crate::imu::Sensor;
     use crate::noise::{Composite, Process};
-    use crate::rng::StreamKey;
-    use crate::wavelet::Curve;
+    use crate::tests::{exact, generator};
     use crate::{Estimator, Scope, Weighting, fit};
+    use approx::assert_relative_eq;
     use rand::RngExt;
     use rand_distr::ChiSquared;
 
@@ -400,17 +400,8 @@ mod tests {
         let ar1 = |time: f64, sigma2: f64| Process::ar1((-1.0 / time).exp(), sigma2).unwrap();
         let fit_of = |processes: Vec<Process>| {
             let composite = Composite::new(processes);
-            let levels: Vec<u32> = (1..=12).collect();
-            let wv = levels
-                .iter()
-                .map(|l| composite.haar_wv(*l) + 1e-12)
-                .collect();
-            let curve = Curve {
-                edof: vec![100.0; 12],
-                levels,
-                wv,
-                ..Curve::default()
-            };
+            let mut curve = exact(&composite, 12, |_| 100.0);
+            curve.wv.iter_mut().for_each(|nu| *nu += 1e-12);
             let spec = "2*AR1".parse().unwrap();
             let mut fit = fit(&curve, &spec, 1.0, Weighting::Edof).unwrap();
             (fit.composite, fit.zero) = (composite, Vec::new());
@@ -466,24 +457,14 @@ mod tests {
     /// relative: 4·√(0.025·0.975/4000)/(q f(q)) with the densities 0.00876 and 0.0363, 6.4 and 12.5 %.
     #[test]
     fn the_interval_of_a_variance_is_the_textbooks() {
-        let mut generator = StreamKey {
-            seed: 1,
-            scenario: "",
-            run: 0,
-            source: "",
-            process: "",
-        }
-        .generator();
+        let mut generator = generator(1, 0);
         let law = ChiSquared::new(8.0).unwrap();
         let drawn = (0..4000)
             .map(|_| 3.0 * generator.sample(law) / 8.0)
             .collect();
         let [low, high] = ParameterDraws::new(Parameter::Sigma2, drawn, 1.0).around(3.0);
-        assert!(
-            (low / (24.0 / 17.53) - 1.0).abs() < 0.064
-                && (high / (24.0 / 2.18) - 1.0).abs() < 0.125,
-            "{low} {high}"
-        );
+        assert_relative_eq!(low, 24.0 / 17.53, max_relative = 0.064);
+        assert_relative_eq!(high, 24.0 / 2.18, max_relative = 0.125);
         assert_eq!(
             ParameterDraws::new(Parameter::Sigma2, vec![0.0, 0.0, 1.0], 1.0).around(0.0),
             [0.0, 1.0]
@@ -507,19 +488,15 @@ mod tests {
             let draws = ParameterDraws::new(Parameter::Sigma2, drawn.clone(), stretch);
             hull(draws.around(1.0), draws.stretched())
         };
-        let [low, high] = hull_of(1.0);
-        // quantiles 0.025 and 0.975 of 201: the fifth from either end
-        let tail = 0.96_f64.exp2();
-        assert!(
-            (low * 4.0 * tail - 1.0).abs() < 0.01 && (high / (4.0 * tail) - 1.0).abs() < 0.01,
-            "{low} {high}"
-        );
-        let [low, high] = hull_of(1.5);
-        let tail = tail.powf(1.5);
-        assert!(
-            (low * 4.0 * tail - 1.0).abs() < 0.01 && (high / (4.0 * tail) - 1.0).abs() < 0.01,
-            "{low} {high}"
-        );
+        for stretch in [1.0, 1.5] {
+            // quantiles 0.025 and 0.975 of 201: the fifth from either end
+            let end = 4.0 * 0.96_f64.exp2().powf(stretch);
+            assert_relative_eq!(
+                hull_of(stretch)[..],
+                [1.0 / end, end][..],
+                max_relative = 0.01
+            );
+        }
     }
 }
 

@@ -742,30 +742,17 @@ mod spread_tests;
 mod alike_tests {
     use super::*;
     use crate::noise::{Composite, Process};
-    use crate::wavelet::{Tuning, both};
-    use rand::RngExt;
-    use rand_distr::StandardNormal;
+    use crate::tests::{generator, measured, normal, white_and_walk};
+    use crate::wavelet::Tuning;
 
     const SAMPLES: usize = 2048;
     const GAMMA2: f64 = 1e-4;
 
-    fn tuning() -> Tuning {
-        Tuning::new(0.6).unwrap()
-    }
-
     /// Signals of white noise and random walk, their white noise of standard deviation e^(spread/2 · N(0, 1)).
     fn set(seed: u64, count: usize, spread: f64) -> Vec<Replicate> {
-        let tuning = tuning();
         let recording = |run: usize| {
-            let key = StreamKey {
-                seed,
-                scenario: "",
-                run: run as u64,
-                source: "",
-                process: "",
-            };
-            let mut generator = key.generator();
-            let mut normal = || generator.sample::<f64, _>(StandardNormal);
+            let mut generator = generator(seed, run as u64);
+            let mut normal = || normal(&mut generator);
             let sigma = (0.5 * spread * normal()).exp();
             let mut walk = 0.0;
             let signal: Vec<f64> = (0..SAMPLES)
@@ -774,29 +761,22 @@ mod alike_tests {
                     walk + sigma * normal()
                 })
                 .collect();
-            let (classical, robust) = both(&signal, 10, &tuning).unwrap();
-            Replicate {
-                name: format!("run{run}"),
-                axis: None,
-                samples: SAMPLES,
-                classical,
-                robust,
-                coverage: Vec::new(),
-                trend: f64::NAN,
-                mean: f64::NAN,
-            }
+            measured(format!("run{run}"), &signal, 10)
         };
         (0..count).map(recording).collect()
     }
 
     /// Sets, of so many, that are said to differ.
-    fn told(sets: u64, count: usize, spread: f64, estimator: Estimator) -> u32 {
-        let white = Process::white(1.0).unwrap();
-        let walk = Process::random_walk(GAMMA2).unwrap();
-        let law = SamplingLaw::new(&Composite::new(vec![white, walk]), 10);
+    fn told(
+        sets: u64,
+        estimator: Estimator,
+        replicates: impl Fn(u64) -> Vec<Replicate> + Sync,
+    ) -> u32 {
+        let law = SamplingLaw::new(&white_and_walk(1.0, GAMMA2), 10);
         let differs = |seed: u64| {
-            let replicates = set(seed, count, spread);
-            let own = ReplicateSpread::new(&replicates, estimator, &law, &tuning());
+            let replicates = replicates(seed);
+            let own =
+                ReplicateSpread::new(&replicates, estimator, &law, &Tuning::new(0.6).unwrap());
             u32::from(alike_p_value(&replicates, estimator, &own, &law, "accel").unwrap() <= LEVEL)
         };
         (0..sets).into_par_iter().map(differs).sum()
@@ -813,41 +793,34 @@ mod alike_tests {
             (3, Estimator::SrAwv),
             (8, Estimator::DrAwv),
         ] {
-            let told_wrongly = told(200, count, 0.0, estimator);
-            assert!(
-                told_wrongly <= 13,
-                "{count} {}: {told_wrongly} of 200",
-                estimator.name()
-            );
+            let told = told(200, estimator, |seed| set(seed, count, 0.0));
+            assert!(told <= 13, "{count} {}: {told} of 200", estimator.name());
         }
-        assert!(told(20, 8, 0.2, Estimator::Awv) >= 19 && told(20, 8, 0.2, Estimator::DrAwv) >= 18);
+        for (estimator, least) in [(Estimator::Awv, 19), (Estimator::DrAwv, 18)] {
+            assert!(told(20, estimator, |seed| set(seed, 8, 0.2)) >= least);
+        }
     }
 
     /// Four recordings of three axes, of which the last has 1.7 times the variance in each of them: of 40 sets 1 ± 1 is said to
     /// differ, so no more than 5.
     #[test]
     fn axes_that_differ_are_not_recordings_that_differ() {
-        let white = Process::white(1.0).unwrap();
-        let walk = Process::random_walk(GAMMA2).unwrap();
-        let law = SamplingLaw::new(&Composite::new(vec![white, walk]), 10);
-        let differs = |seed: u64| {
+        let of_three_axes = |seed: u64| {
             let of_axis = |axis: Axis| {
-                let variance = if axis == Axis::Z { 1.7 } else { 1.0 };
-                set(3 * seed + axis as u64, 4, 0.0)
-                    .into_iter()
-                    .map(move |replicate| Replicate {
-                        axis: Some(axis),
-                        classical: replicate.classical.iter().map(|nu| variance * nu).collect(),
-                        ..replicate
-                    })
+                let mut replicates = set(3 * seed + axis as u64, 4, 0.0);
+                for replicate in &mut replicates {
+                    replicate.axis = Some(axis);
+                    let variance = if axis == Axis::Z { 1.7 } else { 1.0 };
+                    replicate
+                        .classical
+                        .iter_mut()
+                        .for_each(|nu| *nu *= variance);
+                }
+                replicates
             };
-            let replicates: Vec<Replicate> = Axis::ALL.into_iter().flat_map(of_axis).collect();
-            let own = ReplicateSpread::new(&replicates, Estimator::Awv, &law, &tuning());
-            u32::from(
-                alike_p_value(&replicates, Estimator::Awv, &own, &law, "accel").unwrap() <= LEVEL,
-            )
+            Axis::ALL.into_iter().flat_map(of_axis).collect()
         };
-        let told: u32 = (0..40).into_par_iter().map(differs).sum();
+        let told = told(40, Estimator::Awv, of_three_axes);
         assert!(told <= 5, "{told} of 40");
     }
 
@@ -855,7 +828,7 @@ mod alike_tests {
     fn one_signal_cannot_differ() {
         let law = SamplingLaw::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 10);
         let one = set(1, 1, 0.0);
-        let own = ReplicateSpread::new(&one, Estimator::Awv, &law, &tuning());
+        let own = ReplicateSpread::new(&one, Estimator::Awv, &law, &Tuning::new(0.6).unwrap());
         assert_eq!(
             alike_p_value(&one, Estimator::Awv, &own, &law, "accel"),
             None

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::curve::sampling::variance_of_log;
-use approx::assert_relative_eq;
+use crate::tests::replicate;
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 
 /// Of replicates whose noise is nothing.
 fn noiseless(logs: &[f64], estimator: Estimator) -> Scatter {
@@ -87,11 +88,7 @@ fn coverage(between: f64, is_shared: bool) -> f64 {
                     name: k.to_string(),
                     axis: Some(axis),
                     samples: SAMPLES,
-                    classical: vec![(differs + own).exp()],
-                    robust: Vec::new(),
-                    coverage: Vec::new(),
-                    trend: f64::NAN,
-                    mean: f64::NAN,
+                    ..replicate(vec![(differs + own).exp()], Vec::new())
                 });
             }
         }
@@ -113,9 +110,9 @@ fn coverage(between: f64, is_shared: bool) -> f64 {
 #[test]
 fn intervals_hold_the_truth_whatever_axes_share() {
     let shared = coverage(0.3, true);
-    assert!((shared - 0.95).abs() < 0.038, "{shared}");
+    assert_abs_diff_eq!(shared, 0.95, epsilon = 0.038);
     let apart = coverage(0.3, false);
-    assert!((apart - 0.95).abs() < 0.038, "{apart}");
+    assert_abs_diff_eq!(apart, 0.95, epsilon = 0.038);
     // recordings that are alike: the scatter of each signal is its own
     let alike = coverage(0.0, true);
     assert!(alike > 0.95 - 0.038, "{alike}");
@@ -131,13 +128,8 @@ fn a_level_that_a_short_recording_lacks_scatters_as_the_others_show() {
     let law = SamplingLaw::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 2);
     let replicate = |(name, logs): (usize, &[f64])| Replicate {
         name: name.to_string(),
-        axis: None,
         samples: 1 << 40,
-        classical: logs.iter().map(|log| log.exp()).collect(),
-        robust: Vec::new(),
-        coverage: Vec::new(),
-        trend: f64::NAN,
-        mean: f64::NAN,
+        ..replicate(logs.iter().map(|log| log.exp()).collect(), Vec::new())
     };
     let logs: [&[f64]; 4] = [&[0.1, -0.3], &[-0.1, 0.0], &[0.0, 0.3], &[0.0]];
     let replicates: Vec<Replicate> = logs.into_iter().enumerate().map(replicate).collect();
@@ -149,8 +141,5 @@ fn a_level_that_a_short_recording_lacks_scatters_as_the_others_show() {
         .collect();
     let mean = drawn.iter().sum::<f64>() / 4000.0;
     let variance = drawn.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 3999.0;
-    assert!(
-        (variance / 0.09 - 1.0).abs() < 4.0 * 0.022 + 0.02,
-        "{variance}"
-    );
+    assert_relative_eq!(variance, 0.09, max_relative = 4.0 * 0.022 + 0.02);
 }

@@ -433,26 +433,11 @@ mod varying_tests;
 mod indistinct_tests {
     use crate::imu::{Axis, Channel, Sensor};
     use crate::noise::{Parameter, ParameterRef};
-    use crate::rng::StreamKey;
-    use crate::wavelet::{Tuning, classical};
+    use crate::tests::{generator, inferred, measured, normal, plain_settings};
     use crate::*;
-    use rand::RngExt;
-    use rand_distr::StandardNormal;
 
     const SAMPLES: usize = 32_768;
     const TIME: f64 = 10.0;
-
-    fn settings(model: &str) -> Settings {
-        Settings {
-            estimators: vec![Estimator::Awv],
-            model: ModelChoice::Given(model.parse().unwrap()),
-            trim: Trim::Count(0),
-            tuning: Tuning::new(0.6).unwrap(),
-            weighting: Weighting::Edof,
-            fit_range: None,
-            rate_hz: 1.0,
-        }
-    }
 
     /// phi of the two AR1: correlation times of 10 samples and so many times as many.
     fn phis(ratio: f64) -> [f64; 2] {
@@ -467,15 +452,8 @@ mod indistinct_tests {
             axis: Axis::X,
         };
         let recording = |run: u64| {
-            let key = StreamKey {
-                seed,
-                scenario: "",
-                run,
-                source: "",
-                process: "",
-            };
-            let mut generator = key.generator();
-            let mut normal = || generator.sample::<f64, _>(StandardNormal);
+            let mut generator = generator(seed, run);
+            let mut normal = || normal(&mut generator);
             let mut state = [normal(), normal()];
             let mut next = || {
                 for (x, phi) in state.iter_mut().zip(phis) {
@@ -484,31 +462,14 @@ mod indistinct_tests {
                 state[0] + state[1] + normal()
             };
             let signal: Vec<f64> = (0..SAMPLES).map(|_| next()).collect();
-            let nu = classical(&signal, 13).unwrap();
-            let template = Replicate {
-                name: format!("run{run}"),
+            let replicate = Replicate {
                 axis: Some(Axis::X),
-                samples: SAMPLES,
-                classical: vec![],
-                robust: vec![],
-                coverage: Vec::new(),
-                trend: f64::NAN,
-                mean: f64::NAN,
+                ..measured(format!("run{run}"), &signal, 13)
             };
-            (
-                channel,
-                crate::uncertainty::bootstrap::with_variances(&template, nu),
-            )
+            (channel, replicate)
         };
-        let groups = [grouped((0..count).map(recording).collect(), Pool::Axes).remove(0)];
-        let mut outcomes = calibrate(&groups, &settings("WN+2*AR1")).unwrap();
-        infer(
-            &groups,
-            &mut outcomes,
-            &settings("WN+2*AR1"),
-            Bootstrap { draws: 99, seed: 3 },
-        );
-        outcomes.remove(0)
+        let groups = grouped((0..count).map(recording).collect(), Pool::Axes);
+        inferred(&groups, &plain_settings("WN+2*AR1"), 99, 3)
     }
 
     /// Intervals that hold the truth, intervals there are, the widest of them (upper over lower end), and sets in which the two
@@ -532,13 +493,8 @@ mod indistinct_tests {
                     }
                     there += 1;
                     held += u32::from(interval.low < value && value < interval.high);
-                    let scale = |end: f64| {
-                        if parameter == Parameter::Phi {
-                            -1.0 / end.ln()
-                        } else {
-                            end
-                        }
-                    };
+                    let is_phi = parameter == Parameter::Phi;
+                    let scale = |end: f64| if is_phi { -1.0 / end.ln() } else { end };
                     let (low, high) = (scale(interval.low), scale(interval.high));
                     widest = widest.max(high / low);
                 }

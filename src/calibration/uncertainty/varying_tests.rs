@@ -1,9 +1,10 @@
 //! Simulated laboratories: the spread that they find.
 
 use super::*;
-use crate::noise::{Composite, Law, Model, Process, Spread, Variation, VirtualImu};
-use crate::{Estimator, ModelChoice, Pool, calibrate, grouped, infer, replicates};
-use nav_sim_signal::imu::Channel;
+use crate::Estimator;
+use crate::imu::Channel;
+use crate::noise::{Law, Model, Spread, Variation};
+use crate::tests::{imu, inferred, recorded, settings, white_and_walk};
 
 const SAMPLES: usize = 4096;
 const LABORATORIES: u64 = 30;
@@ -16,9 +17,7 @@ fn laboratory(
     sd: f64,
     estimator: Estimator,
 ) -> Outcome {
-    let white = Process::white(1.0).unwrap();
-    let walk = Process::random_walk(1e-3).unwrap();
-    let noise = Composite::new(vec![white, walk]);
+    let noise = white_and_walk(1.0, 1e-3);
     let law = Law::Lognormal {
         median: 1.0,
         sd,
@@ -30,32 +29,19 @@ fn laboratory(
         axes: std::array::from_fn(|_| vec![variation.clone()]),
     };
     let model = Model::pooled(1.0, &noise, &noise);
-    let imu = VirtualImu {
-        model: &model,
-        spread: Some(&spread),
-        contamination: None,
-        seed,
-    };
+    let imu = imu(&model, Some(&spread), seed);
     let settings = Settings {
         estimators: vec![estimator],
-        model: ModelChoice::Given("WN+RW".parse().unwrap()),
-        ..Settings::default()
+        ..settings("WN+RW")
     };
-    let signals = (1..=recordings).flat_map(|run| {
-        let recording = imu
-            .recording(run, &Channel::named(channels), SAMPLES)
-            .unwrap();
-        replicates(&recording, None, &settings.tuning).unwrap()
-    });
-    let groups = grouped(signals.collect(), Pool::Sensor);
-    let mut outcomes = calibrate(&groups, &settings).unwrap();
-    infer(
-        &groups,
-        &mut outcomes,
+    let groups = recorded(
+        &imu,
+        recordings,
+        &Channel::named(channels),
+        SAMPLES,
         &settings,
-        Bootstrap { draws: 99, seed: 1 },
     );
-    outcomes.remove(0)
+    inferred(&groups, &settings, 99, 1)
 }
 
 fn found(
@@ -100,21 +86,15 @@ fn laboratories_find_the_spread_there_is() {
             (mean - 0.3 * (1.0 - 0.25 / freedom)).abs() < 3.0 * error,
             "{estimator}: {mean}"
         );
-        let missed = own
-            .iter()
-            .filter(|s| s.sd_ci95[0] > 0.3 || s.sd_ci95[1] < 0.3)
-            .count();
-        assert!(missed <= 5, "{estimator}: {missed}");
-        let missed = own
-            .iter()
-            .filter(|s| s.median_ci95[0] > 1.0 || s.median_ci95[1] < 1.0)
-            .count();
-        assert!(missed <= 5, "{estimator}: {missed}");
-        assert!(
-            of(Parameter::Gamma2).count() <= 4,
-            "{estimator}: {}",
-            of(Parameter::Gamma2).count()
-        );
+        let misses = |of: fn(&ParameterSpread) -> [f64; 2], truth: f64| {
+            own.iter()
+                .filter(|s| of(s)[0] > truth || of(s)[1] < truth)
+                .count()
+        };
+        let missed = [misses(|s| s.sd_ci95, 0.3), misses(|s| s.median_ci95, 1.0)];
+        assert!(missed.iter().all(|n| *n <= 5), "{estimator}: {missed:?}");
+        let walks = of(Parameter::Gamma2).count();
+        assert!(walks <= 4, "{estimator}: {walks}");
     }
 }
 
@@ -122,14 +102,10 @@ fn laboratories_find_the_spread_there_is() {
 /// probability of 0.1 %. Two recordings never have one.
 #[test]
 fn without_spread_there_is_hardly_a_law() {
-    let written = found(6, "accel.x", 0.0, Estimator::Awv)
-        .iter()
-        .filter(|laws| !laws.is_empty())
-        .count();
-    assert!(written <= 4, "{written}");
-    assert!(
-        found(2, "accel.x", 0.3, Estimator::Awv)
-            .iter()
-            .all(Vec::is_empty)
-    );
+    let written = |recordings, sd| {
+        let all = found(recordings, "accel.x", sd, Estimator::Awv);
+        all.iter().filter(|laws| !laws.is_empty()).count()
+    };
+    assert!(written(6, 0.0) <= 4);
+    assert_eq!(written(2, 0.3), 0);
 }

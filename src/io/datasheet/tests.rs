@@ -1,6 +1,8 @@
 use super::*;
 use crate::io::model_file;
+use crate::io::tests::{Files, answers, told};
 use crate::io::toml_file::TomlSource;
+use approx::assert_relative_eq;
 use nav_sim_signal::noise::practical::AllanMinimum;
 use std::path::Path;
 
@@ -36,11 +38,19 @@ fn densities_are_where_the_allan_deviation_is_read() {
     // 128 samples a second: 1 s is 2^7 samples, level 8
     let made = sheet.model_file(128.0).unwrap().file.model;
     let density = 0.15 / 60.0 * std::f64::consts::PI / 180.0;
-    assert!((allan_deviation(&made.axes[3], 8) / density - 1.0).abs() < 1e-12);
+    assert_relative_eq!(
+        allan_deviation(&made.axes[3], 8),
+        density,
+        max_relative = 1e-12
+    );
     // K² τ/3 in continuous time; sampled, a share 1/(2·128²) more
     let walk = 1e-6 * 9.806_65;
     let expected = walk * (1.0_f64 / 3.0).sqrt();
-    assert!((allan_deviation(&made.axes[0], 8) / expected - 1.0).abs() < 1e-4);
+    assert_relative_eq!(
+        allan_deviation(&made.axes[0], 8),
+        expected,
+        max_relative = 1e-4
+    );
 }
 
 /// The figure is the lowest point of the Allan deviation (IEEE 952), for every entry of the catalogue: over averages of 1 s
@@ -81,38 +91,15 @@ fn what_is_assumed_is_said() {
         (Sensor::Gyro, Figure::Bias, "10 deg/h"),
         (Sensor::Gyro, Figure::Noise, "0.3 deg/sqrt(h)"),
     ];
-    let doubts_with = |extra: &[(Sensor, Figure, &str)]| {
-        let mut sheet = sheet(&bias);
-        self::sheet(extra)
-            .entries
-            .into_iter()
-            .for_each(|entry| sheet.set(entry));
-        sheet.model_file(100.0).unwrap().doubts
+    let doubts = |t_corr: Option<&str>| {
+        let t_corr = t_corr.map(|text| (Sensor::Gyro, Figure::CorrelationTime, text));
+        let sheet = sheet(&bias.into_iter().chain(t_corr).collect::<Vec<_>>());
+        sheet.model_file(100.0).unwrap().doubts.join("\n")
     };
-    let assumed = "gyro: no correlation time given; 300 s assumed for the bias instability";
-    assert_eq!(doubts_with(&[]), [assumed]);
-    // 0.3 °/√h is above 10 °/h until (0.3·60/10)² = 3.24 s: a floor that ends at 1.89·1 s is below that
-    let doubts = doubts_with(&[(Sensor::Gyro, Figure::CorrelationTime, "1 s")]);
-    assert!(
-        doubts[0].starts_with("gyro: at 1.89 s the white noise hides the bias instability"),
-        "{doubts:?}"
-    );
-    // 3.24 s / 1.8926
-    assert!(
-        doubts[0].ends_with("a correlation time above 1.71 s would"),
-        "{doubts:?}"
-    );
-    let doubts = doubts_with(&[(Sensor::Gyro, Figure::CorrelationTime, "0.001 s")]);
-    assert!(
-        doubts[0].starts_with("gyro: at 0.00189 s the white noise alone"),
-        "{doubts:?}"
-    );
-    // one that ends at 1.8926·3 s: √(1 + 3.24/5.678) = 1.25
-    let doubts = doubts_with(&[(Sensor::Gyro, Figure::CorrelationTime, "3 s")]);
-    assert!(
-        doubts[0].contains("is 1.25 times the bias instability, at 5.68 s"),
-        "{doubts:?}"
-    );
+    // 0.3 °/√h is above 10 °/h until (0.3·60/10)² = 3.24 s: a floor that ends at 1.89·1 s is below that, and one of 1.71 s =
+    // 3.24 s/1.8926 would not be; one that ends at 1.8926·3 s is √(1 + 3.24/5.678) = 1.25 times the figure
+    let times = [None, Some("1 s"), Some("0.001 s"), Some("3 s")];
+    insta::assert_snapshot!(times.map(doubts).join("\n"));
 }
 
 #[test]
@@ -132,7 +119,11 @@ fn provenance_holds_every_figure_as_given() {
     assert_eq!(given, ["0.3 °/√h", "0.1 deg/s", "300 ppm"]);
     assert_eq!(provenance["estimator"].as_str(), Some("datasheet"));
     let sigma = 0.1 * std::f64::consts::PI / 180.0;
-    assert!((file.turn_on.unwrap().gyro_rad_s.unwrap()[2] / sigma - 1.0).abs() < 1e-14);
+    assert_relative_eq!(
+        file.turn_on.unwrap().gyro_rad_s.unwrap()[2],
+        sigma,
+        max_relative = 1e-14
+    );
     assert_eq!(file.missing.len(), 3);
 }
 
@@ -198,35 +189,25 @@ fn the_catalogue_is_sound() {
 
 #[test]
 fn entries_are_refused_with_line_key_and_value() {
-    let refused = |text: &str| {
-        let head = "[unit]\nmanufacturer = \"A\"\nname = \"B\"\nclass = \"consumer\"\n";
-        parse(&TomlSource::new("u.toml", &format!("{head}{text}")))
-            .unwrap_err()
-            .to_string()
-    };
-    assert_eq!(
-        refused("[gyro]\nbias = { value = \"10\", source = \"s\" }\n"),
-        "u.toml, line 6: \"gyro.bias.value\" = \"10\" has no unit; expected deg/h, deg/s, mdeg/s, rad/s"
-    );
-    assert_eq!(
-        refused("[accel]\nnoise = { value = \"1 deg/h\", source = \"s\" }\n"),
-        "u.toml, line 6: \"accel.noise.value\" = \"1 deg/h\" has the unit deg/h; expected m/s/sqrt(h), m/s/sqrt(s), ft/s/sqrt(h), m/s²/sqrt(Hz), mg/sqrt(Hz), ug/sqrt(Hz)"
-    );
-    assert_eq!(
-        refused("[gyro]\nnoises = { value = \"1 deg/sqrt(h)\", source = \"s\" }\n"),
-        "u.toml, line 6: unknown key \"gyro.noises\""
-    );
-    assert!(
-        refused("[gyro]\nnoise = { value = \"1 deg/sqrt(h)\" }\n").contains("source\" is missing")
-    );
+    let head = "[unit]\nmanufacturer = \"A\"\nname = \"B\"\nclass = \"consumer\"\n";
+    insta::assert_snapshot!(answers(
+        [
+            "[gyro]\nbias = { value = \"10\", source = \"s\" }\n",
+            "[accel]\nnoise = { value = \"1 deg/h\", source = \"s\" }\n",
+            "[gyro]\nnoises = { value = \"1 deg/sqrt(h)\", source = \"s\" }\n",
+            "[gyro]\nnoise = { value = \"1 deg/sqrt(h)\" }\n",
+        ]
+        .map(|text| {
+            let source = TomlSource::new("u.toml", &format!("{head}{text}"));
+            (text, parse(&source).map_err(|e| told(&e)))
+        })
+    ));
 }
 
 /// The figures and the rate of a file of another program.
-fn read_measured(text: &str, rate_hz: Option<f64>) -> Result<(Datasheet, Option<f64>), Failure> {
-    let place = tempfile::tempdir().unwrap();
-    let path = place.path().join("imu.yaml");
-    std::fs::write(&path, text).unwrap();
-    measured(&path, rate_hz)
+fn read_measured(text: &str, rate_hz: Option<f64>) -> (Datasheet, Option<f64>) {
+    let (_files, path) = Files::with("imu.yaml", text);
+    measured(&path, rate_hz).unwrap()
 }
 
 const KALIBR: &str = "%YAML:1.0 # of a chain\nimu0:\n  T_i_b:\n    - [1.0, 0.0, 0.0, 0.0]\n  accelerometer_noise_density: 0.0025 # m/s^2/sqrt(Hz)\n  \
@@ -238,7 +219,7 @@ const IMU_UTILS: &str = "%YAML:1.0\n---\ntype: IMU\nname: A3\nGyr:\n   unit: \" 
 /// Kalibr reads N off the Allan deviation at 1 s and K at 3 s (of K²τ/3); both are there again, N exactly.
 #[test]
 fn figures_of_kalibr_are_where_it_reads_them() {
-    let (sheet, rate_hz) = read_measured(KALIBR, None).unwrap();
+    let (sheet, rate_hz) = read_measured(KALIBR, None);
     assert_eq!(rate_hz, Some(256.0));
     assert_eq!(sheet.value(Sensor::Gyro, Figure::Walk), None);
     assert_eq!(sheet.value(Sensor::Gyro, Figure::Noise), Some(0.00019));
@@ -250,10 +231,7 @@ fn figures_of_kalibr_are_where_it_reads_them() {
     let of =
         |axis: usize, process: usize| Composite::new(vec![model.axes[axis].processes[process]]);
     let near = |value: f64, expected: f64, error: f64| {
-        assert!(
-            (value / expected - 1.0).abs() < error,
-            "{value:e} {expected:e}"
-        );
+        assert_relative_eq!(value, expected, max_relative = error);
     };
     near(of(0, 0).allan_variance(256).sqrt(), 0.0025, 1e-12);
     near(of(3, 0).allan_variance(256).sqrt(), 0.00019, 1e-12);
@@ -265,7 +243,7 @@ fn figures_of_kalibr_are_where_it_reads_them() {
 /// its lowest is between the floor and what [`no_model_of_a_datasheet_is_below_its_bias_instability`] derives.
 #[test]
 fn figures_of_imu_utils_are_those_of_a_sample_and_the_lowest() {
-    let (sheet, rate_hz) = read_measured(IMU_UTILS, Some(400.0)).unwrap();
+    let (sheet, rate_hz) = read_measured(IMU_UTILS, Some(400.0));
     assert_eq!(rate_hz, Some(400.0));
     assert_eq!(sheet.value(Sensor::Accel, Figure::Noise), Some(2e-2 / 20.0));
     assert_eq!(sheet.value(Sensor::Gyro, Figure::Noise), Some(2e-3 / 20.0));
@@ -286,43 +264,27 @@ fn figures_of_imu_utils_are_those_of_a_sample_and_the_lowest() {
 
 #[test]
 fn figures_of_others_are_refused_with_line_key_and_value() {
-    let refused = |text: &str, rate_hz| {
-        let failure = read_measured(text, rate_hz).unwrap_err().to_string();
-        failure.rsplit_once("imu.yaml").unwrap().1.to_owned()
-    };
-    let of_sample = ", line 8: \"gyr_n\" = 2e-3 is of a sample: the rate is needed";
-    assert_eq!(refused(IMU_UTILS, None), of_sample);
-    let unit = IMU_UTILS.replace(" m/s^2", "g");
-    assert_eq!(
-        refused(&unit, Some(1.0)),
-        ", line 14: \"unit\" = g is not the unit of imu_utils"
-    );
-    let twice = format!("{KALIBR}imu1:\n  gyroscope_noise_density: 1e-3\n");
-    assert_eq!(
-        refused(&twice, None),
-        ", line 12: \"gyroscope_noise_density\" = 1e-3 is given twice"
-    );
-    for (text, reason) in [
+    let cases = [
+        ("no rate", IMU_UTILS.to_owned(), None),
+        ("other unit", IMU_UTILS.replace(" m/s^2", "g"), Some(1.0)),
         (
-            "-1",
-            "does not begin with a number > 0, such as 0.1 m/s²/sqrt(h)",
+            "twice",
+            format!("{KALIBR}imu1:\n  gyroscope_noise_density: 1e-3\n"),
+            None,
         ),
-        ("1e30", "is more than 1e12 in SI units"),
-    ] {
-        let text = KALIBR.replace("7e-05", text);
-        assert!(
-            refused(&text, None).ends_with(reason),
-            "{}",
-            refused(&text, None)
-        );
-    }
-    let rate = KALIBR.replace("256.0", "fast");
-    assert_eq!(
-        refused(&rate, None),
-        ", line 10: \"update_rate\" = fast is not a finite number > 0"
-    );
-    // of VINS, whose figures are other ones
-    assert!(refused("gyr_n: 0.01\nacc_n: 0.1\n", Some(200.0)).contains("no figure of Kalibr"));
+        ("negative", KALIBR.replace("7e-05", "-1"), None),
+        ("absurd", KALIBR.replace("7e-05", "1e30"), None),
+        ("bad rate", KALIBR.replace("256.0", "fast"), None),
+        (
+            "of VINS",
+            "gyr_n: 0.01\nacc_n: 0.1\n".to_owned(),
+            Some(200.0),
+        ),
+    ];
+    insta::assert_snapshot!(answers(cases.map(|(name, text, rate_hz)| {
+        let (files, path) = Files::with("imu.yaml", text);
+        (name, measured(&path, rate_hz).map_err(|e| files.told(&e)))
+    })));
 }
 
 /// A turn-on bias that no document states is that of the grade, and said to be; a grade that nobody knows has none.
@@ -340,7 +302,7 @@ fn a_turn_on_bias_is_by_grade_where_a_sheet_has_none() {
         Some(2e-3 * 9.806_65)
     );
     let gyro = sheet.value(Sensor::Gyro, Figure::TurnOn).unwrap();
-    assert!((gyro / (10.0_f64.to_radians() / 3600.0) - 1.0).abs() < 1e-12);
+    assert_relative_eq!(gyro, 10.0_f64.to_radians() / 3600.0, max_relative = 1e-12);
     let lacking = [
         "accel noise",
         "gyro noise",

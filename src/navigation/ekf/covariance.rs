@@ -728,10 +728,11 @@ mod transition_tests {
     use crate::earth::GravityModel;
     use crate::ekf::tests::{gauss_markov_model, manoeuvre, predict};
     use crate::ekf::{Belief, FilterStates, InitialSettings, UnknownKind, settle};
-    use crate::frames::NavState;
     use crate::imu::Sensor;
     use crate::strapdown::Strapdown;
-    use glam::{DQuat, DVec3};
+    use crate::tests::state;
+    use approx::assert_abs_diff_eq;
+    use glam::DVec3;
 
     /// A covariance as large as this one, with correlations all over.
     fn correlated(p: &DMatrix<f64>) -> DMatrix<f64> {
@@ -757,13 +758,7 @@ mod transition_tests {
             UnknownKind::Drift,
             DVec3::new(1e-6, 2e-6, 3e-6),
         );
-        let start = NavState {
-            lat: 0.8,
-            lon: 0.1,
-            h: 400.0,
-            v_n: DVec3::new(150.0, -50.0, 0.5),
-            q_b_n: DQuat::from_scaled_axis(DVec3::new(0.05, -0.1, 1.0)),
-        };
+        let start = state([150.0, -50.0, 0.5]);
         let nominal = Strapdown::new(&start, GravityModel::Wgs84);
         let mut filters =
             [0, 1].map(|_| Ekf::new(nominal, &belief, &start, &InitialSettings::default()));
@@ -785,10 +780,7 @@ mod transition_tests {
         assert_eq!(found.nrows(), 27);
         for (i, j) in (0..27).flat_map(|i| (0..27).map(move |j| (i, j))) {
             let scale = ((p[(i, i)] + q[(i, i)]) * (p[(j, j)] + q[(j, j)])).sqrt();
-            assert!(
-                (found[(i, j)] - expected[(i, j)]).abs() <= 1e-12 * scale,
-                "({i}, {j})"
-            );
+            assert_abs_diff_eq!(found[(i, j)], expected[(i, j)], epsilon = 1e-12 * scale);
         }
         assert_eq!(filters[0].take_transition(), DMatrix::identity(27, 27));
     }

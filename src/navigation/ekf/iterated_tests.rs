@@ -2,12 +2,13 @@
 
 use super::*;
 use crate::earth::GravityModel;
-use crate::ekf::tests::{error_of, generator, random_case};
+use crate::ekf::tests::{error_of, fix_at_nominal, generator, random_case};
 use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings, advance, update};
 use crate::frames::NavState;
 use crate::imu::ImuSample;
 use crate::lanes::Vec3;
 use crate::noise::Model;
+use approx::assert_abs_diff_eq;
 use glam::DQuat;
 use rand::RngExt;
 
@@ -58,12 +59,7 @@ fn what_is_carried_is_the_derivative_of_the_retraction() {
 fn coefficients_of_small_angles_go_on_into_those_of_large_ones() {
     let [below, above] = [SMALL * (1.0 - 1e-12), SMALL].map(coefficients);
     for (k, bound) in [1e-12, 1e-12, 2e-9, 3e-10].into_iter().enumerate() {
-        assert!(
-            (below[k] - above[k]).abs() < bound,
-            "{k}: {} {}",
-            below[k],
-            above[k]
-        );
+        assert_abs_diff_eq!(below[k], above[k], epsilon = bound);
     }
 }
 
@@ -116,9 +112,7 @@ fn small_innovations_are_used_alike() {
                 lon: Lanes::splat(here.lon - scale * 2e-5),
                 h: Lanes::splat(here.h + scale * 30.0),
                 v_n: Some(Vec3::splat(here.v_n + DVec3::new(3.0, -4.0, 1.0) * scale)),
-                pos_sigma_m: DVec3::splat(2.0),
-                vel_sigma_m_s: DVec3::splat(0.05),
-                lever_arm_b: DVec3::ZERO,
+                ..fix_at_nominal(&ekf, 2.0, 0.05)
             };
             update(&mut ekf, &fix);
             ekf.nominal.lane(0)
@@ -127,5 +121,5 @@ fn small_innovations_are_used_alike() {
         error.iter().map(|x| x * x).sum::<f64>().sqrt()
     };
     let (whole, half) = (difference(0.02), difference(0.01));
-    assert!((whole / half - 4.0).abs() < 0.2, "{whole} {half}");
+    assert_abs_diff_eq!(whole / half, 4.0, epsilon = 0.2);
 }

@@ -8,11 +8,13 @@ use super::update::dense;
 use super::{Belief, Ekf, FilterStates, Fix, InitialSettings, advance, settle, update};
 use crate::earth::{self, GravityModel};
 use crate::frames::NavState;
-use crate::imu::{ImuSample, Sensor};
+use crate::imu::ImuSample;
 use crate::lanes::{Lanes, Level, Vec3};
-use crate::noise::{Composite, Model, Process};
-use crate::rng::{Generator, StreamKey};
+use crate::noise::Model;
+use crate::rng::Generator;
 use crate::strapdown::Strapdown;
+use crate::tests::{gauss_markov, key, state};
+use approx::assert_abs_diff_eq;
 use glam::{DQuat, DVec3};
 use nalgebra::{DMatrix, Matrix3, SMatrix};
 use rand::RngExt;
@@ -20,14 +22,7 @@ use rand::RngExt;
 pub(super) type Matrix15 = SMatrix<f64, 15, 15>;
 
 pub(super) fn generator(process: &str) -> Generator {
-    StreamKey {
-        seed: 11,
-        scenario: "",
-        run: 0,
-        source: "test",
-        process,
-    }
-    .generator()
+    key(11).stream("test", process)
 }
 
 /// A fast vehicle anywhere, in any attitude, with what its IMU measures.
@@ -79,6 +74,8 @@ fn perturbed(state: &NavState, block: usize, axis: usize, size: f64) -> NavState
     }
 }
 
+/// Correlation times of the biases of accelerometers and gyroscopes.
+pub(super) const T_CORR_S: [f64; 2] = [200.0, 500.0];
 /// Random states at which H is compared.
 const RANDOM_STATES: usize = 100_000;
 const PERTURBATION: [f64; 5] = [1000.0, 1.0, 1e-4, 1e-2, 1e-4];
@@ -176,26 +173,8 @@ fn every_block_of_f_agrees_with_central_differences() {
     }
 }
 
-fn model(accel: [Process; 2], gyro: [Process; 2]) -> Model {
-    Model::pooled(
-        100.0,
-        &Composite::new(accel.to_vec()),
-        &Composite::new(gyro.to_vec()),
-    )
-}
-
 pub(super) fn gauss_markov_model() -> Model {
-    let (phi_a, phi_g) = ((-0.01_f64 / 200.0).exp(), (-0.01_f64 / 500.0).exp());
-    model(
-        [
-            Process::white(4e-5).unwrap(),
-            Process::ar1(phi_a, 9e-4 * (1.0 - phi_a * phi_a)).unwrap(),
-        ],
-        [
-            Process::white(1e-6).unwrap(),
-            Process::ar1(phi_g, 1e-8 * (1.0 - phi_g * phi_g)).unwrap(),
-        ],
-    )
+    gauss_markov(100.0, [4e-5, 1e-6], [0.03, 1e-4], T_CORR_S)
 }
 
 /// A vehicle that circles while it climbs and brakes: what its IMU measures at time t.
@@ -213,21 +192,46 @@ pub(super) fn manoeuvre(t: f64) -> (DVec3, DVec3) {
     (omega, f)
 }
 
-fn ekf(model: &Model, states: FilterStates) -> Ekf {
-    let belief = Belief::new(model, states, 1.0, 800.0).unwrap();
-    let start = NavState {
-        lat: 0.8,
-        lon: 0.1,
-        h: 400.0,
-        v_n: DVec3::new(15.0, -5.0, 0.5),
-        q_b_n: DQuat::from_scaled_axis(DVec3::new(0.05, -0.1, 1.0)),
-    };
+pub(super) fn ekf(belief: &Belief, state: &NavState, initial: &InitialSettings) -> Ekf {
     Ekf::new(
-        Strapdown::new(&start, GravityModel::Wgs84),
-        &belief,
-        &start,
-        &InitialSettings::default(),
+        Strapdown::new(state, GravityModel::Wgs84),
+        belief,
+        state,
+        initial,
     )
+}
+
+pub(super) fn start() -> NavState {
+    state([15.0, -5.0, 0.5])
+}
+
+/// A start that is known exactly.
+pub(super) fn certain_start() -> InitialSettings {
+    InitialSettings {
+        pos_sigma_m: [0.0; 3],
+        vel_sigma_m_s: [0.0; 3],
+        att_sigma_deg: [0.0; 3],
+        ..InitialSettings::default()
+    }
+}
+
+fn filter(model: &Model, states: FilterStates) -> Ekf {
+    let belief = Belief::new(model, states, 1.0, 800.0).unwrap();
+    ekf(&belief, &start(), &InitialSettings::default())
+}
+
+/// The filter after so many samples of the manoeuvre with such a fix a second.
+fn driven(mut filter: Ekf, samples: u32, fix: impl Fn(&Ekf) -> Fix) -> Ekf {
+    for k in 0..samples {
+        let (omega, f) = manoeuvre(f64::from(k) * 0.01);
+        predict(&mut filter, omega, f);
+        if k % 100 == 99 {
+            let fix = fix(&filter);
+            update(&mut filter, &fix);
+        }
+    }
+    settle(&mut filter);
+    filter
 }
 
 /// One IMU sample, the same in all lanes.
@@ -261,72 +265,6 @@ pub(super) fn measurement_rows(ekf: &Ekf, lever_arm_b: DVec3) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Phi and Qd of one sample by [van Loan](crate::bibliography::VanLoan78) for F and G Q Gᵀ held constant.
-fn van_loan(f: &Matrix15, q: &Matrix15, dt: f64) -> (Matrix15, Matrix15) {
-    let mut m = DMatrix::<f64>::zeros(30, 30);
-    m.view_mut((0, 0), (15, 15)).copy_from(&(-f));
-    m.view_mut((0, 15), (15, 15)).copy_from(q);
-    m.view_mut((15, 15), (15, 15)).copy_from(&f.transpose());
-    let e = (m * dt).exp();
-    let phi: Matrix15 = e.fixed_view::<15, 15>(15, 15).transpose();
-    let qd = phi * e.fixed_view::<15, 15>(0, 15);
-    (phi, qd)
-}
-
-/// The biases' own step is exact in the model (b_k = phi b_{k−1} + w, held over sample k).
-fn bias_step(p: &Matrix15) -> Matrix15 {
-    let phi: [f64; 2] = [(-0.01_f64 / 200.0).exp(), (-0.01_f64 / 500.0).exp()];
-    let variance = [9e-4, 1e-8];
-    let decay = |i: usize| if i < 9 { 1.0 } else { phi[i / 3 - 3] };
-    let q = |i: usize| {
-        if i < 9 {
-            0.0
-        } else {
-            variance[i / 3 - 3] * (1.0 - phi[i / 3 - 3].powi(2))
-        }
-    };
-    Matrix15::from_fn(|i, j| decay(i) * p[(i, j)] * decay(j) + if i == j { q(i) } else { 0.0 })
-}
-
-/// The standard deviations of a whole run with an outage against the exact discretisation: 1e-4.
-#[test]
-fn covariance_agrees_with_the_matrix_exponential_over_a_run() {
-    let mut ekf = ekf(&gauss_markov_model(), FilterStates::Reduced15);
-    let mut p: Matrix15 = Matrix15::from_fn(|i, j| ekf.p.get::<Lanes>(i, j)[0]);
-    let dt = 0.01;
-    for k in 0..20_000 {
-        let t = (k as f64 + 0.5) * dt;
-        let (omega, f) = manoeuvre(t);
-        let terms = EarthTerms::at(&ekf.nominal);
-        let c_before = ekf.nominal.q_b_n.to_matrix().lane(0);
-        predict(&mut ekf, omega, f);
-        let c = (c_before + ekf.nominal.q_b_n.to_matrix().lane(0)) * 0.5;
-        let (phi, qd) = van_loan(&continuous_f(&terms, &c, f), &continuous_q(), dt);
-        p = bias_step(&p);
-        p = phi * p * phi.transpose() + qd;
-        let second = (k + 1) / 100;
-        if (k + 1) % 100 == 0 && !(60..150).contains(&second) {
-            let fix = fix_at_nominal(&ekf, 2.0, 0.05);
-            update(&mut ekf, &fix);
-            for state in 0..6 {
-                let r: f64 = if state < 3 { 4.0 } else { 0.0025 };
-                let column: SMatrix<f64, 15, 1> = p.column(state).into();
-                p -= column * column.transpose() / (p[(state, state)] + r);
-            }
-        }
-        if (k + 1) % 100 == 0 {
-            settle(&mut ekf);
-            for i in 0..15 {
-                let ratio = (ekf.p.get::<Lanes>(i, i)[0] / p[(i, i)]).sqrt();
-                assert!(
-                    (ratio - 1.0).abs() < 1e-4,
-                    "state {i} at {second} s: ratio {ratio}"
-                );
-            }
-        }
-    }
-}
-
 pub(super) fn continuous_f(terms: &EarthTerms<Lanes>, c: &Matrix3<f64>, f_b: DVec3) -> Matrix15 {
     let mut f = Matrix15::zeros();
     let f_n = c * nalgebra::Vector3::new(f_b.x, f_b.y, f_b.z);
@@ -358,36 +296,16 @@ pub(super) fn continuous_q() -> Matrix15 {
 /// Positive definite and exactly symmetric after many fixes that are nearly perfect, and nearly worthless.
 #[test]
 fn covariance_stays_positive_definite_under_extreme_measurements() {
-    extreme_measurements(100_000);
-}
-
-/// The same over 10⁶ epochs: `cargo test --lib extreme -- --ignored`.
-#[test]
-#[ignore = "two times 10^6 epochs: some seconds of an optimised build"]
-fn covariance_stays_positive_definite_under_extreme_measurements_for_a_million_epochs() {
-    extreme_measurements(1_000_000);
-}
-
-fn extreme_measurements(epochs: u32) {
-    for variance in [1e-12, 1e12] {
-        let mut ekf = ekf(&gauss_markov_model(), FilterStates::Reduced15);
-        let sigma = f64::sqrt(variance);
-        for k in 0..epochs {
-            let (omega, f) = manoeuvre(f64::from(k) * 0.01);
-            predict(&mut ekf, omega, f);
-            if k % 100 == 99 {
-                let fix = fix_at_nominal(&ekf, sigma, sigma);
-                update(&mut ekf, &fix);
-            }
-        }
-        let p = ekf.p.lane(3);
+    for sigma in [1e-6, 1e6] {
+        let filter = filter(&gauss_markov_model(), FilterStates::Reduced15);
+        let filter = driven(filter, 100_000, |filter| {
+            fix_at_nominal(filter, sigma, sigma)
+        });
+        let p = filter.p.lane(3);
         let scale = DMatrix::from_diagonal(&p.diagonal().map(|v| 1.0 / v.sqrt()));
         let correlation = &scale * &p * &scale;
         assert!(p == p.transpose(), "exactly symmetric");
-        assert!(
-            correlation.cholesky().is_some(),
-            "variance {variance:e}: not positive definite"
-        );
+        assert!(correlation.cholesky().is_some(), "{sigma:e} m");
     }
 }
 
@@ -402,22 +320,16 @@ fn splitting_a_bias_into_two_states_changes_nothing_outside() {
         let part = |share: f64| bias.times(share).unwrap();
         axis.processes.splice(1.., [part(0.3), part(0.7)]);
     }
-    let mut filters = [
-        ekf(&one, FilterStates::Reduced15),
-        ekf(&one, FilterStates::Full),
-        ekf(&two, FilterStates::Full),
-    ];
-    for filter in &mut filters {
-        for k in 0..3000 {
-            let (omega, f) = manoeuvre(k as f64 * 0.01);
-            predict(filter, omega, f);
-            if k % 100 == 99 {
-                let fix = fix_at_nominal(filter, 2.0, 0.05);
-                update(filter, &fix);
-            }
-        }
-    }
-    let [reduced, full, split] = &filters;
+    let [reduced, full, split] = [
+        (&one, FilterStates::Reduced15),
+        (&one, FilterStates::Full),
+        (&two, FilterStates::Full),
+    ]
+    .map(|(model, states)| {
+        driven(filter(model, states), 3000, |f| {
+            fix_at_nominal(f, 2.0, 0.05)
+        })
+    });
     assert_eq!(reduced.p.lane(0), full.p.lane(0));
     assert_eq!(split.p.dim(), 21);
     for i in 0..9 {
@@ -431,19 +343,13 @@ fn splitting_a_bias_into_two_states_changes_nothing_outside() {
 #[test]
 fn every_vector_unit_computes_the_same() {
     let run = |level: Level| {
-        let mut filter = ekf(&gauss_markov_model(), FilterStates::Full).at_level(level);
-        for k in 0..6000 {
-            let (omega, f) = manoeuvre(k as f64 * 0.01);
-            predict(&mut filter, omega, f);
-            if k % 100 == 99 {
-                let mut fix = fix_at_nominal(&filter, 2.0, 0.05);
-                fix.lever_arm_b = DVec3::new(0.5, -0.2, -1.0);
-                fix.h[3] += 1.0;
-                update(&mut filter, &fix);
-            }
-        }
-        settle(&mut filter);
-        filter
+        let filter = filter(&gauss_markov_model(), FilterStates::Full).at_level(level);
+        driven(filter, 6000, |filter| {
+            let mut fix = fix_at_nominal(filter, 2.0, 0.05);
+            fix.lever_arm_b = DVec3::new(0.5, -0.2, -1.0);
+            fix.h[3] += 1.0;
+            fix
+        })
     };
     let [portable, avx2, avx512] = [Level::Portable, Level::Avx2, Level::Avx512].map(run);
     if Level::best() == Level::Avx512 {
@@ -453,12 +359,7 @@ fn every_vector_unit_computes_the_same() {
     let (p, q) = (portable.p.lane(3), avx2.p.lane(3));
     for (i, j) in (0..15).flat_map(|i| (0..15).map(move |j| (i, j))) {
         let scale = (p[(i, i)] * p[(j, j)]).sqrt();
-        assert!(
-            (p[(i, j)] - q[(i, j)]).abs() <= 1e-9 * scale,
-            "({i}, {j}): {} {}",
-            p[(i, j)],
-            q[(i, j)]
-        );
+        assert_abs_diff_eq!(p[(i, j)], q[(i, j)], epsilon = 1e-9 * scale);
     }
     let (a, b) = (portable.nominal.lane(3), avx2.nominal.lane(3));
     let difference = error_of(&a, &b);

@@ -4,8 +4,8 @@
 use super::belief::BiasGroup;
 use super::covariance::{EarthTerms, PSI, V};
 use super::tests::{
-    Matrix15, continuous_f, continuous_q, error_of, fix_at_nominal, gauss_markov_model, generator,
-    manoeuvre, measurement_rows, predict, random_case,
+    Matrix15, T_CORR_S, certain_start, continuous_f, continuous_q, ekf, error_of, fix_at_nominal,
+    gauss_markov_model, generator, manoeuvre, measurement_rows, predict, random_case, start,
 };
 use super::{Belief, Ekf, FilterStates, InitialSettings, UnknownKind, settle, update};
 use crate::earth::{self, GravityModel};
@@ -14,6 +14,7 @@ use crate::imu::Sensor;
 use crate::lanes::{Lanes, Level, Vec3};
 use crate::noise::{Composite, Model, Process};
 use crate::strapdown::Strapdown;
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 use glam::{DQuat, DVec3};
 use nalgebra::DMatrix;
 
@@ -34,26 +35,6 @@ fn belief() -> Belief {
     belief
 }
 
-fn start() -> NavState {
-    let q_b_n = DQuat::from_scaled_axis(DVec3::new(0.05, -0.1, 1.0));
-    NavState {
-        lat: 0.8,
-        lon: 0.1,
-        h: 400.0,
-        v_n: DVec3::new(15.0, -5.0, 0.5),
-        q_b_n,
-    }
-}
-
-fn ekf(belief: &Belief, state: &NavState, initial: &InitialSettings) -> Ekf {
-    Ekf::new(
-        Strapdown::new(state, GravityModel::Wgs84),
-        belief,
-        state,
-        initial,
-    )
-}
-
 /// Squares of the deviations, of attitude those of roll, pitch and yaw of a level vehicle.
 #[test]
 fn the_covariance_at_the_start_is_what_is_believed() {
@@ -71,10 +52,10 @@ fn the_covariance_at_the_start_is_what_is_believed() {
     let angles = initial.att_sigma_deg.map(f64::to_radians);
     let sigmas = [initial.pos_sigma_m, initial.vel_sigma_m_s, angles].concat();
     for (i, sigma) in sigmas.iter().enumerate() {
-        assert!(
-            (p[(i, i)] - sigma * sigma).abs() < 1e-15 * (1.0 + p[(i, i)]),
-            "{i}: {}",
-            p[(i, i)]
+        assert_abs_diff_eq!(
+            p[(i, i)],
+            sigma * sigma,
+            epsilon = 1e-15 * (1.0 + p[(i, i)])
         );
     }
 }
@@ -92,10 +73,7 @@ fn flicker_noise_starts_with_its_variance() {
     )
     .unwrap();
     let variance: f64 = belief.groups[0].iter().map(|group| group.initial.x).sum();
-    assert!(
-        (variance / noise.initial_variance() - 1.0).abs() < 1e-12,
-        "{variance}"
-    );
+    assert_relative_eq!(variance, noise.initial_variance(), max_relative = 1e-12);
 }
 
 /// A turn-on bias has a state beside the processes of the model, which stay; a second one adds its variance to the first, and
@@ -126,10 +104,7 @@ fn a_turn_on_bias_is_beside_what_wanders() {
             constant.phi.x == 1.0 && constant.innovation.x == 0.0,
             "{constant:?}"
         );
-        assert!(
-            (constant.initial.x - 0.05 * 0.05).abs() < 1e-15,
-            "{constant:?}"
-        );
+        assert_abs_diff_eq!(constant.initial.x, 0.05 * 0.05, epsilon = 1e-15);
     }
 }
 
@@ -191,12 +166,7 @@ fn numeric_column(
 #[test]
 fn columns_of_unknowns_agree_with_central_differences() {
     let mut g = generator("unknowns");
-    let exact = InitialSettings {
-        pos_sigma_m: [0.0; 3],
-        vel_sigma_m_s: [0.0; 3],
-        att_sigma_deg: [0.0; 3],
-        ..InitialSettings::default()
-    };
+    let exact = certain_start();
     let mut silent = belief();
     silent.white = [DVec3::ZERO; 2];
     silent.groups = [vec![BiasGroup::default()], vec![BiasGroup::default()]];
@@ -305,31 +275,19 @@ fn samples_are_corrected_by_what_is_estimated() {
     );
 }
 
-/// exp(F dt) by its series: F dt is below 0.2, the seventh power 1e-9 of it.
-fn exponential(f: &DMatrix<f64>, dt: f64) -> DMatrix<f64> {
-    let mut term = DMatrix::identity(DIM, DIM);
-    let mut sum = term.clone();
-    for k in 1..8 {
-        term = &term * f * (dt / f64::from(k));
-        sum += &term;
-    }
-    sum
-}
-
 /// The dense covariance through one sample: biases first, then exp(F dt) with the noise by Simpson's rule.
-fn dense_step(p: &DMatrix<f64>, f: &DMatrix<f64>, filter: &Ekf, dt: f64) -> DMatrix<f64> {
+fn dense_step(p: &DMatrix<f64>, f: &DMatrix<f64>, dt: f64) -> DMatrix<f64> {
     let mut decay = DMatrix::identity(DIM, DIM);
     let mut q = DMatrix::zeros(DIM, DIM);
-    for (g, step) in filter.steps.iter().enumerate() {
-        for axis in 0..3 {
-            let i = 9 + 3 * g + axis;
-            (decay[(i, i)], q[(i, i)]) = (step.phi[axis], step.innovation[axis]);
-        }
+    for i in 9..15 {
+        let sensor = i / 3 - 3;
+        let phi = (-dt / T_CORR_S[sensor]).exp();
+        (decay[(i, i)], q[(i, i)]) = (phi, [9e-4, 1e-8][sensor] * (1.0 - phi * phi));
     }
     let p = &decay * p * decay.transpose() + q;
     let mut white = DMatrix::zeros(DIM, DIM);
     white.view_mut((0, 0), (15, 15)).copy_from(&continuous_q());
-    let (whole, half) = (exponential(f, dt), exponential(f, 0.5 * dt));
+    let (whole, half) = ((f * dt).exp(), (f * (0.5 * dt)).exp());
     let spread = |phi: &DMatrix<f64>| phi * &white * phi.transpose();
     let noise = (&white + spread(&half) * 4.0 + spread(&whole)) * (dt / 6.0);
     &whole * p * whole.transpose() + noise
@@ -367,7 +325,6 @@ fn covariance_agrees_with_dense_matrices_over_a_run() {
         p = dense_step(
             &p,
             &dense_f(&continuous_f(&terms, &c, f), [age, f, age, omega]),
-            &filters[0],
             0.01,
         );
         if (k + 1) % 100 != 0 {
@@ -403,16 +360,12 @@ fn covariance_agrees_with_dense_matrices_over_a_run() {
     for sensor in Sensor::ALL {
         let first = if sensor == Sensor::Accel { 18 } else { 24 };
         let sigma = filters[0].p.variances(first / 3).lane(0).y.sqrt();
-        assert!((sigma / p[(first + 1, first + 1)].sqrt() - 1.0).abs() < 1e-4);
+        assert_relative_eq!(sigma, p[(first + 1, first + 1)].sqrt(), max_relative = 1e-4);
         // bias and drift of an axis together: c = (1, age)
         let (bias, drift) = (9 + 3 * sensor as usize, first - 3);
         let sum = p[(bias, bias)] + 2.0 * 6000.0 * p[(bias, drift)] + 3.6e7 * p[(drift, drift)];
         let got = filters[0].bias_sigma(sensor).lane(0).x;
-        assert!(
-            (got / sum.sqrt() - 1.0).abs() < 2e-3,
-            "{got} {}",
-            sum.sqrt()
-        );
+        assert_relative_eq!(got, sum.sqrt(), max_relative = 2e-3);
     }
 }
 

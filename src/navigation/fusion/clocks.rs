@@ -285,27 +285,21 @@ pub fn earlier(gnss: &[GnssFix], seconds: f64) -> Vec<GnssFix> {
 mod tests {
     use super::*;
     use crate::earth::moved;
+    use crate::tests::key;
+    use approx::assert_abs_diff_eq;
+    use rand::RngExt;
 
-    fn turns_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
-        clocks_apart(recorded, |_| None)
-    }
-
-    /// A drive of ten minutes at 10 m/s whose course turns by `rate(t)`, an IMU at 50 Hz in any attitude, and fixes whose
-    /// clock is `late_s` ahead of the IMU's.
-    fn drive(late_s: f64, rate: impl Fn(f64) -> f64) -> (Vec<ImuIncrement>, Vec<GnssFix>) {
-        drive_at(1, late_s, rate)
-    }
-
-    /// The same with so many fixes a second, whose velocities are 0.05 m/s off to either side.
-    fn drive_at(
+    /// A drive of ten minutes at 10 m/s whose course turns by `rate(t)`, an IMU at 50 Hz in any attitude, and so many fixes a
+    /// second whose clock is `late_s` ahead of the IMU's; the velocities of more than one are 0.05 m/s off to either side.
+    fn drive(
         fixes: usize,
         late_s: f64,
         rate: impl Fn(f64) -> f64,
     ) -> (Vec<ImuIncrement>, Vec<GnssFix>) {
         let axis = DVec3::new(0.6, 0.0, 0.8);
         let (mut imu, mut gnss, mut course) = (Vec::new(), Vec::new(), 0.0_f64);
-        for k in 1..=30_000 {
-            let t_s = f64::from(k) * 0.02;
+        for k in 1..=30_000_usize {
+            let t_s = k as f64 * 0.02;
             let turn = rate(t_s) * 0.02;
             course += turn;
             imu.push(ImuIncrement {
@@ -314,13 +308,10 @@ mod tests {
                 dtheta: axis * turn,
                 dv: DVec3::ZERO,
             });
-            if (k as usize).is_multiple_of(50 / fixes) {
-                let off = if fixes > 1 && (k as usize).is_multiple_of(100 / fixes) {
-                    0.005
-                } else {
-                    0.0
-                };
-                let v_n = 10.0 * DVec3::new((course + off).cos(), (course + off).sin(), 0.0);
+            if k.is_multiple_of(50 / fixes) {
+                let is_off = fixes > 1 && k.is_multiple_of(100 / fixes);
+                let course = course + if is_off { 0.005 } else { 0.0 };
+                let v_n = 10.0 * DVec3::new(course.cos(), course.sin(), 0.0);
                 gnss.push(GnssFix {
                     t_s: t_s + late_s,
                     lat: 0.8,
@@ -334,6 +325,15 @@ mod tests {
         (imu, gnss)
     }
 
+    fn turns_apart((imu, gnss): &(Vec<ImuIncrement>, Vec<GnssFix>)) -> Option<ClocksApart> {
+        let recorded = Recorded {
+            imu,
+            gnss,
+            aids: &[],
+        };
+        clocks_apart(&recorded, |_| None)
+    }
+
     /// Turns that never come again in the same order.
     fn winding(t_s: f64) -> f64 {
         0.2 * (t_s / 7.0).sin() * (t_s / 11.3).sin() + 0.1 * (t_s / 31.7).sin()
@@ -344,13 +344,10 @@ mod tests {
     #[test]
     fn positions_tell_the_origin_of_their_clock() {
         let late_s = 50_400.0;
-        let (imu, mut gnss) = drive(late_s, winding);
-        let (mut place, mut state) = ([0.8, 0.1, 0.0], 1_u32);
+        let (imu, mut gnss) = drive(1, late_s, winding);
+        let (mut place, mut g) = ([0.8, 0.1, 0.0], key(1).generator());
         for fix in &mut gnss {
-            let mut off_m = || {
-                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                4.0 * (f64::from(state >> 8) / f64::from(1 << 24)) - 2.0
-            };
+            let mut off_m = || g.random_range(-2.0..2.0);
             place = moved(place, fix.velocity.unwrap().v_n());
             [fix.lat, fix.lon, fix.h] = moved(place, DVec3::new(off_m(), off_m(), 0.0));
             (fix.pos_sigma_n, fix.velocity) = (DVec3::splat(2.0), None);
@@ -366,56 +363,22 @@ mod tests {
 
     #[test]
     fn the_difference_of_the_clocks_is_found_with_its_sign() {
-        for late_s in [18.0, -18.0, 2.0, -0.7] {
-            let (imu, gnss) = drive(late_s, winding);
-            let apart = turns_apart(&Recorded {
-                imu: &imu,
-                gnss: &gnss,
-                aids: &[],
-            })
-            .unwrap();
-            assert!((apart.delay_s - late_s).abs() < 0.5 * STEP_S, "{apart:?}");
+        for (fixes, late_s) in [(1, 18.0), (1, -18.0), (1, 2.0), (1, -0.7), (10, 2.0)] {
+            let apart = turns_apart(&drive(fixes, late_s, winding)).unwrap();
+            assert_abs_diff_eq!(apart.delay_s, late_s, epsilon = 0.5 * STEP_S);
         }
-        let (imu, gnss) = drive_at(10, 2.0, winding);
-        let apart = turns_apart(&Recorded {
-            imu: &imu,
-            gnss: &gnss,
-            aids: &[],
-        })
-        .unwrap();
-        assert!((apart.delay_s - 2.0).abs() < 0.5 * STEP_S, "{apart:?}");
     }
 
     #[test]
     fn nothing_is_said_of_one_clock_nor_of_straight_roads_nor_of_turns_that_repeat() {
-        let (imu, gnss) = drive(0.0, winding);
-        assert_eq!(
-            turns_apart(&Recorded {
-                imu: &imu,
-                gnss: &gnss,
-                aids: &[]
-            }),
-            None
-        );
-        let (imu, gnss) = drive(18.0, |_| 0.0);
-        assert_eq!(
-            turns_apart(&Recorded {
-                imu: &imu,
-                gnss: &gnss,
-                aids: &[]
-            }),
-            None
-        );
         // a round of 20 s: as good as they are as 20 s later
         let round = |t: f64| 0.3 * (std::f64::consts::PI * t / 10.0).sin();
-        let (imu, gnss) = drive(0.0, round);
-        assert_eq!(
-            turns_apart(&Recorded {
-                imu: &imu,
-                gnss: &gnss,
-                aids: &[]
-            }),
-            None
-        );
+        for drive in [
+            drive(1, 0.0, winding),
+            drive(1, 18.0, |_| 0.0),
+            drive(1, 0.0, round),
+        ] {
+            assert_eq!(turns_apart(&drive), None);
+        }
     }
 }

@@ -517,6 +517,7 @@ fn stretch(
 #[cfg(test)]
 mod blocks_tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
 
     /// Of 400 values of ±1, neighbours as often alike as not, the mean has the standard deviation 1/√400.
     #[test]
@@ -530,11 +531,7 @@ mod blocks_tests {
         }
         assert!(blocks.mean().abs() < 1e-12 && blocks.count() == 400);
         // 1 % for the few
-        assert!(
-            (blocks.sigma() * 20.0 - 1.0).abs() < 0.01,
-            "{}",
-            blocks.sigma()
-        );
+        assert_abs_diff_eq!(blocks.sigma() * 20.0, 1.0, epsilon = 0.01);
         // neighbours that are all alike in pairs: half as many values
         let mut pairs = BlockSums::default();
         (0..400).for_each(|k| {

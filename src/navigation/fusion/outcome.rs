@@ -657,8 +657,10 @@ impl FusionError {
 
 #[cfg(test)]
 mod assessment_tests {
+    use super::VerdictKind::*;
     use super::*;
     use crate::fusion::outcome;
+    use approx::assert_relative_eq;
     use statrs::distribution::{ChiSquared, ContinuousCDF};
 
     /// A fix a second of three components with this NIS per component.
@@ -696,19 +698,12 @@ mod assessment_tests {
     #[test]
     fn the_nis_tells_what_is_consistent_too_large_and_untold() {
         let verdict = |nis: f64| judged(&solution(|_| nis, 600)).verdict;
-        assert_eq!([0.6, 1.0, 1.6].map(verdict), [VerdictKind::Consistent; 3]);
+        assert_eq!([0.6, 1.0, 1.6].map(verdict), [Consistent; 3]);
         assert_eq!(
             [0.3, 2.5, 5.0].map(verdict),
-            [
-                VerdictKind::Undecided,
-                VerdictKind::Doubtful,
-                VerdictKind::Overconfident
-            ]
+            [Undecided, Doubtful, Overconfident]
         );
-        assert_eq!(
-            judged(&solution(|_| 1.0, 10)).verdict,
-            VerdictKind::Undecided
-        );
+        assert_eq!(judged(&solution(|_| 1.0, 10)).verdict, Undecided);
     }
 
     /// Bad minutes count although the mean over the drive hides them; one wild fix is no bad minute.
@@ -716,24 +711,18 @@ mod assessment_tests {
     fn bad_minutes_count_and_wild_fixes_do_not() {
         let bad = |minutes: usize| {
             judged(&solution(
-                move |k| if k < 60 * minutes { 9.0 } else { 0.3 },
+                |k| if k < 60 * minutes { 9.0 } else { 0.3 },
                 1800,
             ))
         };
-        assert_eq!(bad(1).verdict, VerdictKind::Doubtful);
+        let one = bad(1);
+        assert_eq!((one.verdict, bad(4).verdict), (Doubtful, Overconfident));
         assert!(
-            matches!(
-                bad(1).findings[0].1,
-                Finding::Minutes { bad: 1, of: 30, .. }
-            ),
-            "{:?}",
-            bad(1)
+            matches!(one.findings[0].1, Finding::Minutes { bad: 1, of: 30, .. }),
+            "{one:?}"
         );
-        assert_eq!(bad(4).verdict, VerdictKind::Overconfident);
-        assert_eq!(
-            judged(&solution(|k| if k == 77 { 200.0 } else { 0.5 }, 600)).verdict,
-            VerdictKind::Consistent
-        );
+        let wild = solution(|k| if k == 77 { 300.0 } else { 0.5 }, 600);
+        assert_eq!(judged(&wild).verdict, Consistent);
     }
 
     /// Ten outages of ends 1.5 and 2.5 times as far as stated are too much, and 1.3 is chance: chi-square of 20 degrees exceeds
@@ -746,7 +735,11 @@ mod assessment_tests {
                 .retain(|f| f.t_s % 60.0 >= 59.0 || f.t_s % 60.0 < 30.0);
             let outcome = outcome(&all, &[]);
             assert_eq!(outcome.ends.unwrap().count, 10);
-            assert!((outcome.ends.unwrap().error_over_sigma / ratio - 1.0).abs() < 1e-12);
+            assert_relative_eq!(
+                outcome.ends.unwrap().error_over_sigma,
+                ratio,
+                max_relative = 1e-12
+            );
             assess(&weighed(&all), &outcome, &[], None)
                 .findings
                 .into_iter()
@@ -754,11 +747,7 @@ mod assessment_tests {
         };
         assert_eq!(
             [1.3, 1.5, 2.5].map(|ratio| verdict(ratio).map(|(kind, _)| kind)),
-            [
-                None,
-                Some(VerdictKind::Overconfident),
-                Some(VerdictKind::Overconfident)
-            ]
+            [None, Some(Overconfident), Some(Overconfident)]
         );
     }
 
@@ -784,12 +773,9 @@ mod assessment_tests {
             (lag_1 - (1.0 - 2.0 * 29.0 / 599.0)).abs() < 1e-12 && pos_sigma_factor == 1.0,
             "{found:?}"
         );
-        assert_eq!(found.verdict, VerdictKind::Doubtful);
+        assert_eq!(found.verdict, Doubtful);
         assert!(
-            !found
-                .findings
-                .iter()
-                .any(|(kind, _)| *kind == VerdictKind::Undecided),
+            !found.findings.iter().any(|(kind, _)| *kind == Undecided),
             "{found:?}"
         );
         let answered = WeightedSolution {
@@ -797,7 +783,7 @@ mod assessment_tests {
             ..weighed(&all)
         };
         let found = assess(&answered, &outcome(&all, &[]), &[], None);
-        assert_eq!(found.verdict, VerdictKind::Undecided);
+        assert_eq!(found.verdict, Undecided);
     }
 
     /// Errors of 1.0, 1.4 and 0.7 times the stated at the ends of twelve windows decide; of two windows with six components, χ²
@@ -814,17 +800,19 @@ mod assessment_tests {
             };
             assess(&weighed(&all), &outcome(&all, &[]), &[], Some(withheld)).verdict
         };
-        let judged = |ratio, windows| judged_at(1.0, ratio, windows);
-        assert_eq!(
-            [1.0, 1.4, 0.7].map(|ratio| judged(ratio, 12)),
-            [
-                VerdictKind::Consistent,
-                VerdictKind::Overconfident,
-                VerdictKind::Underconfident
-            ]
-        );
-        assert_eq!(judged(1.4, 2), VerdictKind::Undecided);
-        assert_eq!(judged_at(0.3, 1.0, 12), VerdictKind::Undecided);
+        for (nis, ratio, windows, expected) in [
+            (1.0, 1.0, 12, Consistent),
+            (1.0, 1.4, 12, Overconfident),
+            (1.0, 0.7, 12, Underconfident),
+            (1.0, 1.4, 2, Undecided),
+            (0.3, 1.0, 12, Undecided),
+        ] {
+            assert_eq!(
+                judged_at(nis, ratio, windows),
+                expected,
+                "{nis} {ratio} {windows}"
+            );
+        }
     }
 
     /// What is as believed is doubted once in 500 at most, however few its fixes.

@@ -124,10 +124,11 @@ fn cost(solution: &Solution) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::vehicle_tests::settings;
+    use super::super::vehicle_tests::{settings, start_of, without_aids};
     use super::*;
     use crate::scenario::aiding_tests::{consumer, scenario, town};
-    use crate::sensors::aiding::AidingSettings;
+    use approx::assert_relative_eq;
+
     use crate::sensors::imu::Truth;
     use crate::simulation::{Plan, record};
 
@@ -136,7 +137,7 @@ mod tests {
     /// Where the noise is the model's, motion proposes nothing; the fixes decide for the right one of two beliefs.
     #[test]
     fn noise_of_the_recording_is_found_and_told_from_motion() {
-        let (trajectory, model, plain) = (town(), consumer(), scenario(AidingSettings::default()));
+        let (trajectory, model, plain) = (town(), consumer(), scenario(""));
         let with_white = |times: f64| {
             let mut model = model.clone();
             for axis in &mut model.axes {
@@ -160,17 +161,7 @@ mod tests {
                 let off = noise.times_model / times.sqrt() - 1.0;
                 assert!(off.abs() < 0.1, "{noise:?}");
             }
-            let start = Start {
-                t_s: 0.0,
-                state: recording.start,
-                sigma: plain.initial.clone(),
-                found: None,
-            };
-            let recorded = Recorded {
-                imu: &recording.imu,
-                gnss: &recording.gnss,
-                aids: &[],
-            };
+            let (recorded, start) = (without_aids(&recording), start_of(&recording));
             let as_well = predicts_as_well(&recorded, [&larger, &stated], &start, &settings());
             assert_eq!(as_well, found == 2, "{times}");
         }
@@ -185,10 +176,10 @@ mod tests {
             (stated(&white, 1.0) - 2.0).abs() < 1e-9 && (stated(&white, 0.1) - 2.0).abs() < 1e-9
         );
         let fast = Composite::new(vec![Process::ar1(0.5, 1.0).unwrap()]);
-        assert!((stated(&fast, 0.01) / 4.0 - 1.0).abs() < 0.01);
+        assert_relative_eq!(stated(&fast, 0.01), 4.0, max_relative = 0.01);
         // the autocovariances of an AR1, φ^k/(1 − φ²), under the fourth difference
         let weights = [70.0, 2.0 * -56.0, 2.0 * 28.0, 2.0 * -8.0, 2.0];
         let sum: f64 = (0..5).map(|k| weights[k as usize] * 0.5_f64.powi(k)).sum();
-        assert!((stated(&fast, 1.0) / (sum / 0.75 / 70.0) - 1.0).abs() < 1e-9);
+        assert_relative_eq!(stated(&fast, 1.0), sum / 0.75 / 70.0, max_relative = 1e-9);
     }
 }

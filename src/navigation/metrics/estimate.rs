@@ -536,35 +536,23 @@ impl QuadraticForm {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
 
     #[test]
     fn mean_and_root_mean_square_of_a_known_sample() {
         // 1, 2, 3, 6: mean 3, sample variance 14/3
         let mean = Estimate::mean_of([1.0, 2.0, 3.0, 6.0].into_iter(), None);
         assert_eq!(mean.value, 3.0);
-        assert!((mean.std_error - (14.0_f64 / 12.0).sqrt()).abs() < 1e-15);
+        assert_abs_diff_eq!(mean.std_error, (14.0_f64 / 12.0).sqrt(), epsilon = 1e-15);
         // squares 1, 4, 9, 36: mean 12.5, sample variance 769/3
         let rms =
             Estimate::mean_of([1.0_f64, -2.0, 3.0, -6.0].into_iter().map(|x| x * x), None).root();
-        assert!((rms.value - 12.5_f64.sqrt()).abs() < 1e-15);
+        assert_abs_diff_eq!(rms.value, 12.5_f64.sqrt(), epsilon = 1e-15);
         let expected = (769.0_f64 / 12.0).sqrt() / (2.0 * 12.5_f64.sqrt());
-        assert!(
-            (rms.std_error - expected).abs() < 1e-14,
-            "{} {expected}",
-            rms.std_error
-        );
+        assert_abs_diff_eq!(rms.std_error, expected, epsilon = 1e-14);
     }
 
-    #[test]
-    fn one_run_has_no_standard_error() {
-        assert!(
-            Estimate::mean_of([2.0].into_iter(), None)
-                .std_error
-                .is_nan()
-        );
-    }
-
-    /// Every value twice: the mean of half as many independent ones, its standard error theirs.
+    /// Every value twice: the mean of half as many independent ones, its standard error theirs; one value has none.
     #[test]
     fn values_that_repeat_each_other_count_once() {
         let once = [1.0, 2.0, 3.0, 6.0];
@@ -579,11 +567,11 @@ mod tests {
             quantile_interval(&doubled, 0.5, Some(100.0)),
             quantile_interval(&sorted, 0.5, None)
         );
-        assert!(
-            Estimate::mean_of(once.into_iter(), Some(1.0))
-                .std_error
-                .is_nan()
-        );
+        let one = [
+            Estimate::mean_of(once.into_iter(), Some(1.0)),
+            Estimate::mean_of([2.0].into_iter(), None),
+        ];
+        assert!(one.iter().all(|one| one.std_error.is_nan()));
     }
 
     /// The interval's bounds for n = 100: for the median the 40th and 61st values (96.5 % together), for
@@ -591,17 +579,13 @@ mod tests {
     #[test]
     fn quantiles_lie_between_order_statistics() {
         let sorted: Vec<f64> = (1..=100).map(f64::from).collect();
-        let (median, ci95) = (
-            sample_quantile(&sorted, 0.5),
-            quantile_interval(&sorted, 0.5, None),
-        );
-        assert_eq!((median, ci95), (50.5, (Some(40.0), Some(61.0))));
-        let (high, high_ci95) = (
-            sample_quantile(&sorted, 0.95),
-            quantile_interval(&sorted, 0.95, None),
-        );
-        assert!((high - 95.05).abs() < 1e-12);
-        assert_eq!(high_ci95, (Some(90.0), Some(100.0)));
+        for (p, value, ci95) in [(0.5, 50.5, (40.0, 61.0)), (0.95, 95.05, (90.0, 100.0))] {
+            assert_abs_diff_eq!(sample_quantile(&sorted, p), value, epsilon = 1e-12);
+            assert_eq!(
+                quantile_interval(&sorted, p, None),
+                (Some(ci95.0), Some(ci95.1))
+            );
+        }
     }
 
     #[test]
@@ -626,21 +610,16 @@ mod tests {
 #[cfg(test)]
 mod consistency_tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
 
     /// Quantiles from tables: χ²(9): 2.7004, 19.0228; χ²(900): 818.756, 985.032.
     #[test]
     fn chi_square_bands_agree_with_tables() {
-        let one = chi_square_band(9, 1.0);
-        assert!(
-            (one.lower - 2.700_39).abs() < 1e-5 && (one.upper - 19.022_77).abs() < 1e-5,
-            "{one:?}"
-        );
-        let hundred = chi_square_band(9, 100.0);
-        let (lower, upper) = (8.187_56, 9.850_32);
-        assert!(
-            (hundred.lower - lower).abs() < 1e-4 && (hundred.upper - upper).abs() < 1e-4,
-            "{hundred:?}"
-        );
+        for (n, lower, upper) in [(1.0, 2.700_39, 19.022_77), (100.0, 8.187_56, 9.850_32)] {
+            let band = chi_square_band(9, n);
+            assert_abs_diff_eq!(band.lower, lower, epsilon = 1e-5);
+            assert_abs_diff_eq!(band.upper, upper, epsilon = 1e-5);
+        }
     }
 
     #[test]
@@ -669,8 +648,8 @@ mod consistency_tests {
 #[cfg(test)]
 mod quadratic_form_tests {
     use super::*;
-    use crate::rng::StreamKey;
-    use rand_distr::{Distribution, StandardNormal};
+    use crate::tests::normals;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
     use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
     fn form_of(terms: impl IntoIterator<Item = (f64, f64)>) -> QuadraticForm {
@@ -710,11 +689,7 @@ mod quadratic_form_tests {
         for x in [1e-3, 0.1, 1.0, 10.0, 60.0] {
             let beyond = |w: f64| w * (-0.5 * x / w).exp();
             let expected = 1.0 - (beyond(a) - beyond(b)) / (a - b);
-            assert!(
-                (form.cdf(x) - expected).abs() < 1e-12,
-                "{x}: {} {expected}",
-                form.cdf(x)
-            );
+            assert_abs_diff_eq!(form.cdf(x), expected, epsilon = 1e-12);
         }
     }
 
@@ -757,43 +732,22 @@ mod quadratic_form_tests {
             (0.004, 0.0),
         ];
         let form = form_of(terms);
-        let mut rng = StreamKey {
-            seed: 3,
-            scenario: "",
-            run: 0,
-            source: "form",
-            process: "t",
-        }
-        .generator();
-        let mut draw = || -> f64 {
-            terms
-                .iter()
-                .map(|(w, d)| {
-                    w * {
-                        let z: f64 = StandardNormal.sample(&mut rng);
-                        z + d
-                    }
-                    .powi(2)
-                })
-                .sum()
-        };
+        let mut normal = normals(3);
+        let mut draw = || terms.iter().map(|(w, d)| w * (normal() + d).powi(2)).sum();
         let n = 1_000_000;
         let draws: Vec<f64> = (0..n).map(|_| draw()).collect();
         for p in [0.01, 0.1, 0.5, 0.9, 0.95, 0.999] {
             let x = form.quantile(p);
             let share = draws.iter().filter(|q| **q <= x).count() as f64 / f64::from(n);
-            assert!(
-                (share - p).abs() < 5.0 * (p * (1.0 - p) / f64::from(n)).sqrt(),
-                "{p}: {share}"
+            assert_abs_diff_eq!(
+                share,
+                p,
+                epsilon = 5.0 * (p * (1.0 - p) / f64::from(n)).sqrt()
             );
         }
         let root = draws.iter().map(|q| q.sqrt()).sum::<f64>() / f64::from(n);
         let error = ((form.mean() - root * root) / f64::from(n)).sqrt();
-        assert!(
-            (root - form.mean_root()).abs() < 5.0 * error,
-            "{root} {}",
-            form.mean_root()
-        );
+        assert_abs_diff_eq!(root, form.mean_root(), epsilon = 5.0 * error);
     }
 
     #[test]
@@ -809,11 +763,7 @@ mod quadratic_form_tests {
             (sure.cdf(24.9), sure.cdf(25.1), sure.quantile(0.5)),
             (0.0, 1.0, 25.0)
         );
-        assert!(
-            (sure.mean_root() / 5.0 - 1.0).abs() < 1e-8,
-            "{}",
-            sure.mean_root()
-        );
+        assert_relative_eq!(sure.mean_root(), 5.0, max_relative = 1e-8);
         // z² beside a certain 4: χ² of one degree of freedom from there on
         let mut half = DMatrix::zeros(2, 2);
         half[(0, 0)] = 1.0;

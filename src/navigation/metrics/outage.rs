@@ -251,6 +251,7 @@ impl Serialize for Budget {
 mod tests {
     use super::*;
     use crate::simulation::{EpochSums, RunRecord};
+    use approx::assert_abs_diff_eq;
 
     fn run(run: u64, value: f64, diverged: bool) -> RunRecord {
         let record = OutageRecord {
@@ -286,20 +287,16 @@ mod tests {
         };
         let metrics = &outages(&result, &[])[0];
         assert_eq!(metrics.asee_mean.0[1], 3.0);
-        assert!((metrics.rmse_end.0[4] - (35.0_f64 / 3.0).sqrt()).abs() < 1e-15);
+        assert_abs_diff_eq!(
+            metrics.rmse_end.0[4],
+            (35.0_f64 / 3.0).sqrt(),
+            epsilon = 1e-15
+        );
         assert_eq!((metrics.asee_end.0[1], metrics.nees_end), (6.0, 27.0));
         assert_eq!(metrics.log_density_end, -3.0);
-        assert_eq!(
-            (
-                metrics.horizontal_error_end_m.p50,
-                metrics.horizontal_error_end_m.max
-            ),
-            (3.0, 5.0)
-        );
-        assert_eq!(
-            (metrics.reconvergence_s.p50, metrics.reconvergence_s.never),
-            (2.0, Some(1))
-        );
+        let (horizontal, back) = (&metrics.horizontal_error_end_m, &metrics.reconvergence_s);
+        assert_eq!((horizontal.p50, horizontal.max), (3.0, 5.0));
+        assert_eq!((back.p50, back.never), (2.0, Some(1)));
     }
 
     /// Two tilts of 1° that stand still for 100 s: g·(1°)²·100 s = 0.2987 m/s, against 0.3 of a standard deviation.
@@ -344,6 +341,7 @@ mod tests {
 mod epoch_tests {
     use super::*;
     use crate::simulation::REPORTED;
+    use approx::assert_abs_diff_eq;
 
     /// Two runs of SEE 1 and 3, errors 1 and −7: ASEE is the mean 2 (not the root mean square √5), its standard
     /// error √2/√2; RMSE √25, bias −3; NEES 8 and 12.
@@ -362,6 +360,7 @@ mod epoch_tests {
         }
     }
 
+    /// The accuracy of a run is the mean of its epochs.
     #[test]
     fn an_epoch_of_two_runs_in_closed_form() {
         let e = EpochMetrics::of(&two_runs(), None);
@@ -369,30 +368,20 @@ mod epoch_tests {
             (e.asee.0[3].value, e.rmse.0[3].value, e.bias.0[3].value),
             (2.0, 5.0, -3.0)
         );
-        assert!((e.asee.0[3].std_error - 1.0).abs() < 1e-15);
+        assert_abs_diff_eq!(e.asee.0[3].std_error, 1.0, epsilon = 1e-15);
         assert_eq!(e.bias_asee, [0.25; BIASES]);
         // squares 1 and 49: standard deviation 24 √2, of their mean 24, of its root 24/(2·5)
-        assert!(
-            (e.rmse.0[3].std_error - 2.4).abs() < 1e-14,
-            "{:?}",
-            e.rmse.0[3]
-        );
+        assert_abs_diff_eq!(e.rmse.0[3].std_error, 2.4, epsilon = 1e-14);
         assert_eq!(
             (e.nees.value, e.nees.std_error, e.coverage),
             (10.0, 2.0, 0.5)
         );
-    }
-
-    #[test]
-    fn accuracy_is_the_mean_of_standard_deviations() {
-        let mut later = two_runs();
-        later.see = [12.0; REPORTED];
-        later.error_sq = [2.0 * 81.0; REPORTED];
-        let all = [
-            EpochMetrics::of(&two_runs(), None),
-            EpochMetrics::of(&later, None),
-        ];
-        let accuracy = AccuracySummary::over(all.iter());
+        let later = EpochSums {
+            see: [12.0; REPORTED],
+            error_sq: [2.0 * 81.0; REPORTED],
+            ..two_runs()
+        };
+        let accuracy = AccuracySummary::over([e, EpochMetrics::of(&later, None)].iter());
         assert_eq!(
             (accuracy.asee_mean.0[0], accuracy.rmse_mean.0[8]),
             (4.0, 7.0)

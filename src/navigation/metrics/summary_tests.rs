@@ -1,20 +1,13 @@
 use super::*;
 use crate::metrics::{Requirement, VerdictKind};
-use crate::rng::StreamKey;
+
 use crate::simulation::{EpochSums, OutageRecord, RunRecord};
-use rand_distr::{Distribution, StandardNormal};
+use crate::tests::normals;
+use approx::assert_abs_diff_eq;
 
 /// Runs of a filter that is right by construction: errors drawn from its own covariance (identity).
 fn matched(runs: u64, epochs: usize) -> RunResult {
-    let mut rng = StreamKey {
-        seed: 11,
-        scenario: "",
-        run: 0,
-        source: "summary",
-        process: "t",
-    }
-    .generator();
-    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let mut normal = normals(11);
     let mut sums = Vec::new();
     for t in 0..epochs {
         let mut s = EpochSums {
@@ -63,58 +56,37 @@ fn matched(runs: u64, epochs: usize) -> RunResult {
     }
 }
 
+fn summary_of(result: &RunResult) -> Summary {
+    Summary::of(result, &super::super::epochs(result), 7)
+}
+
 /// Over 2000 independent epochs 95 % of the NEES means lie in their band, within 5 standard deviations of
 /// a binomial share, 5 √(0.05·0.95/2000) = 0.0244. The band of the coverage is discrete: for 50 runs its
 /// probability is 98.3 % (44 to 50 of 50, and 50 cannot be exceeded).
 #[test]
-fn a_correct_filter_is_found_correct() {
-    let result = matched(50, 2000);
-    let epochs = super::super::epochs(&result);
-    let summary = Summary::of(&result, &epochs, 7);
-    assert!(
-        (summary.nees.fraction_inside - 0.95).abs() < 0.0244,
-        "{:?}",
-        summary.nees
+fn a_correct_filter_is_found_correct_and_one_off_by_a_quarter_is_not() {
+    let mut result = matched(50, 2000);
+    let Summary { nees, coverage, .. } = summary_of(&result);
+    assert_abs_diff_eq!(nees.fraction_inside, 0.95, epsilon = 0.0244);
+    assert_abs_diff_eq!(nees.mean, 9.0, epsilon = 5.0 * (18.0_f64 / 1e5).sqrt());
+    assert!(coverage.fraction_inside > 0.95, "{coverage:?}");
+    assert_abs_diff_eq!(
+        coverage.mean,
+        0.95,
+        epsilon = 5.0 * (0.0475_f64 / 1e5).sqrt()
     );
-    assert!(
-        (summary.nees.mean - 9.0).abs() < 5.0 * (18.0_f64 / 1e5).sqrt(),
-        "{:?}",
-        summary.nees
-    );
-    assert!(
-        summary.coverage.fraction_inside > 0.95,
-        "{:?}",
-        summary.coverage
-    );
-    assert!(
-        (summary.coverage.mean - 0.95).abs() < 5.0 * (0.0475_f64 / 1e5).sqrt(),
-        "{:?}",
-        summary.coverage
-    );
-    let rmse = epochs[0].rmse.0[0];
-    // sd of a mean square of 50 standard normals: √(2/50); of its root half of that
-    assert!(
-        (rmse.std_error - 0.1).abs() < 0.05 && (rmse.value - 1.0).abs() < 0.5,
-        "{rmse:?}"
-    );
-}
-
-#[test]
-fn a_filter_off_by_a_quarter_is_found_out() {
-    let mut result = matched(100, 200);
     for s in &mut result.epochs {
         s.nees = s.nees.map(|n| n * 1.25);
     }
-    let epochs = super::super::epochs(&result);
-    assert!(Summary::of(&result, &epochs, 7).nees.fraction_inside < 0.2);
+    // the mean is at 11.25 ± 0.75, the band ends at 10.2: 0.1 by the normal law
+    assert!(summary_of(&result).nees.fraction_inside < 0.2);
 }
 
 #[test]
 fn the_file_has_the_keys_of_the_interface() {
     let mut result = matched(4, 6);
     result.runs[2].diverged = true;
-    let summary = Summary::of(&result, &super::super::epochs(&result), 7);
-    let json = serde_json::to_value(&summary).unwrap();
+    let json = serde_json::to_value(summary_of(&result)).unwrap();
     for pointer in [
         "/outages/0/start_s",
         "/outages/0/asee_mean/pos_e_m",
@@ -157,8 +129,7 @@ fn nothing_left_is_null_not_a_crash() {
             ..EpochSums::default()
         }
     });
-    let json =
-        serde_json::to_value(Summary::of(&result, &super::super::epochs(&result), 7)).unwrap();
+    let json = serde_json::to_value(summary_of(&result)).unwrap();
     assert!(json["nees"]["mean"].is_null() && json["nees"]["lower95"].is_null());
 }
 
@@ -167,23 +138,24 @@ fn nothing_left_is_null_not_a_crash() {
 fn runs_that_share_their_noise_count_once_in_every_band() {
     let mut copies = matched(16, 20);
     copies.independent_windows = Some(4.0);
-    let summary = Summary::of(&copies, &super::super::epochs(&copies), 7);
-    let four = chi_square_band(9, 4.0);
-    assert_eq!(
-        (summary.nees.lower95, summary.nees.upper95),
-        (four.lower, four.upper)
-    );
-    let four = coverage_band(0.95, 4.0);
-    assert_eq!(
-        (summary.coverage.lower95, summary.coverage.upper95),
-        (four.lower, four.upper)
-    );
-    let four = chi_square_band(6, 40.0);
-    assert_eq!(
-        (summary.nis.lower95, summary.nis.upper95),
-        (four.lower, four.upper)
-    );
-    assert_eq!(summary.independent_runs, 4.0);
+    let Summary {
+        nees,
+        coverage,
+        nis,
+        independent_runs,
+        ..
+    } = summary_of(&copies);
+    for (found, four) in [
+        ((nees.lower95, nees.upper95), chi_square_band(9, 4.0)),
+        (
+            (coverage.lower95, coverage.upper95),
+            coverage_band(0.95, 4.0),
+        ),
+        ((nis.lower95, nis.upper95), chi_square_band(6, 40.0)),
+    ] {
+        assert_eq!(found, (four.lower, four.upper));
+    }
+    assert_eq!(independent_runs, 4.0);
 }
 
 /// Every figure of runs at one standard error above what is expected, one of them at three below. With two independent runs
@@ -191,7 +163,7 @@ fn runs_that_share_their_noise_count_once_in_every_band() {
 #[test]
 fn distances_are_counted_in_standard_errors_and_the_bound_is_students() {
     let result = matched(4, 6);
-    let mut runs = Summary::of(&result, &super::super::epochs(&result), 7);
+    let mut runs = summary_of(&result);
     let expected = runs.clone();
     let above = |expected: f64| (expected + 0.25, 0.25);
     let (verdict, accuracy, outage) = (&mut runs.verdict, &mut runs.accuracy, &mut runs.outages[0]);
@@ -221,7 +193,7 @@ fn distances_are_counted_in_standard_errors_and_the_bound_is_students() {
 #[test]
 fn a_limit_downwards_beyond_linear_theory_is_left_to_the_runs() {
     let result = matched(4, 6);
-    let mut summary = Summary::of(&result, &super::super::epochs(&result), 7);
+    let mut summary = summary_of(&result);
     let outage = &mut summary.outages[0];
     (
         outage.beyond_linear,

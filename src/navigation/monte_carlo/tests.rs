@@ -1,7 +1,7 @@
 //! The whole chain, trajectory to sums, against statistics and against itself on other threads.
 
 use super::*;
-use crate::earth::GravityModel;
+use crate::earth::{self, GravityModel};
 use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings};
 use crate::frames::RollPitchYaw;
 use crate::imu::Channel;
@@ -13,46 +13,39 @@ use crate::sensors::gnss::{BaroSettings, GnssSettings};
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
 use crate::simulation::{Gains, NEES_DOF};
-use crate::trajectory::{Trajectory, TrajectorySample};
+use crate::tests::{assert_chi_square, gauss_markov, key, samples};
+use crate::trajectory::Trajectory;
 use crate::units::DEG;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use approx::assert_relative_eq;
 
 /// A winding drive of the given length, knots at 2 Hz.
 fn trajectory(duration_s: f64) -> Trajectory {
     let (lat, lon) = (46.5 * DEG, 6.6 * DEG);
-    let sample = |k: u32| {
-        let t_s = 0.5 * f64::from(k);
+    let knots = samples((2.0 * duration_s) as u32, 0.5, |t_s| {
         let (north, east) = (12.0 * t_s, 150.0 * (0.05 * t_s).sin());
-        let yaw = (7.5 * (0.05 * t_s).cos()).atan2(12.0);
         let attitude = RollPitchYaw {
             roll: 0.02 * (0.3 * t_s).sin(),
             pitch: 0.03 * (0.1 * t_s).cos(),
-            yaw,
+            yaw: (7.5 * (0.05 * t_s).cos()).atan2(12.0),
         };
-        TrajectorySample {
-            t_s,
-            lat: lat + north / 6.37e6,
-            lon: lon + east / (6.39e6 * lat.cos()),
-            h: 400.0 + 10.0 * (0.02 * t_s).sin(),
-            q_b_n: attitude.to_quat(),
-        }
-    };
-    Trajectory::from_samples(
-        &(0..=(2.0 * duration_s) as u32)
-            .map(sample)
-            .collect::<Vec<_>>(),
-    )
-    .unwrap()
+        (
+            lat + north / 6.37e6,
+            lon + east / (6.39e6 * lat.cos()),
+            400.0 + 10.0 * (0.02 * t_s).sin(),
+            attitude.to_quat(),
+        )
+    });
+    Trajectory::from_samples(&knots).unwrap()
 }
 
 /// White noise and one Gauss-Markov bias an axis: the 15-state filter's own model.
 fn model(scale: f64) -> Model {
-    let axis = |white: f64, deviation: f64, t_corr_s: f64| {
-        let phi = (-0.01 / t_corr_s).exp();
-        let bias = Process::ar1(phi, scale * deviation * deviation * (1.0 - phi * phi)).unwrap();
-        Composite::new(vec![Process::white(white).unwrap(), bias])
-    };
-    Model::pooled(100.0, &axis(4e-5, 0.02, 200.0), &axis(1e-6, 2e-4, 300.0))
+    let sigma = [0.02, 2e-4].map(|sigma| sigma * f64::sqrt(scale));
+    gauss_markov(100.0, [4e-5, 1e-6], sigma, [200.0, 300.0])
+}
+
+fn outage(start_s: f64, end_s: f64) -> Outage {
+    Outage { start_s, end_s }
 }
 
 struct Setting {
@@ -80,10 +73,7 @@ impl Setting {
             beliefs: belief_scales.iter().map(belief).collect(),
             gnss: GnssSettings::default(),
             initial: InitialSettings::default(),
-            outages: vec![Outage {
-                start_s: 20.0,
-                end_s: 40.0,
-            }],
+            outages: vec![outage(20.0, 40.0)],
             seed: 3,
             defects: ImuSettings::default(),
             baro: None,
@@ -157,10 +147,7 @@ fn the_iterated_update_is_more_consistent_after_a_long_outage() {
     const PAIRS: u64 = 384;
     let mut setting = Setting::new(460.0, &[1.0]);
     setting.seed = 5;
-    setting.outages = vec![Outage {
-        start_s: 60.0,
-        end_s: 360.0,
-    }];
+    setting.outages = vec![outage(60.0, 360.0)];
     let once = setting.run(PAIRS);
     setting.update = FixUpdate::Iterated;
     let iterated = setting.run(PAIRS);
@@ -182,7 +169,7 @@ fn the_iterated_update_is_more_consistent_after_a_long_outage() {
             .sum::<f64>()
             / pairs
     };
-    assert!((end(&once[0]) / end(&iterated[0]) - 1.0).abs() < 0.01);
+    assert_relative_eq!(end(&once[0]), end(&iterated[0]), max_relative = 0.01);
 }
 
 /// Outages change which fixes are used and no random number: before the outage nothing differs.
@@ -200,78 +187,61 @@ fn outages_leave_the_past_alone() {
     assert!(with[0].epochs[30].error_sq[0] > without[0].epochs[30].error_sq[0]);
 }
 
-/// Truth and belief are the same model, 200 runs: at times 100 s apart (the errors' memory is some tens of
-/// seconds with fixes) Σ NEES over runs is chi-square with 9·200 degrees of freedom, the runs inside the
-/// 95 % ellipsoid binomial. Both must lie inside 99.9 % intervals, corrected for the number of looks
-/// (Bonferroni). A filter whose bias variance is wrong by 4 must not.
 #[test]
 fn matched_models_are_consistent_and_mismatched_ones_are_not() {
     let runs = 200_u64;
     let setting = Setting::new(400.0, &[1.0, 0.25]);
     let results = setting.run(runs);
     let looks = [41_usize, 100, 200, 300, 400];
-    let chi2 = ChiSquared::new((NEES_DOF as u64 * runs) as f64).unwrap();
-    let alpha = 1e-3 / (2.0 * looks.len() as f64);
-    let (low, high) = (
-        chi2.inverse_cdf(alpha / 2.0),
-        chi2.inverse_cdf(1.0 - alpha / 2.0),
-    );
+    assert_consistent(&results[0], &looks, runs as f64);
     for look in looks {
         let epoch = &results[0].epochs[look];
         assert_eq!(epoch.count, runs);
-        let nees = epoch.nees[0];
-        assert!(
-            (low..high).contains(&nees),
-            "NEES {nees} at {} s not in {low}..{high}",
-            epoch.t_s
-        );
-        // binomial(200, 0.05) misses: P(> 24) = 3.0e-5 and P(< 1) = 3.5e-5, both below alpha/2 = 5e-5
+        // binomial(200, 0.05) misses: P(> 24) = 3.0e-5 and P(< 1) = 3.5e-5, of five looks 3e-4
         let missed = runs - epoch.covered;
         assert!(
             (1..=24).contains(&missed),
             "{missed} of {runs} outside the 95 % ellipsoid"
         );
     }
-    let nis: f64 = results[0]
-        .runs
-        .iter()
-        .map(|r| r.nis.0 * r.nis.1 as f64)
-        .sum();
-    let fixes: u64 = results[0].runs.iter().map(|r| r.nis.1).sum();
-    // Σ NIS is chi-square with 6·fixes degrees of freedom (innovations are white): ±4.4 deviations
-    let deviations = (nis - 6.0 * fixes as f64) / (12.0 * fixes as f64).sqrt();
-    assert!(
-        deviations.abs() < 4.4,
-        "NIS off by {deviations} standard deviations"
+    let nis = |of: fn(&RunRecord) -> f64| results[0].runs.iter().map(of).sum::<f64>();
+    // Σ NIS is chi-square with 6·fixes degrees of freedom: innovations are white
+    assert_chi_square(
+        nis(|r| r.nis.0 * r.nis.1 as f64),
+        nis(|r| 6.0 * r.nis.1 as f64),
+        1e-5,
     );
-    let end_of_outage = results[1].epochs[39].nees[0];
+    let end_of_outage = results[1].epochs[39].nees[0] / runs as f64;
+    // 9 ± 4.9 deviations √(18/200) of the mean of a right filter
     assert!(
-        end_of_outage > high,
-        "a wrong model must show: NEES {end_of_outage}, bound {high}"
+        end_of_outage > 10.5,
+        "a wrong model must show: {end_of_outage}"
     );
+}
+
+/// The sum of the NEES over the runs of a matched experiment, which are worth so many independent ones, is chi-square at every
+/// look (99.9 % in all).
+fn assert_consistent(result: &RunResult, looks: &[usize], independent: f64) {
+    for look in looks {
+        let epoch = &result.epochs[*look];
+        assert_chi_square(
+            epoch.nees[0] * independent / epoch.count as f64,
+            NEES_DOF as f64 * independent,
+            1e-3 / looks.len() as f64,
+        );
+    }
 }
 
 /// An acceleration (m/s²) along x and east for 20 s without a fix, of an IMU without noise.
 fn dragster(a: f64, defects: ImuSettings) -> Setting {
-    let straight = |k: u32| {
-        let t_s = 0.25 * f64::from(k);
-        let q_b_n = RollPitchYaw {
-            roll: 0.0,
-            pitch: 0.0,
-            yaw: 90.0 * DEG,
-        }
-        .to_quat();
-        TrajectorySample {
-            t_s,
-            lat: 0.0,
-            lon: 0.5 * a * t_s * t_s / crate::earth::A,
-            h: 0.0,
-            q_b_n,
-        }
+    let east = RollPitchYaw {
+        roll: 0.0,
+        pitch: 0.0,
+        yaw: 90.0 * DEG,
     };
-    let samples: Vec<_> = (0..=80).map(straight).collect();
+    let straight = |t_s| (0.0, 0.5 * a * t_s * t_s / earth::A, 0.0, east.to_quat());
     Setting {
-        trajectory: Trajectory::from_samples(&samples).unwrap(),
+        trajectory: Trajectory::from_samples(&samples(80, 0.25, straight)).unwrap(),
         model: Model {
             rate_hz: 100.0,
             axes: Default::default(),
@@ -280,10 +250,7 @@ fn dragster(a: f64, defects: ImuSettings) -> Setting {
             perfect: true,
             ..InitialSettings::default()
         },
-        outages: vec![Outage {
-            start_s: 0.0,
-            end_s: 100.0,
-        }],
+        outages: vec![outage(0.0, 100.0)],
         defects,
         ..Setting::new(30.0, &[1.0])
     }
@@ -303,16 +270,13 @@ fn bias_and_scale_factor_of_the_true_imu_act_as_in_closed_form() {
     };
     for run in &dragster(a, defects.clone()).run(20)[0].runs {
         let key = StreamKey {
-            seed: 3,
-            scenario: "",
             run: run.run,
-            source: "",
-            process: "",
+            ..key(3)
         };
         let drawn = Defects::draw(&defects, key);
         let along = (drawn.bias[0].x + drawn.matrix[0].x_axis.x * a) * seconds;
-        let down = drawn.bias[0].z - drawn.matrix[0].z_axis.z * crate::earth::GRAVITY_EQUATOR;
-        let coriolis = crate::earth::OMEGA_IE * down * seconds * seconds;
+        let down = drawn.bias[0].z - drawn.matrix[0].z_axis.z * earth::GRAVITY_EQUATOR;
+        let coriolis = earth::OMEGA_IE * down * seconds * seconds;
         let (found, bound) = (
             run.outages[0].error_end[4],
             3e-4 * along.abs() + 0.1 * coriolis.abs(),
@@ -326,33 +290,13 @@ fn bias_and_scale_factor_of_the_true_imu_act_as_in_closed_form() {
     }
 }
 
-/// The sum of the NEES over the runs of a matched experiment is chi-square at every look (99.9 % in all).
-fn assert_consistent(result: &RunResult, runs: u64, looks: &[usize]) {
-    let chi2 = ChiSquared::new((NEES_DOF as u64 * runs) as f64).unwrap();
-    let alpha = 1e-3 / looks.len() as f64;
-    let (low, high) = (
-        chi2.inverse_cdf(alpha / 2.0),
-        chi2.inverse_cdf(1.0 - alpha / 2.0),
-    );
-    for look in looks {
-        let nees = result.epochs[*look].nees[0];
-        assert!(
-            (low..high).contains(&nees),
-            "NEES {nees} at {look} s not in {low}..{high}"
-        );
-    }
-}
-
 /// A barometer of 0.5 m holds the height through an outage that costs metres without it, and the filter
 /// stays as sure as it should.
 #[test]
 fn a_barometer_holds_the_height() {
     let runs = 104;
     let mut setting = Setting::new(80.0, &[1.0]);
-    setting.outages = vec![Outage {
-        start_s: 20.0,
-        end_s: 60.0,
-    }];
+    setting.outages = vec![outage(20.0, 60.0)];
     let without = setting.run(8);
     setting.baro = Some(BaroSettings {
         rate_hz: 2.0,
@@ -361,7 +305,7 @@ fn a_barometer_holds_the_height() {
     let with = setting.run(runs);
     let down = |r: &RunResult, runs: u64| r.epochs[59].see[2] / runs as f64;
     assert!(down(&with[0], runs) < 0.4 && down(&without[0], 8) > 2.0);
-    assert_consistent(&with[0], runs, &[10, 30, 59, 75]);
+    assert_consistent(&with[0], &[10, 30, 59, 75], runs as f64);
 }
 
 /// Sums over runs are those of the runs one by one, in every field: 11 runs are two batches.
@@ -423,7 +367,7 @@ fn records_agree_with_the_epochs_of_their_run() {
         let mean = |value: &dyn Fn(&EpochSums) -> f64, of: &[EpochSums]| {
             of.iter().map(value).sum::<f64>() / of.len() as f64
         };
-        let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-12, "run {k}: {a} {b}");
+        let near = |a: f64, b: f64| assert_relative_eq!(a, b, max_relative = 1e-12);
         let outage = &record.outages[0];
         near(record.nees_mean, mean(&|e| e.nees[0], epochs));
         near(record.covered, mean(&|e| e.covered as f64, epochs));
@@ -464,10 +408,7 @@ fn records_agree_with_the_epochs_of_their_run() {
 #[test]
 fn an_outage_that_outlasts_the_trajectory_ends_with_it() {
     let mut setting = Setting::new(30.0, &[1.0]);
-    setting.outages = vec![Outage {
-        start_s: 20.0,
-        end_s: 31.0,
-    }];
+    setting.outages = vec![outage(20.0, 31.0)];
     let result = &setting.run(1)[0];
     let (last, outage) = (&result.epochs[30], &result.runs[0].outages[0]);
     assert_eq!(
@@ -503,20 +444,7 @@ fn windows_of_recordings_leave_the_matched_filter_consistent() {
     };
     let result = &run(&experiment, 160, &|_| {}).unwrap()[0];
     assert_eq!(result.independent_windows, Some(80.0));
-    let looks = [5, 20, 39, 60];
-    let chi2 = ChiSquared::new(NEES_DOF as f64 * 80.0).unwrap();
-    let alpha = 1e-3 / looks.len() as f64;
-    let (low, high) = (
-        chi2.inverse_cdf(alpha / 2.0) / 80.0,
-        chi2.inverse_cdf(1.0 - alpha / 2.0) / 80.0,
-    );
-    for look in looks {
-        let nees = result.epochs[look].nees[0] / 160.0;
-        assert!(
-            (low..high).contains(&nees),
-            "NEES {nees} at {look} s not in {low}..{high}"
-        );
-    }
+    assert_consistent(result, &[5, 20, 39, 60], 80.0);
 }
 
 /// At the end of an outage, on the same noise: the errors of runs hang on the gains by far less than they scatter.

@@ -188,7 +188,7 @@ pub struct BaroSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sensors::check_bounds;
+    use crate::tests::key;
 
     #[test]
     fn velocity_may_be_none_and_survives_a_round_trip() {
@@ -216,14 +216,7 @@ mod tests {
             correlation_time_s: 20.0,
             ..GnssSettings::default()
         };
-        let key = StreamKey {
-            seed: 4,
-            scenario: "",
-            run: 0,
-            source: "",
-            process: "",
-        };
-        let mut noise = GnssNoise::new(&settings, key);
+        let mut noise = GnssNoise::new(&settings, key(4));
         let n = 400_000;
         let errors: Vec<DVec3> = (0..n).map(|_| noise.draw().0).collect();
         let phi = (-1.0_f64 / 20.0).exp();
@@ -240,32 +233,5 @@ mod tests {
                 );
             }
         }
-    }
-
-    #[test]
-    fn impossible_values_are_refused_by_key() {
-        let cases = [
-            GnssSettings {
-                rate_hz: 0.0,
-                ..GnssSettings::default()
-            },
-            GnssSettings {
-                pos_sigma_m: [2.0, f64::NAN, 4.0],
-                ..GnssSettings::default()
-            },
-            GnssSettings {
-                vel_sigma_m_s: Some([0.1, 0.0, 0.1]),
-                ..GnssSettings::default()
-            },
-            GnssSettings {
-                lever_arm_m: [0.0, f64::INFINITY, 0.0],
-                ..GnssSettings::default()
-            },
-        ];
-        let keys = ["rate_hz", "pos_sigma_m", "vel_sigma_m_s", "lever_arm_m"];
-        for (settings, key) in cases.iter().zip(keys) {
-            assert_eq!(check_bounds(&settings).unwrap_err().key, key);
-        }
-        assert_eq!(check_bounds(&GnssSettings::default()), Ok(()));
     }
 }

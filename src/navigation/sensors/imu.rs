@@ -316,13 +316,15 @@ fn level_at(signal: &[f64], start: usize, span: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::imu::Signal;
+    use crate::tests::{key, normals};
 
-    fn recording(rate_hz: f64, samples: usize) -> Recording {
+    fn recording(samples: &[f64], rate_hz: f64) -> Recording {
         let signal = |channel: Channel| Signal {
             channel,
             mean: 0.0,
-            samples: (0..samples)
-                .map(|k| k as f64 + 1000.0 * channel.index() as f64)
+            samples: samples
+                .iter()
+                .map(|x| x + 1000.0 * channel.index() as f64)
                 .collect(),
         };
         Recording {
@@ -332,24 +334,22 @@ mod tests {
         }
     }
 
-    const KEY: StreamKey<'_> = StreamKey {
-        seed: 5,
-        scenario: "",
-        run: 0,
-        source: "",
-        process: "",
-    };
+    fn run(run: u64) -> StreamKey<'static> {
+        StreamKey { run, ..key(5) }
+    }
 
     #[test]
     fn windows_keep_the_axes_together_and_reach_both_ends() {
-        let recordings = [recording(100.0, 12)];
+        let recordings = [recording(
+            &std::array::from_fn::<_, 12, _>(|k| k as f64),
+            100.0,
+        )];
         let mut starts = std::collections::BTreeSet::new();
         let truth = Truth::Static(&recordings);
         truth.check(100.0, 10).unwrap();
         let spans = best_spans(&truth);
-        for run in 0..200 {
-            let key = StreamKey { run, ..KEY };
-            let mut errors = LaneErrors::new(&truth, &spans, &[key], 10);
+        for k in 0..200 {
+            let mut errors = LaneErrors::new(&truth, &spans, &[run(k)], 10);
             let drawn = errors.next(4);
             let start = drawn[0][0][0][0];
             for channel in Channel::ALL {
@@ -366,83 +366,50 @@ mod tests {
 
     #[test]
     fn unusable_recordings_are_refused_with_their_name_and_by_how_much() {
-        let refused = |r: Recording| {
-            Truth::Static(&[r])
-                .check(100.0, 500)
-                .unwrap_err()
-                .to_string()
-        };
-        assert_eq!(
-            refused(recording(100.0, 300)),
-            "r.csv lasts 3 s, the trajectory 5 s: 2 s too short"
-        );
-        assert_eq!(
-            refused(recording(50.0, 600)),
-            "r.csv was sampled at 50 Hz, the simulated IMU at 100 Hz"
-        );
-        let mut partial = recording(100.0, 600);
+        let mut partial = recording(&[0.0; 600], 100.0);
         partial.signals.remove(4);
-        assert_eq!(
-            refused(partial),
-            "r.csv: no channel gyro.y; all six are needed, in one file"
-        );
-        assert!(Truth::Static(&[]).check(100.0, 1).is_err());
-    }
-}
-
-#[cfg(test)]
-mod windows_tests {
-    use super::*;
-    use crate::imu::Signal;
-    use rand_distr::{Distribution, StandardNormal};
-
-    const KEY: StreamKey<'_> = StreamKey {
-        seed: 5,
-        scenario: "",
-        run: 0,
-        source: "",
-        process: "",
-    };
-
-    fn recording(signal: &[f64]) -> Recording {
-        let channel = |channel| Signal {
-            channel,
-            mean: 0.0,
-            samples: signal.to_vec(),
-        };
-        Recording {
-            name: "r.csv".into(),
-            rate_hz: 100.0,
-            signals: Channel::ALL.map(channel).into(),
+        for (recording, expected) in [
+            (
+                recording(&[0.0; 300], 100.0),
+                "r.csv lasts 3 s, the trajectory 5 s: 2 s too short",
+            ),
+            (
+                recording(&[0.0; 600], 50.0),
+                "r.csv was sampled at 50 Hz, the simulated IMU runs at 100 Hz",
+            ),
+            (
+                partial,
+                "r.csv: channel gyro.y is missing; all six are needed, in one file",
+            ),
+        ] {
+            let error = Truth::Static(&[recording]).check(100.0, 500).unwrap_err();
+            assert_eq!(error.to_string(), expected);
         }
+        assert!(Truth::Static(&[]).check(100.0, 1).is_err());
     }
 
     /// White noise of standard deviation `sigma` and a random walk of steps 1.
     fn walk(sigma: f64, samples: usize) -> Vec<f64> {
-        let mut rng = StreamKey {
-            source: "walk",
-            ..KEY
-        }
-        .generator();
-        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-        let mut level = 0.0;
-        (0..samples)
-            .map(|_| {
-                level += normal();
-                level + sigma * normal()
-            })
-            .collect()
+        let (mut normal, mut level) = (normals(5), 0.0);
+        let mut sample = || {
+            level += normal();
+            level + sigma * normal()
+        };
+        (0..samples).map(|_| sample()).collect()
     }
 
     /// 100 windows in 20 equal stretches: drawn independently one stretch in ten would hold none or one, ten or
     /// more (binomial, 4.8 %); here each holds 4 to 6, for any seed.
     #[test]
     fn windows_are_spread_evenly() {
-        let recordings = [recording(&vec![0.0; 6000]), recording(&vec![0.0; 4000])];
+        let recordings = [
+            recording(&[0.0; 6000], 100.0),
+            recording(&[0.0; 4000], 100.0),
+        ];
         for seed in 0..20 {
             let mut held = [0_u32; 20];
             for run in 0..100 {
-                let (index, start) = place(&recordings, StreamKey { seed, run, ..KEY }, 1000);
+                let (index, start) = place(&recordings, StreamKey { run, ..key(seed) }, 1000);
                 let share = start as f64 / (recordings[index].len() - 999) as f64;
                 held[12 * index + (share * [12.0, 8.0][index]) as usize] += 1;
             }
@@ -464,11 +431,10 @@ mod windows_tests {
     /// A pure random walk starts at zero, wherever its window begins.
     #[test]
     fn a_random_walk_starts_at_zero() {
-        let recordings = [recording(&walk(0.0, 5000))];
+        let recordings = [recording(&walk(0.0, 5000), 100.0)];
         let truth = Truth::Static(&recordings);
-        for run in 0..20 {
-            let key = StreamKey { run, ..KEY };
-            let mut errors = LaneErrors::new(&truth, &best_spans(&truth), &[key], 1000);
+        for k in 0..20 {
+            let mut errors = LaneErrors::new(&truth, &best_spans(&truth), &[run(k)], 1000);
             let first = errors.next(1)[0];
             assert!(
                 first

@@ -137,27 +137,15 @@ mod tests {
     use super::*;
     use crate::earth::{omega_en_n, omega_ie_n, radii};
     use crate::frames::RollPitchYaw;
-    use crate::trajectory::TrajectorySample;
+    use crate::tests::samples;
     use crate::units::DEG;
+    use approx::assert_abs_diff_eq;
     use glam::DQuat;
 
     const WGS84: GravityModel = GravityModel::Wgs84;
 
-    fn through(n: i32, dt: f64, at: impl Fn(f64) -> (f64, f64, f64, DQuat)) -> Trajectory {
-        let samples: Vec<_> = (0..=n)
-            .map(|k| {
-                let t_s = f64::from(k) * dt;
-                let (lat, lon, h, q_b_n) = at(t_s);
-                TrajectorySample {
-                    t_s,
-                    lat,
-                    lon,
-                    h,
-                    q_b_n,
-                }
-            })
-            .collect();
-        Trajectory::from_samples(&samples).unwrap()
+    fn through(n: u32, dt_s: f64, at: impl Fn(f64) -> (f64, f64, f64, DQuat)) -> Trajectory {
+        Trajectory::from_samples(&samples(n, dt_s, at)).unwrap()
     }
 
     #[test]
@@ -221,7 +209,7 @@ mod tests {
             (0.0, 0.0, 0.0, DQuat::from_rotation_x(omega * t))
         });
         let g = gravity_down(WGS84, 0.0, 0.0);
-        for (rate_hz, spline_error) in [(20.0, 1e-7), (33.0, 1e-7), (100.0, 1e-7)] {
+        for rate_hz in [20.0, 33.0, 100.0] {
             let dt = 1.0 / rate_hz;
             let sinc = (omega * dt / 2.0).sin() / (omega * dt / 2.0);
             for (k, s) in ideal_imu(&trajectory, rate_hz, WGS84)
@@ -231,8 +219,9 @@ mod tests {
             {
                 let angle = omega * (k as f64 + 0.5) * dt;
                 let expected = DVec3::new(0.0, -angle.sin(), -angle.cos()) * g * sinc;
-                assert!((s.f_ib_b - expected).length() < spline_error * g);
-                assert!((s.omega_ib_b.x - omega - OMEGA_IE).abs() < 1e-6);
+                // the spline's error
+                assert!((s.f_ib_b - expected).length() < 1e-7 * g);
+                assert_abs_diff_eq!(s.omega_ib_b.x - omega, OMEGA_IE, epsilon = 1e-6);
             }
         }
     }
@@ -268,26 +257,20 @@ mod tests {
     #[test]
     fn impossible_rates_are_refused() {
         let trajectory = through(4, 1.0, |_| (0.8, 0.1, 0.0, DQuat::IDENTITY));
-        let refused = |rate_hz| {
-            ideal_imu(&trajectory, rate_hz, WGS84)
-                .unwrap_err()
-                .to_string()
-        };
-        assert_eq!(
-            refused(0.0),
-            "IMU rate 0 Hz is not a number > 0 and ≤ 100000"
-        );
-        assert_eq!(
-            refused(f64::NAN),
-            "IMU rate NaN Hz is not a number > 0 and ≤ 100000"
-        );
-        assert_eq!(
-            refused(1e9),
-            "IMU rate 1000000000 Hz is not a number > 0 and ≤ 100000"
-        );
-        assert_eq!(
-            refused(0.1),
-            "the trajectory lasts 4 s: less than one sample at 0.1 Hz"
-        );
+        for (rate_hz, expected) in [
+            (0.0, "IMU rate 0 Hz is not a number > 0 and ≤ 100000"),
+            (f64::NAN, "IMU rate NaN Hz is not a number > 0 and ≤ 100000"),
+            (
+                1e9,
+                "IMU rate 1000000000 Hz is not a number > 0 and ≤ 100000",
+            ),
+            (
+                0.1,
+                "the trajectory lasts 4 s: less than one sample at 0.1 Hz",
+            ),
+        ] {
+            let error = ideal_imu(&trajectory, rate_hz, WGS84).unwrap_err();
+            assert_eq!(error.to_string(), expected);
+        }
     }
 }

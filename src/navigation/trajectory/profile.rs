@@ -922,6 +922,7 @@ mod profile_tests;
 #[cfg(test)]
 mod piece_tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
 
     #[test]
     fn rate_value_and_integral_are_derivatives_of_one_another() {
@@ -964,7 +965,7 @@ mod piece_tests {
             let x = f64::from(k) / 100.0;
             let [before, now, after] = [x - step, x, x + step].map(|x| piece.at(x));
             let vertical = (after.h - before.h) / (2.0 * step * piece.duration);
-            assert!((now.slope.tan() * now.horizontal - vertical).abs() < 1e-6);
+            assert_abs_diff_eq!(now.slope.tan() * now.horizontal, vertical, epsilon = 1e-6);
         }
         assert_eq!(piece.at(0.0).slope, 0.0);
         assert!((piece.at(1.0).h - 103.0).abs() < 1e-12 && (piece.length() - 40.0).abs() < 1e-12);

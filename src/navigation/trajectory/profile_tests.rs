@@ -1,51 +1,19 @@
 use super::*;
 use crate::earth::{GravityModel, e_to_n, gravity_down, ned_difference, radii};
-use crate::frames::{RollPitchYaw, wrap_angle};
+use crate::frames::wrap_angle;
 use crate::units::{DEG, STANDARD_GRAVITY};
+use approx::assert_abs_diff_eq;
 use glam::DVec3;
 
-fn straight(by: Length) -> Segment {
-    Segment {
-        kind: SegmentKind::Straight(by),
-        climb_m: 0.0,
-        ramp_s: None,
-    }
+/// From 10 s on, with ramps of a second.
+fn profile(speed: f64, segments: &str) -> Profile {
+    let mut profile = crate::tests::profile(speed, segments);
+    (profile.start.t_s, profile.ramp_s) = (10.0, 1.0);
+    profile
 }
 
-fn accelerate(to_speed: f64, by: Acceleration) -> Segment {
-    Segment {
-        kind: SegmentKind::Accelerate { to_speed, by },
-        climb_m: 0.0,
-        ramp_s: None,
-    }
-}
-
-fn turn(angle_deg: f64, by: Turning) -> Segment {
-    Segment {
-        kind: SegmentKind::Turn {
-            angle: angle_deg * DEG,
-            by,
-        },
-        climb_m: 0.0,
-        ramp_s: None,
-    }
-}
-
-fn profile(speed: f64, segments: Vec<Segment>) -> Profile {
-    let start = ProfileStart {
-        t_s: 10.0,
-        lat: 46.5 * DEG,
-        lon: 6.6 * DEG,
-        h: 400.0,
-        heading: 30.0 * DEG,
-        speed,
-    };
-    Profile {
-        start,
-        bank: Bank::None,
-        ramp_s: 1.0,
-        segments,
-    }
+fn built(speed: f64, segments: &str) -> Trajectory {
+    profile(speed, segments).build().unwrap()
 }
 
 /// Speed, acceleration along and across the track (m/s²), and angles at an instant.
@@ -68,15 +36,14 @@ fn largest(t: &Trajectory, f: impl Fn(f64) -> f64) -> f64 {
 
 #[test]
 fn a_straight_covers_its_distance_in_its_direction() {
-    let t = profile(20.0, vec![straight(Length::Distance(1000.0))])
-        .build()
-        .unwrap();
+    let t = built(20.0, "{ kind = 'straight', distance_m = 1000 }");
     assert_eq!((t.start_s(), t.end_s()), (10.0, 60.0));
     let (start, end) = (t.state(10.0), t.state(60.0));
     let moved = ned_difference(start.place(), end.place());
     // Loxodrome against radii at its start: 1000² tan(lat)/(2 R) = 0.08 m.
+    let (north, east) = ((40.0 * DEG).cos(), (40.0 * DEG).sin());
     assert!(
-        (moved - DVec3::new(30.0_f64.to_radians().cos(), 0.5, 0.0) * 1000.0).length() < 0.15,
+        (moved - DVec3::new(north, east, 0.0) * 1000.0).length() < 0.15,
         "{moved}"
     );
     // Positions in e are rounded to 1e-9 m, 0.02 s apart.
@@ -85,60 +52,53 @@ fn a_straight_covers_its_distance_in_its_direction() {
 
 #[test]
 fn acceleration_keeps_its_limit_and_reaches_its_speed() {
-    let t = profile(
+    let t = built(
         0.0,
-        vec![
-            accelerate(25.0, Acceleration::Peak(2.0)),
-            accelerate(5.0, Acceleration::Duration(12.0)),
-        ],
-    )
-    .build()
-    .unwrap();
-    assert!((t.end_s() - (10.0 + 13.5 + 12.0)).abs() < 1e-12); // Δv/a + ramp
-    assert!(
-        (feel(&t, 23.5).0 - 25.0).abs() < 1e-5,
-        "{}",
-        feel(&t, 23.5).0 - 25.0
+        "{ kind = 'accelerate', to_speed_m_s = 25, accel_m_s2 = 2 },
+        { kind = 'accelerate', to_speed_m_s = 5, duration_s = 12 }",
     );
-    assert!(
-        (feel(&t, t.end_s()).0 - 5.0).abs() < 1e-5,
-        "{}",
-        feel(&t, t.end_s()).0 - 5.0
-    );
+    assert_abs_diff_eq!(t.end_s(), 10.0 + 13.5 + 12.0, epsilon = 1e-12); // Δv/a + ramp
+    // what the spline of step 0.02 s makes of the speed (m/s)
+    assert_abs_diff_eq!(feel(&t, 23.5).0, 25.0, epsilon = 1e-5);
+    assert_abs_diff_eq!(feel(&t, t.end_s()).0, 5.0, epsilon = 1e-5);
     // Beside the curvature of the Earth, v²/R = 1e-4 m/s², all of it is along the track.
-    assert!((largest(&t, |s| feel(&t, s).1.x) - 2.0).abs() < 1e-4);
+    assert_abs_diff_eq!(largest(&t, |s| feel(&t, s).1.x), 2.0, epsilon = 1e-4);
     assert!(largest(&t, |s| feel(&t, s).1.y.abs()) < 2e-4);
 }
 
 #[test]
 fn turns_end_where_they_should_whatever_limits_them() {
     for (by, duration) in [
-        (Turning::Duration(14.0), 14.0),
-        (Turning::Rate(10.0 * DEG), 10.0),
-        (Turning::Radius(60.0), 90.0 * DEG * 6.0 + 1.0),
-        (Turning::LateralAccel(2.0), 90.0 * DEG * 5.0 + 1.0),
+        ("duration_s = 14", 14.0),
+        ("rate_deg_s = 10", 10.0),
+        ("radius_m = 60", 90.0 * DEG * 6.0 + 1.0),
+        ("lateral_accel_m_s2 = 2", 90.0 * DEG * 5.0 + 1.0),
     ] {
-        let t = profile(10.0, vec![turn(-90.0, by), straight(Length::Duration(1.0))])
-            .build()
-            .unwrap();
-        assert!((t.end_s() - 11.0 - duration).abs() < 1e-9);
-        assert!((feel(&t, t.end_s()).2.yaw / DEG + 60.0).abs() < 1e-10);
+        let turn = format!("{{ kind = 'turn', angle_deg = -90, {by} }}");
+        let t = built(10.0, &(turn + ", { kind = 'straight', duration_s = 1 }"));
+        assert_abs_diff_eq!(t.end_s(), 11.0 + duration, epsilon = 1e-9);
+        assert_abs_diff_eq!(feel(&t, t.end_s()).2.yaw / DEG, -50.0, epsilon = 1e-10);
         let lateral = largest(&t, |s| -feel(&t, s).1.y);
         let expected = 10.0 * 90.0 * DEG / (duration - 1.0);
         assert!(
             (lateral - expected).abs() < 1e-3,
-            "{by:?}: {lateral} {expected}"
+            "{by}: {lateral} {expected}"
         );
     }
 }
 
 #[test]
 fn height_changes_by_what_was_asked_and_pitch_is_the_slope() {
-    let mut hill = straight(Length::Duration(20.0));
-    hill.climb_m = -15.0;
-    let t = profile(10.0, vec![hill]).build().unwrap();
-    assert!((t.state(t.end_s()).h - 385.0).abs() < 1e-8);
-    assert!((largest(&t, |s| feel(&t, s).2.pitch.abs()).sin() - 15.0 / 200.0 / 0.95).abs() < 1e-6);
+    let t = built(
+        10.0,
+        "{ kind = 'straight', duration_s = 20, climb_m = -15 }",
+    );
+    assert_abs_diff_eq!(t.state(t.end_s()).h, 385.0, epsilon = 1e-8);
+    assert_abs_diff_eq!(
+        largest(&t, |s| feel(&t, s).2.pitch.abs()).sin(),
+        15.0 / 200.0 / 0.95,
+        epsilon = 1e-6
+    );
     for s in [12.0, 17.7, 25.0] {
         let (speed, _, rpy) = feel(&t, s);
         assert!(
@@ -153,11 +113,15 @@ fn height_changes_by_what_was_asked_and_pitch_is_the_slope() {
 /// a″ = 5.77 · 7 m/s² / (3 s)², doubled where a‴ jumps.
 #[test]
 fn coordinated_turns_bank() {
-    let mut p = profile(40.0, vec![turn(120.0, Turning::Rate(10.0 * DEG))]);
+    let mut p = profile(40.0, "{ kind = 'turn', angle_deg = 120, rate_deg_s = 10 }");
     (p.bank, p.ramp_s) = (Bank::Coordinated, 3.0);
     let t = p.build().unwrap();
     let middle = 0.5 * (t.start_s() + t.end_s());
-    assert!((feel(&t, middle).2.roll - (40.0 * 10.0 * DEG / STANDARD_GRAVITY).atan()).abs() < 1e-6);
+    assert_abs_diff_eq!(
+        feel(&t, middle).2.roll,
+        (40.0 * 10.0 * DEG / STANDARD_GRAVITY).atan(),
+        epsilon = 1e-6
+    );
     let lateral = largest(&t, |s| {
         let (_, a_b, _) = feel(&t, s);
         let state = t.state(s);
@@ -167,33 +131,26 @@ fn coordinated_turns_bank() {
     assert!(lateral < 2.0 * 3.8e-4, "{lateral}");
 }
 
-/// The acceleration of the spline never jumps: its change over 5 ms is what the jerk allows, peak rate of
-/// a quintic ramp 1.875 · 3 m/s² / 1 s, plus a turn's.
 #[test]
 fn acceleration_and_rate_are_continuous_over_a_stop_and_go_drive() {
-    let stop = Segment {
-        kind: SegmentKind::Stop {
-            duration: 5.0,
-            decel: 3.0,
-        },
-        climb_m: 0.0,
-        ramp_s: None,
-    };
-    let segments = vec![
-        accelerate(15.0, Acceleration::Peak(3.0)),
-        turn(60.0, Turning::LateralAccel(3.0)),
-        stop,
-        accelerate(8.0, Acceleration::Peak(3.0)),
-    ];
-    let t = profile(0.0, segments).build().unwrap();
+    let t = built(
+        0.0,
+        "{ kind = 'accelerate', to_speed_m_s = 15, accel_m_s2 = 3 },
+        { kind = 'turn', angle_deg = 60, lateral_accel_m_s2 = 3 },
+        { kind = 'stop', duration_s = 5, decel_m_s2 = 3 },
+        { kind = 'accelerate', to_speed_m_s = 8, accel_m_s2 = 3 }",
+    );
     let n = ((t.end_s() - t.start_s()) / 0.005) as usize;
-    let kinematics_after = |k: usize| t.kinematics(t.start_s() + 0.005 * k as f64);
-    let jump = (1..=n)
-        .map(|k| (kinematics_after(k).a_e - kinematics_after(k - 1).a_e).length())
-        .fold(0.0, f64::max);
-    let rate = (1..=n)
-        .map(|k| (kinematics_after(k).omega_eb_b - kinematics_after(k - 1).omega_eb_b).length())
-        .fold(0.0, f64::max);
+    let after = |k: usize| t.kinematics(t.start_s() + 0.005 * k as f64);
+    let largest = |change: &dyn Fn(
+        &crate::trajectory::Kinematics,
+        &crate::trajectory::Kinematics,
+    ) -> DVec3| {
+        let of = |k| change(&after(k), &after(k - 1)).length();
+        (1..=n).map(of).fold(0.0, f64::max)
+    };
+    let jump = largest(&|now, before| now.a_e - before.a_e);
+    let rate = largest(&|now, before| now.omega_eb_b - before.omega_eb_b);
     assert!(jump < 1.875 * 3.0 * 0.005 * 1.05, "{jump}");
     assert!(rate < 1.875 * 3.0 / 15.0 * 0.005 * 1.05, "{rate}");
     // It stands still while it stands still.
@@ -203,23 +160,15 @@ fn acceleration_and_rate_are_continuous_over_a_stop_and_go_drive() {
 
 #[test]
 fn waypoints_are_met_at_the_end_and_passed_inside_before() {
-    let local = |north: f64, east: f64, h: Option<f64>| Waypoint {
-        place: HorizontalPosition::Local { north, east },
-        h,
-    };
     for (lat_deg, lon_deg) in [(46.5, 6.6), (-60.0, 179.99)] {
-        let points = vec![
-            local(2000.0, 0.0, None),
-            local(2000.0, 3000.0, Some(700.0)),
-            local(-500.0, 2500.0, None),
-        ];
-        let by = Turning::LateralAccel(3.0);
-        let segment = Segment {
-            kind: SegmentKind::Waypoints { points, by },
-            climb_m: 0.0,
-            ramp_s: Some(2.0),
-        };
-        let mut p = profile(30.0, vec![segment]);
+        let mut p = profile(
+            30.0,
+            "{ kind = 'waypoints', lateral_accel_m_s2 = 3, ramp_s = 2, points = [
+                { n_m = 2000, e_m = 0 },
+                { n_m = 2000, e_m = 3000, h_m = 700 },
+                { n_m = -500, e_m = 2500 },
+            ] }",
+        );
         (p.start.lat, p.start.lon) = (lat_deg * DEG, lon_deg * DEG);
         let t = p.build().unwrap();
         let place = |s: f64| {
@@ -232,10 +181,10 @@ fn waypoints_are_met_at_the_end_and_passed_inside_before() {
                 state.h,
             )
         };
+        let end = place(t.end_s());
         assert!(
-            (place(t.end_s()) - DVec3::new(-500.0, 2500.0, 700.0)).length() < 5e-3,
-            "{}",
-            place(t.end_s())
+            (end - DVec3::new(-500.0, 2500.0, 700.0)).length() < 5e-3,
+            "{end}"
         );
         for corner in [
             DVec3::new(2000.0, 0.0, 400.0),
@@ -251,88 +200,85 @@ fn waypoints_are_met_at_the_end_and_passed_inside_before() {
 
 #[test]
 fn what_cannot_be_followed_is_refused() {
-    let refused = |speed: f64, segment: Segment| {
-        profile(speed, vec![segment])
-            .build()
-            .unwrap_err()
-            .to_string()
+    let refused = |profile: &Profile| profile.build().unwrap_err().to_string();
+    let waypoints = |north: f64, east: f64| {
+        let (a, b) = (
+            format!("n_m = {north}, e_m = {east}"),
+            format!("n_m = {}, e_m = 0", 2.0 * north),
+        );
+        format!("{{ kind = 'waypoints', radius_m = 30, points = [{{ {a} }}, {{ {b} }}] }}")
     };
-    let straight_s = |s| straight(Length::Duration(s));
-    assert_eq!(
-        refused(1.0, straight_s(1e300)),
-        "segment 1: \"duration_s\" makes the trajectory 1.000e300 s long: over a day"
-    );
-    assert_eq!(
-        refused(2.0, straight(Length::Distance(1e300))),
-        "segment 1: \"distance_m\" makes the trajectory 5.000e299 s long: over a day"
-    );
-    assert_eq!(
-        refused(0.0, straight(Length::Distance(5.0))),
-        "segment 1: \"distance_m\" needs a moving vehicle, which stands still here"
-    );
-    assert_eq!(
-        refused(0.0, turn(10.0, Turning::Radius(5.0))),
-        "segment 1: \"radius_m\" needs a moving vehicle, which stands still here"
-    );
-    assert_eq!(
-        refused(
-            5.0,
-            Segment {
-                climb_m: 50.0,
-                ..straight_s(10.0)
-            }
+    for (speed, segment, expected) in [
+        (
+            1.0,
+            "{ kind = 'straight', duration_s = 1e300 }",
+            "\"duration_s\" makes the trajectory 1.000e300 s long: more than a day",
         ),
-        "segment 1: \"climb_m\" is too steep: 50 m over 50.0 m of path climbs more than 60°"
-    );
-    assert_eq!(
-        refused(5.0, turn(10_000.0, Turning::Duration(1.0))),
-        "start: \"segment\" gives no trajectory: attitude turns 65.4° between 10.14 s and 10.16 s: more than 60°"
-    );
-    let waypoints = |north, east| {
-        let points = vec![
-            Waypoint {
-                place: HorizontalPosition::Local { north, east },
-                h: None,
-            },
-            Waypoint {
-                place: HorizontalPosition::Local {
-                    north: 2.0 * north,
-                    east: 0.0,
-                },
-                h: None,
-            },
-        ];
-        Segment {
-            kind: SegmentKind::Waypoints {
-                points,
-                by: Turning::Radius(30.0),
-            },
-            climb_m: 0.0,
-            ramp_s: None,
-        }
+        (
+            2.0,
+            "{ kind = 'straight', distance_m = 1e300 }",
+            "\"distance_m\" makes the trajectory 5.000e299 s long: more than a day",
+        ),
+        (
+            0.0,
+            "{ kind = 'straight', distance_m = 5 }",
+            "\"distance_m\" needs a moving vehicle, but it stands still here",
+        ),
+        (
+            0.0,
+            "{ kind = 'turn', angle_deg = 10, radius_m = 5 }",
+            "\"radius_m\" needs a moving vehicle, but it stands still here",
+        ),
+        (
+            5.0,
+            "{ kind = 'straight', duration_s = 10, climb_m = 50 }",
+            "\"climb_m\" is too steep: 50 m over 50.0 m of path climbs more than 60°",
+        ),
+        (
+            10.0,
+            &waypoints(2.0, 5.0),
+            "\"points\" has waypoint 1 inside the turning circle",
+        ),
+        (
+            10.0,
+            &waypoints(0.0, 200.0),
+            "\"points\" turns back by 175° at waypoint 1: more than 150°",
+        ),
+        (
+            10.0,
+            &waypoints(40.0, 60.0),
+            "\"points\" has waypoint 1 too near: 46.5 m away, the turns take 55.4 m",
+        ),
+        (
+            0.0,
+            &waypoints(100.0, 0.0),
+            "\"points\" needs a moving vehicle, but it stands still here",
+        ),
+    ] {
+        assert_eq!(
+            refused(&profile(speed, segment)),
+            format!("segment 1: {expected}")
+        );
+    }
+    let fast = profile(5.0, "{ kind = 'turn', angle_deg = 10000, duration_s = 1 }");
+    let lost = Profile {
+        start: ProfileStart {
+            lat: f64::NAN,
+            ..fast.start
+        },
+        ..fast.clone()
     };
-    assert_eq!(
-        refused(10.0, waypoints(2.0, 5.0)),
-        "segment 1: \"points\" has waypoint 1 inside the turning circle"
-    );
-    assert_eq!(
-        refused(10.0, waypoints(0.0, 200.0)),
-        "segment 1: \"points\" turns back by 173° at waypoint 1: more than 150°"
-    );
-    assert_eq!(
-        refused(10.0, waypoints(40.0, 60.0)),
-        "segment 1: \"points\" has waypoint 1 too near: 46.5 m away, the turns take 55.4 m"
-    );
-    assert!(refused(0.0, waypoints(100.0, 0.0)).contains("\"points\" needs a moving vehicle"));
-    let mut p = profile(5.0, Vec::new());
-    assert_eq!(
-        p.build().unwrap_err().to_string(),
-        "start: \"segment\" is not a list of at least one segment"
-    );
-    p.segments.push(straight_s(1.0));
-    p.start.lat = f64::NAN;
-    assert_eq!(
-        p.build().unwrap_err().to_string(),
-        "start: \"lat_deg\" is not a latitude within ±89.9°"
-    );
+    for (profile, expected) in [
+        (
+            fast,
+            "\"segment\" gives no trajectory: attitude turns 65.4° between 10.14 s and 10.16 s: more than 60°",
+        ),
+        (
+            profile(5.0, ""),
+            "\"segment\" is not a list of at least one segment",
+        ),
+        (lost, "\"lat_deg\" is not a latitude within ±89.9°"),
+    ] {
+        assert_eq!(refused(&profile), format!("start: {expected}"));
+    }
 }

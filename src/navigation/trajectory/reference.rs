@@ -315,39 +315,27 @@ impl<'a> Steps<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frames::RollPitchYaw;
+    use crate::tests::samples;
+    use glam::DQuat;
 
     /// 60 s north at 15 m/s, 20 samples a second, changed by `fault`.
     fn drive(fault: impl Fn(f64, &mut TrajectorySample)) -> Vec<TrajectorySample> {
-        let sample = |k: u32| {
-            let t_s = 0.05 * f64::from(k);
-            let q_b_n = RollPitchYaw {
-                roll: 0.0,
-                pitch: 0.0,
-                yaw: 0.3,
-            }
-            .to_quat();
-            let mut s = TrajectorySample {
-                t_s,
-                lat: 0.8 + 15.0 * t_s / 6.38e6,
-                lon: 0.1,
-                h: 400.0,
-                q_b_n,
-            };
-            fault(t_s, &mut s);
-            s
+        let north = |t_s| {
+            (
+                0.8 + 15.0 * t_s / 6.38e6,
+                0.1,
+                400.0,
+                DQuat::from_rotation_z(0.3),
+            )
         };
-        (0..=1200).map(sample).collect()
+        let mut samples = samples(1200, 0.05, north);
+        samples.iter_mut().for_each(|s| fault(s.t_s, s));
+        samples
     }
 
     fn spans(samples: &[TrajectorySample]) -> Vec<(f64, f64)> {
         let rounded = |t: f64| (t * 1e3).round() / 1e3;
-        let span = |r: Range<usize>| {
-            (
-                rounded(samples[r.start].t_s),
-                rounded(samples[r.end - 1].t_s),
-            )
-        };
+        let span = |r: Range<usize>| [r.start, r.end - 1].map(|i| rounded(samples[i].t_s)).into();
         usable(samples, &breaks(samples))
             .into_iter()
             .map(span)
@@ -386,12 +374,7 @@ mod tests {
         );
         let started = drive(|t, s| {
             if t < 3.02 {
-                s.q_b_n = RollPitchYaw {
-                    roll: 0.0,
-                    pitch: 0.0,
-                    yaw: 2.9,
-                }
-                .to_quat();
+                s.q_b_n = DQuat::from_rotation_z(2.9);
             }
         });
         assert_eq!(spans(&started), [(4.05, 60.0)]);

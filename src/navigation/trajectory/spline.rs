@@ -130,6 +130,7 @@ impl<const N: usize> Cubic<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
 
     fn uneven() -> Vec<f64> {
         vec![-1.0, -0.4, 0.3, 0.35, 1.2, 2.0, 2.9]
@@ -145,8 +146,8 @@ mod tests {
                 let x = -1.0 + (t[n - 1] + 1.0) * f64::from(k) / 40.0;
                 let [value, first, second] = s.at(x);
                 assert!((value[0] - f(x)).abs() < 1e-13 && (value[1] + f(x)).abs() < 1e-13);
-                assert!((first[0] - (-1.0 + x - 0.75 * x * x)).abs() < 1e-12);
-                assert!((second[0] - (1.0 - 1.5 * x)).abs() < 1e-11);
+                assert_abs_diff_eq!(first[0], -1.0 + x - 0.75 * x * x, epsilon = 1e-12);
+                assert_abs_diff_eq!(second[0], 1.0 - 1.5 * x, epsilon = 1e-11);
             }
         }
     }
@@ -157,9 +158,9 @@ mod tests {
         let s = Spline::not_a_knot(t.clone(), t.iter().map(|&t| [(3.0 * t).sin()]).collect());
         for &knot in &t[1..t.len() - 1] {
             let (left, right) = (s.at(knot.next_down()), s.at(knot));
-            assert!((left[0][0] - right[0][0]).abs() < 1e-13);
-            assert!((left[1][0] - right[1][0]).abs() < 1e-12);
-            assert!((left[2][0] - right[2][0]).abs() < 1e-11);
+            assert_abs_diff_eq!(left[0][0], right[0][0], epsilon = 1e-13);
+            assert_abs_diff_eq!(left[1][0], right[1][0], epsilon = 1e-12);
+            assert_abs_diff_eq!(left[2][0], right[2][0], epsilon = 1e-11);
         }
     }
 

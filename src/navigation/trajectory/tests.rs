@@ -1,29 +1,30 @@
 use super::*;
 use crate::earth::{E2, radii};
 use crate::frames::RollPitchYaw;
+use crate::tests::samples;
 
-fn sample(t_s: f64, lat_deg: f64, lon_deg: f64, h: f64, rpy_deg: [f64; 3]) -> TrajectorySample {
-    let [roll, pitch, yaw] = rpy_deg.map(|a| a * DEG);
-    let q_b_n = RollPitchYaw { roll, pitch, yaw }.to_quat();
-    TrajectorySample {
-        t_s,
-        lat: lat_deg * DEG,
-        lon: lon_deg * DEG,
-        h,
-        q_b_n,
-    }
+fn resting() -> Vec<TrajectorySample> {
+    through(5, 1.0, |_| (46.0, 7.0, 400.0, [1.0, -2.0, 200.0]))
 }
 
-fn resting(n: i32) -> Vec<TrajectorySample> {
-    (0..n)
-        .map(|k| sample(f64::from(k), 46.0, 7.0, 400.0, [1.0, -2.0, 200.0]))
-        .collect()
+/// Samples of latitude, longitude, height, and roll, pitch and yaw, all angles in degrees.
+fn through(
+    n: u32,
+    dt_s: f64,
+    at: impl Fn(f64) -> (f64, f64, f64, [f64; 3]),
+) -> Vec<TrajectorySample> {
+    samples(n, dt_s, |t_s| {
+        let (lat_deg, lon_deg, h, rpy_deg) = at(t_s);
+        let [roll, pitch, yaw] = rpy_deg.map(|a| a * DEG);
+        let q_b_n = RollPitchYaw { roll, pitch, yaw }.to_quat();
+        (lat_deg * DEG, lon_deg * DEG, h, q_b_n)
+    })
 }
 
 #[test]
 fn samples_are_met_and_a_resting_vehicle_rests() {
-    let trajectory = Trajectory::from_samples(&resting(5)).unwrap();
-    assert_eq!((trajectory.start_s(), trajectory.end_s()), (0.0, 4.0));
+    let trajectory = Trajectory::from_samples(&resting()).unwrap();
+    assert_eq!((trajectory.start_s(), trajectory.end_s()), (0.0, 5.0));
     let state = trajectory.state(2.4);
     let rpy = RollPitchYaw::from_quat(state.q_b_n);
     assert!((state.lat / DEG - 46.0).abs() < 1e-13 && (state.h - 400.0).abs() < 2e-9);
@@ -36,17 +37,9 @@ fn samples_are_met_and_a_resting_vehicle_rests() {
 fn east_along_a_parallel_across_the_antimeridian() {
     for lat_deg in [-37.0, 52.0] {
         let rate_deg_s = 1e-3;
-        let samples: Vec<_> = (0..=60)
-            .map(|k| {
-                sample(
-                    f64::from(k),
-                    lat_deg,
-                    179.97 + rate_deg_s * f64::from(k),
-                    1000.0,
-                    [0.0, 0.0, 90.0],
-                )
-            })
-            .collect();
+        let samples = through(60, 1.0, |t_s| {
+            (lat_deg, 179.97 + rate_deg_s * t_s, 1000.0, [0.0, 0.0, 90.0])
+        });
         let trajectory = Trajectory::from_samples(&samples).unwrap();
         let (s, c) = (lat_deg * DEG).sin_cos();
         let rho = (radii(s).transverse + 1000.0) * c;
@@ -74,17 +67,7 @@ fn east_along_a_parallel_across_the_antimeridian() {
 #[test]
 fn north_along_a_meridian() {
     let rate = 2e-3 * DEG;
-    let samples: Vec<_> = (0..=60)
-        .map(|k| {
-            sample(
-                f64::from(k),
-                45.0 + 2e-3 * f64::from(k),
-                -120.0,
-                0.0,
-                [0.0; 3],
-            )
-        })
-        .collect();
+    let samples = through(60, 1.0, |t_s| (45.0 + 2e-3 * t_s, -120.0, 0.0, [0.0; 3]));
     let trajectory = Trajectory::from_samples(&samples).unwrap();
     let (t_s, lat) = (31.7, (45.0 + 2e-3 * 31.7) * DEG);
     let meridian = radii(lat.sin()).meridian;
@@ -102,16 +85,19 @@ fn north_along_a_meridian() {
 #[test]
 fn constant_rotation_through_every_attitude() {
     let rate = DVec3::new(0.3, 0.4, -0.2) * (50.0 * DEG / DVec3::new(0.3, 0.4, -0.2).length());
-    let samples: Vec<_> = (0..=200)
-        .map(|k| {
-            let t_s = 0.1 * f64::from(k);
-            let mut s = sample(t_s, -33.0, 151.0, 20.0, [0.0; 3]);
-            s.q_b_n = DQuat::from_scaled_axis(rate * t_s);
-            // Either sign of a quaternion is the same attitude.
-            s.q_b_n = if k % 3 == 0 { -s.q_b_n } else { s.q_b_n };
-            s
-        })
-        .collect();
+    let mut samples = samples(200, 0.1, |t_s| {
+        (
+            -33.0 * DEG,
+            151.0 * DEG,
+            20.0,
+            DQuat::from_scaled_axis(rate * t_s),
+        )
+    });
+    // Either sign of a quaternion is the same attitude.
+    samples
+        .iter_mut()
+        .step_by(3)
+        .for_each(|s| s.q_b_n = -s.q_b_n);
     let trajectory = Trajectory::from_samples(&samples).unwrap();
     for k in 0..=1000 {
         let t_s = 0.02 * f64::from(k);
@@ -124,19 +110,16 @@ fn constant_rotation_through_every_attitude() {
 /// The derivatives are the derivatives: central differences of position, velocity and attitude.
 #[test]
 fn kinematics_agree_with_central_differences() {
-    let samples: Vec<_> = (0..=30)
-        .map(|k| {
-            let t = f64::from(k);
-            let wave = (0.4 * t).sin();
-            sample(
-                t,
-                46.0 + 1e-4 * wave,
-                7.0 + 2e-4 * t,
-                400.0 + 3.0 * wave,
-                [5.0 * wave, -3.0 * wave, 20.0 * t],
-            )
-        })
-        .collect();
+    let samples = through(30, 1.0, |t| {
+        let wave = (0.4 * t).sin();
+        let rpy_deg = [5.0 * wave, -3.0 * wave, 20.0 * t];
+        (
+            46.0 + 1e-4 * wave,
+            7.0 + 2e-4 * t,
+            400.0 + 3.0 * wave,
+            rpy_deg,
+        )
+    });
     let trajectory = Trajectory::from_samples(&samples).unwrap();
     let step = 1e-3;
     for t_s in [0.6, 13.2, 22.9] {
@@ -155,65 +138,51 @@ fn kinematics_agree_with_central_differences() {
 
 #[test]
 fn unusable_samples_are_refused_by_name() {
+    type Change = fn(&mut [TrajectorySample]);
+    let cases: [(Change, &str); 6] = [
+        (
+            |s| s[4].t_s = 2.5,
+            "time goes from 3 s to 2.5 s: it must increase",
+        ),
+        (
+            |s| s[4].t_s = 3.0,
+            "time goes from 3 s to 3 s: it must increase",
+        ),
+        (|s| s[2].h = f64::NAN, "h = NaN is not a finite number"),
+        (
+            |s| s[5].lat = 89.95 * DEG,
+            "latitude 89.95° at 5 s is beyond ±89.9°",
+        ),
+        (
+            |s| s[3].q_b_n = DQuat::from_rotation_z(61.0 * DEG) * s[3].q_b_n,
+            "attitude turns 61.0° between 2 s and 3 s: more than 60°",
+        ),
+        (
+            |s| s[3].q_b_n = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0),
+            "attitude = 0 is not a finite number",
+        ),
+    ];
     let refused = |samples: &[TrajectorySample]| Trajectory::from_samples(samples).unwrap_err();
-    assert_eq!(
-        refused(&resting(3)).to_string(),
-        "3 samples: a trajectory needs at least 4"
-    );
-    let mut s = resting(6);
-    s[4].t_s = 2.5;
-    assert_eq!(
-        refused(&s).to_string(),
-        "time goes from 3 s to 2.5 s: it must increase"
-    );
-    s[4].t_s = 3.0;
-    assert_eq!(
-        refused(&s),
-        TrajectoryError::Time {
-            index: 4,
-            t_s: 3.0,
-            previous_s: 3.0
-        }
-    );
-    let mut s = resting(6);
-    s[2].h = f64::NAN;
-    assert_eq!(refused(&s).to_string(), "h = NaN is not a finite number");
-    let mut s = resting(6);
-    s[5].lat = 89.95 * DEG;
-    assert_eq!(
-        refused(&s).to_string(),
-        "latitude 89.95° at 5 s is beyond ±89.9°"
-    );
-    let mut s = resting(6);
-    s[3].q_b_n = DQuat::from_rotation_z(61.0 * DEG) * s[3].q_b_n;
-    assert_eq!(
-        refused(&s).to_string(),
-        "attitude turns 61.0° between 2 s and 3 s: more than 60°"
-    );
-    s[3].q_b_n = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
-    assert!(matches!(
-        refused(&s),
-        TrajectoryError::NotFinite {
-            index: 3,
-            what: "attitude",
-            ..
-        }
-    ));
+    for (change, expected) in cases {
+        let mut samples = resting();
+        change(&mut samples);
+        assert_eq!(refused(&samples).to_string(), expected);
+    }
+    let expected = "3 samples: a trajectory needs at least 4";
+    assert_eq!(refused(&resting()[..3]).to_string(), expected);
 }
 
 #[test]
 fn what_is_left_of_a_trajectory_is_the_same_motion() {
-    let turning = |i: i32| {
-        let t_s = f64::from(i);
-        sample(
-            t_s,
-            45.0 + 1e-4 * t_s,
-            7.0 + 1e-6 * t_s * t_s,
+    let turning = through(39, 1.0, |t| {
+        (
+            45.0 + 1e-4 * t,
+            7.0 + 1e-6 * t * t,
             100.0,
-            [0.0, 1.0, 3.0 * t_s],
+            [0.0, 1.0, 3.0 * t],
         )
-    };
-    let whole = Trajectory::from_samples(&(0..40).map(turning).collect::<Vec<_>>()).unwrap();
+    });
+    let whole = Trajectory::from_samples(&turning).unwrap();
     let part = whole.until(20.5);
     assert_eq!((part.start_s(), part.end_s()), (0.0, 21.0));
     assert_eq!(whole.until(99.0).end_s(), 39.0);

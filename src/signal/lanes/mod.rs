@@ -554,6 +554,7 @@ impl<L: Real> Mul for Quat<L> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_abs_diff_eq;
     use glam::{DMat3, DQuat, DVec3};
 
     #[test]
@@ -578,7 +579,7 @@ mod tests {
         let m = (q * p).to_matrix();
         let e = DMat3::from_quat(expected);
         for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
-            assert!((m.0[i][j][5] - e.col(j)[i]).abs() < 1e-15);
+            assert_abs_diff_eq!(m.0[i][j][5], e.col(j)[i], epsilon = 1e-15);
         }
     }
 }

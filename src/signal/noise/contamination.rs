@@ -386,4 +386,4 @@ fn replace(
 
 #[cfg(test)]
 #[path = "contamination_tests.rs"]
-mod tests;
+pub(crate) mod tests;

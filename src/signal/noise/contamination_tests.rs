@@ -1,28 +1,44 @@
 use super::*;
 use crate::imu::Axis;
 use crate::noise::Process;
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 
 const X: Channel = Channel {
     sensor: Sensor::Accel,
     axis: Axis::X,
 };
 
-fn one(operation: Operation) -> Contamination {
-    let rules = vec![Rule {
+fn rule(operation: Operation) -> Rule {
+    Rule {
         sensor: Sensor::Accel,
         replicate: Some(2),
         operation,
         place: String::new(),
-    }];
+    }
+}
+
+/// Rules for the accelerometers of the second replicate.
+pub(crate) fn contamination(operations: impl IntoIterator<Item = Operation>) -> Contamination {
     Contamination {
         name: "test".into(),
-        rules,
+        rules: operations.into_iter().map(rule).collect(),
+    }
+}
+
+fn replace(points: Extent, block: u64, mean: Option<f64>, sigma: f64) -> Operation {
+    Operation::Replace {
+        points,
+        block: Extent::Samples(block),
+        mean,
+        sigma,
     }
 }
 
 fn applied(operation: Operation, n: usize) -> Vec<f64> {
     let mut x = vec![0.0; n];
-    one(operation).apply(&mut x, X, 2, 100.0, 1).unwrap();
+    contamination([operation])
+        .apply(&mut x, X, 2, 100.0, 1)
+        .unwrap();
     x
 }
 
@@ -54,36 +70,24 @@ fn a_step_is_from_the_middle_on() {
 #[test]
 fn replacement_is_exact_in_number_and_random_in_place() {
     let mut x = vec![100.0; 200_000];
-    let replace = Operation::Replace {
-        points: Extent::Share(0.1),
-        block: Extent::Samples(1),
-        mean: Some(-1.0),
-        sigma: 0.5,
-    };
-    one(replace).apply(&mut x, X, 2, 100.0, 1).unwrap();
+    let replace_all = contamination([replace(Extent::Samples(1000), 1, None, 0.0)]);
+    let mut kept = vec![7.0; 1000];
+    replace_all.apply(&mut kept, X, 2, 100.0, 1).unwrap();
+    assert_eq!(
+        kept, [7.0; 1000],
+        "the mean of the signal, if none is given"
+    );
+    let some = contamination([replace(Extent::Share(0.1), 1, Some(-1.0), 0.5)]);
+    some.apply(&mut x, X, 2, 100.0, 1).unwrap();
     let replaced: Vec<f64> = x.iter().copied().filter(|v| *v < 50.0).collect();
     assert_eq!(replaced.len(), 20_000);
     let n = replaced.len() as f64;
     let mean = replaced.iter().sum::<f64>() / n;
     let variance = replaced.iter().map(|v| (v + 1.0).powi(2)).sum::<f64>() / n;
     assert!((mean + 1.0).abs() < 5.0 * 0.5 / n.sqrt());
-    assert!((variance - 0.25).abs() < 5.0 * 0.25 * (2.0 / n).sqrt());
+    assert_abs_diff_eq!(variance, 0.25, epsilon = 5.0 * 0.25 * (2.0 / n).sqrt());
     let first_half = x[..100_000].iter().filter(|v| **v < 50.0).count() as f64;
-    assert!((first_half - n / 2.0).abs() < 5.0 * n.sqrt() / 2.0);
-}
-
-#[test]
-fn replacement_keeps_the_mean_of_the_signal_if_none_is_given() {
-    let mut x = vec![7.0; 1000];
-    one(Operation::Replace {
-        points: Extent::Samples(1000),
-        block: Extent::Samples(1),
-        mean: None,
-        sigma: 0.0,
-    })
-    .apply(&mut x, X, 2, 100.0, 1)
-    .unwrap();
-    assert_eq!(x, [7.0; 1000]);
+    assert_abs_diff_eq!(first_half, n / 2.0, epsilon = 5.0 * n.sqrt() / 2.0);
 }
 
 #[test]
@@ -107,19 +111,16 @@ fn bursts_are_sines_at_multiples_of_the_spacing() {
         assert!((v - expected).abs() < 1e-15, "{k}");
     }
     let mut short = vec![0.0; 239];
-    let e = one(bursts).apply(&mut short, X, 2, 100.0, 1).unwrap_err();
-    assert_eq!(
-        e.to_string(),
-        "a train of bursts needs 240 samples, the record has 239"
-    );
-    let e = RefusedRule {
+    let e = contamination([bursts])
+        .apply(&mut short, X, 2, 100.0, 1)
+        .unwrap_err();
+    let expected = "a train of bursts needs 240 samples, the record has 239";
+    assert_eq!(e.to_string(), expected);
+    let placed = RefusedRule {
         place: "a.toml, line 3".into(),
         ..e
     };
-    assert_eq!(
-        e.to_string(),
-        "a.toml, line 3: a train of bursts needs 240 samples, the record has 239"
-    );
+    assert_eq!(placed.to_string(), format!("a.toml, line 3: {expected}"));
 }
 
 #[test]
@@ -129,31 +130,16 @@ fn the_added_ar1_has_its_variance() {
     let variance = x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64;
     // Bartlett: var of the sample variance 2γ₀²/n · (1 + φ²)/(1 − φ²).
     let bound = 5.0 * 10.0 * (2.0 / 1e5 * 1.81 / 0.19_f64).sqrt();
-    assert!((variance - 10.0).abs() < bound, "{variance}");
+    assert_abs_diff_eq!(variance, 10.0, epsilon = bound);
 }
 
 #[test]
 fn the_order_is_fixed_and_other_signals_are_untouched() {
-    let replace = Operation::Replace {
-        points: Extent::Share(1.0),
-        block: Extent::Samples(1),
-        mean: Some(0.0),
-        sigma: 0.0,
-    };
     let step = Operation::Step {
         at: Extent::Samples(0),
         amplitude: 1.0,
     };
-    let rule = |operation| Rule {
-        sensor: Sensor::Accel,
-        replicate: Some(2),
-        operation,
-        place: String::new(),
-    };
-    let both = Contamination {
-        name: String::new(),
-        rules: vec![rule(replace), rule(step)],
-    };
+    let both = contamination([replace(Extent::Share(1.0), 1, Some(0.0), 0.0), step]);
     let mut x = vec![5.0; 4];
     both.apply(&mut x, X, 2, 100.0, 1).unwrap();
     assert_eq!(x, [0.0; 4], "the step comes before the replacement");
@@ -179,11 +165,11 @@ fn parameters_are_scaled_for_their_replicate_only() {
     };
     let scale = |process: &str| {
         let (process, parameter) = (process.to_owned(), "gamma2".to_owned());
-        one(Operation::Scale {
+        contamination([Operation::Scale {
             process,
             parameter,
             factor: 4.0,
-        })
+        }])
     };
     let (mut second, mut third) = (noise(), noise());
     scale("RW").scale(&mut second, X, 2).unwrap();
@@ -199,14 +185,8 @@ fn parameters_are_scaled_for_their_replicate_only() {
 
 #[test]
 fn the_same_points_are_replaced_whatever_else_is_done() {
-    let replace = Operation::Replace {
-        points: Extent::Samples(10),
-        block: Extent::Samples(1),
-        mean: Some(0.0),
-        sigma: 1.0,
-    };
+    let replace = replace(Extent::Samples(10), 1, Some(0.0), 1.0);
     let alone = applied(replace.clone(), 1000);
-    let mut with_bursts = one(replace);
     let (length, spacing) = (Extent::Samples(1), Extent::Samples(999));
     let bursts = Operation::Bursts {
         count: 1,
@@ -215,17 +195,10 @@ fn the_same_points_are_replaced_whatever_else_is_done() {
         amplitude: 0.0,
         frequency_hz: 1.0,
     };
-    with_bursts.rules.insert(
-        0,
-        Rule {
-            sensor: Sensor::Accel,
-            replicate: None,
-            operation: bursts,
-            place: String::new(),
-        },
-    );
     let mut x = vec![0.0; 1000];
-    with_bursts.apply(&mut x, X, 2, 100.0, 1).unwrap();
+    contamination([bursts, replace])
+        .apply(&mut x, X, 2, 100.0, 1)
+        .unwrap();
     assert_eq!(x, alone);
 }
 
@@ -237,36 +210,20 @@ fn blocks_are_whole_and_anywhere() {
     let mut centre = 0.0;
     for seed in 0..40 {
         let mut x = vec![1.0; n];
-        let (points, block) = (Extent::Samples(1000), Extent::Samples(64));
-        one(Operation::Replace {
-            points,
-            block,
-            mean: Some(0.0),
-            sigma: 0.0,
-        })
-        .apply(&mut x, X, 2, 100.0, seed)
-        .unwrap();
+        let blocks = contamination([replace(Extent::Samples(1000), 64, Some(0.0), 0.0)]);
+        blocks.apply(&mut x, X, 2, 100.0, seed).unwrap();
         let replaced: Vec<usize> = (0..n).filter(|k| x[*k] == 0.0).collect();
         assert_eq!(replaced.len(), 1000);
-        let lengths: Vec<usize> = x
-            .chunk_by(|a, b| a == b)
-            .filter(|run| run[0] == 0.0)
-            .map(<[f64]>::len)
-            .collect();
+        let runs = x.chunk_by(|a, b| a == b).filter(|run| run[0] == 0.0);
+        let lengths: Vec<usize> = runs.map(<[f64]>::len).collect();
         assert!(
-            lengths
-                .iter()
-                .filter(|l| **l % 64 != 0)
-                .all(|l| *l % 64 == 40),
+            lengths.iter().all(|l| [0, 40].contains(&(l % 64))),
             "{lengths:?}"
         );
         centre += replaced.iter().map(|k| *k as f64).sum::<f64>() / 1000.0 / 40.0;
     }
     let deviation = n as f64 / (12.0_f64 * 16.0 * 40.0).sqrt();
-    assert!(
-        (centre - 0.5 * n as f64).abs() < 5.0 * deviation,
-        "{centre}"
-    );
+    assert_abs_diff_eq!(centre, 0.5 * n as f64, epsilon = 5.0 * deviation);
 }
 
 #[test]
@@ -283,19 +240,18 @@ fn a_drift_goes_from_nothing_to_its_amplitude() {
 #[test]
 fn heavy_tails_are_students() {
     let n = 200_000;
-    let x = applied(
-        Operation::HeavyTails {
-            freedom: 10.0,
-            sigma: 3.0,
-        },
-        n,
-    );
+    let tails = Operation::HeavyTails {
+        freedom: 10.0,
+        sigma: 3.0,
+    };
+    let x = applied(tails, n);
     let variance = x.iter().map(|v| v * v).sum::<f64>() / n as f64;
-    assert!(
-        (variance / (9.0 * 1.25) - 1.0).abs() < 5.0 * (3.0 / n as f64).sqrt(),
-        "{variance}"
+    assert_relative_eq!(
+        variance,
+        9.0 * 1.25,
+        max_relative = 5.0 * (3.0 / n as f64).sqrt()
     );
     let beyond = x.iter().filter(|v| v.abs() > 3.0 * 4.587).count() as f64;
     // P(|t| > 4.587) = 0.001 with ten degrees of freedom
-    assert!((beyond - 200.0).abs() < 5.0 * 200.0_f64.sqrt(), "{beyond}");
+    assert_abs_diff_eq!(beyond, 200.0, epsilon = 5.0 * 200.0_f64.sqrt());
 }

@@ -68,6 +68,7 @@ pub fn same_rate(a_hz: f64, b_hz: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
 
     fn n2_without_qn() -> Model {
         let axis = Composite::new(vec![
@@ -115,10 +116,22 @@ mod tests {
         // 0.01 °/s/√Hz is 0.6 °/√h; at 100 Hz a sample deviates by 0.1 °/s
         let deg = crate::units::DEG;
         let sigma2 = white_sigma2(0.01 * deg, 100.0);
-        assert!((sigma2.sqrt() / deg - 0.1).abs() < 1e-15);
-        assert!((white_density(sigma2, 100.0) / deg * 60.0 - 0.6).abs() < 1e-12);
-        assert!((walk_gamma2(walk_density(2e-11, 100.0), 100.0) / 2e-11 - 1.0).abs() < 1e-15);
-        assert!((correlation_time_s((-1e-9_f64).exp(), 100.0) / 1e7 - 1.0).abs() < 1e-6);
+        assert_abs_diff_eq!(sigma2.sqrt() / deg, 0.1, epsilon = 1e-15);
+        assert_abs_diff_eq!(
+            white_density(sigma2, 100.0) / deg * 60.0,
+            0.6,
+            epsilon = 1e-12
+        );
+        assert_relative_eq!(
+            walk_gamma2(walk_density(2e-11, 100.0), 100.0),
+            2e-11,
+            max_relative = 1e-15
+        );
+        assert_relative_eq!(
+            correlation_time_s((-1e-9_f64).exp(), 100.0),
+            1e7,
+            max_relative = 1e-6
+        );
     }
 
     #[test]

@@ -1,6 +1,7 @@
 use super::*;
 use crate::noise::Process;
 use crate::units::DEG;
+use approx::assert_relative_eq;
 
 const RATE: f64 = 100.0;
 
@@ -14,6 +15,14 @@ fn rw(density: f64) -> Process {
 
 fn gm(sigma: f64, t_corr_s: f64) -> Process {
     Process::gauss_markov(1.0 / t_corr_s, sigma * sigma, RATE).unwrap()
+}
+
+fn pair(density: f64, walk: f64) -> Pair {
+    Pair {
+        density,
+        walk,
+        markov: None,
+    }
 }
 
 fn curve(processes: Vec<Process>) -> AllanCurve {
@@ -36,10 +45,8 @@ fn a_pair_comes_back_from_every_policy() {
     let (n, k) = (0.15 * DEG / 60.0, 2e-7);
     for policy in [Policy::Strict, Policy::Matched, Policy::Envelope] {
         let pair = curve(vec![wn(n), rw(k)]).pair(policy, Bias::Walk);
-        assert!(
-            (pair.density / n - 1.0).abs() < 1e-12 && (pair.walk / k - 1.0).abs() < 1e-12,
-            "{pair:?}"
-        );
+        assert_relative_eq!(pair.density, n, max_relative = 1e-12);
+        assert_relative_eq!(pair.walk, k, max_relative = 1e-12);
     }
 }
 
@@ -52,10 +59,8 @@ fn the_search_finds_a_pair_by_another_name() {
     let slow = gm(k * (0.5 * t).sqrt(), t);
     for policy in [Policy::Matched, Policy::Envelope] {
         let pair = curve(vec![white, slow]).pair(policy, Bias::Walk);
-        assert!(
-            (pair.density / n - 1.0).abs() < 1e-4 && (pair.walk / k - 1.0).abs() < 1e-4,
-            "{pair:?}"
-        );
+        assert_relative_eq!(pair.density, n, max_relative = 1e-4);
+        assert_relative_eq!(pair.walk, k, max_relative = 1e-4);
     }
 }
 
@@ -65,12 +70,9 @@ fn a_gauss_markov_bias_comes_back() {
     for policy in [Policy::Strict, Policy::Matched, Policy::Envelope] {
         let pair = curve(vec![wn(n), gm(sigma, t)]).pair(policy, Bias::Markov);
         let markov = pair.markov.unwrap();
-        let worst = [pair.density / n, markov.sigma / sigma, markov.t_corr_s / t];
-        assert!(
-            worst.iter().all(|r| (r - 1.0).abs() < 1e-3),
-            "{policy:?} {worst:?}"
-        );
-        assert!((markov.drive() / (sigma * (2.0 / t).sqrt()) - 1.0).abs() < 1e-3);
+        let found = [pair.density, markov.sigma, markov.t_corr_s, markov.drive()];
+        let expected = [n, sigma, t, sigma * (2.0 / t).sqrt()];
+        assert_relative_eq!(found[..], expected[..], max_relative = 1e-3);
     }
 }
 
@@ -81,11 +83,7 @@ fn a_fast_ar1_is_the_white_noise() {
     let axis = vec![Process::ar1(0.6, 4e-5).unwrap()];
     let pair = curve(axis).pair(Policy::Matched, Bias::Walk);
     let n = (4e-5_f64 / RATE).sqrt() / (1.0 - 0.6);
-    assert!(
-        (pair.density / n - 1.0).abs() < 0.03,
-        "{:e} {n:e}",
-        pair.density
-    );
+    assert_relative_eq!(pair.density, n, max_relative = 0.03);
 }
 
 #[test]
@@ -112,23 +110,10 @@ fn matched_is_the_least_squares_pair() {
     let target = curve.reference.carried;
     for i in 0..=2000 {
         let density2 = target * f64::from(i) / 2000.0;
-        let unit = Pair {
-            density: 0.0,
-            walk: 1.0,
-            markov: None,
-        }
-        .allan_variance(100, RATE);
+        let unit = self::pair(0.0, 1.0).allan_variance(100, RATE);
         let walk = ((target - density2) / unit).max(0.0).sqrt();
-        let other = Pair {
-            density: density2.sqrt(),
-            walk,
-            markov: None,
-        };
-        assert!(
-            found <= misfit(&other) * (1.0 + 1e-9),
-            "{i}: {found} {}",
-            misfit(&other)
-        );
+        let other = misfit(&self::pair(density2.sqrt(), walk));
+        assert!(found <= other * (1.0 + 1e-9), "{i}: {found} {other}");
     }
 }
 
@@ -145,18 +130,14 @@ fn the_envelope_is_nowhere_below() {
     ] {
         let composite = Composite::new(model.clone());
         for kind in [Bias::Walk, Bias::Markov, Bias::MarkovOf(50.0)] {
-            let pair = curve(model.clone()).pair(Policy::Envelope, kind);
+            let curve = curve(model.clone());
+            let pair = curve.pair(Policy::Envelope, kind);
             for m in 100..=10_000 {
                 let ratio = (pair.allan_variance(m, RATE) / composite.allan_variance(m)).sqrt();
                 assert!(ratio > 1.0 - 4e-4, "{kind:?} {m}: {ratio}");
             }
-            let closure = curve(model.clone())
-                .pair(Policy::Envelope, kind)
-                .closure(&curve(model.clone()));
-            assert!(
-                (closure.lowest.ratio - 1.0).abs() < 1e-6,
-                "not the smallest: {closure:?}"
-            );
+            // it is the smallest
+            assert_relative_eq!(pair.closure(&curve).lowest.ratio, 1.0, max_relative = 1e-6);
         }
     }
 }
@@ -170,10 +151,7 @@ fn what_a_pair_cannot_carry_is_told() {
     let expected =
         (1e-8 / 100.0_f64).sqrt() / (1e-8 / 100.0 + 0.5 * (1e-5_f64 * 100.0).powi(2)).sqrt();
     let closure = pair.closure(&with_drift);
-    assert!(
-        (closure.lowest.ratio / expected - 1.0).abs() < 1e-6,
-        "{closure:?} {expected}"
-    );
+    assert_relative_eq!(closure.lowest.ratio, expected, max_relative = 1e-6);
     assert!((closure.lowest.tau_s - 100.0).abs() < 1e-9 && with_drift.left_out().ratio > 0.99);
     assert_eq!(curve(vec![wn(1e-4)]).left_out().ratio, 0.0);
 }
@@ -186,9 +164,8 @@ fn the_largest_axis_rules() {
     );
     let both = AllanCurve::largest(&[&small, &large], RATE, Horizon::default()).unwrap();
     let strict = both.pair(Policy::Strict, Bias::Walk);
-    assert!(
-        (strict.density / 2e-3 - 1.0).abs() < 1e-12 && (strict.walk / 4e-5 - 1.0).abs() < 1e-12
-    );
+    assert_relative_eq!(strict.density, 2e-3, max_relative = 1e-12);
+    assert_relative_eq!(strict.walk, 4e-5, max_relative = 1e-12);
     let pair = both.pair(Policy::Envelope, Bias::Walk);
     for m in (100..=10_000).step_by(50) {
         for axis in [&small, &large] {
@@ -206,9 +183,9 @@ fn the_bias_instability_is_the_minimum() {
         AxisParameters::of(&[&axis], RATE, Horizon::default(), Policy::Matched, 1e4).unwrap()
     };
     let minimum = parameters(vec![wn(n), rw(k)]).minimum.unwrap();
-    assert!((minimum.tau_s / (3.0_f64.sqrt() * n / k) - 1.0).abs() < 0.05);
+    assert_relative_eq!(minimum.tau_s, 3.0_f64.sqrt() * n / k, max_relative = 0.05);
     let floor = (2.0 * n * k / 3.0_f64.sqrt()).sqrt();
-    assert!((minimum.deviation / floor - 1.0).abs() < 1e-3);
+    assert_relative_eq!(minimum.deviation, floor, max_relative = 1e-3);
     assert_eq!(parameters(vec![wn(n)]).minimum, None);
     assert_eq!(parameters(vec![rw(n)]).minimum, None);
 }
@@ -241,11 +218,7 @@ fn horizons_that_cannot_be_are_refused() {
 #[test]
 fn a_pair_departs_from_a_model_without_its_random_walk() {
     let (n, k) = (1e-3, 1e-5);
-    let pair = Pair {
-        density: n,
-        walk: k,
-        markov: None,
-    };
+    let pair = pair(n, k);
     let departs = |processes, to_s| pair.departs_s(&Composite::new(processes), RATE, to_s, 2.0);
     let found = departs(vec![wn(n)], 1e4).unwrap() / (3.0 * n / k);
     assert!((1.0..1.045).contains(&found), "{found}");
@@ -261,25 +234,7 @@ fn a_pair_departs_from_a_model_without_its_random_walk() {
 /// N²/τ = K²τ/3 at τ = √3 N/K: 173.2 s for N = 1e-3 and K = 1e-5.
 #[test]
 fn white_noise_and_random_walk_are_equal_at_the_crossover() {
-    let (n, k) = (1e-3, 1e-5);
-    let pair = Pair {
-        density: n,
-        walk: k,
-        markov: None,
-    };
-    let tau_s = pair.crossover_s().unwrap();
-    assert!(
-        (tau_s / 173.205_080_756_887_7 - 1.0).abs() < 1e-12,
-        "{tau_s}"
-    );
-    let samples = (tau_s * RATE).round() as u32;
-    let [white, walk] = [(n, 0.0), (0.0, k)].map(|(density, walk)| Pair {
-        density,
-        walk,
-        markov: None,
-    });
-    let ratio = white.allan_variance(samples, RATE) / walk.allan_variance(samples, RATE);
-    // half a sample of 17 320, and what the sampling adds to a walk: 1/(2m²)
-    assert!((ratio - 1.0).abs() < 1e-4, "{ratio}");
-    assert_eq!(Pair { walk: 0.0, ..pair }.crossover_s(), None);
+    let tau_s = pair(1e-3, 1e-5).crossover_s().unwrap();
+    assert_relative_eq!(tau_s, 173.205_080_756_887_7, max_relative = 1e-12);
+    assert_eq!(pair(1e-3, 0.0).crossover_s(), None);
 }

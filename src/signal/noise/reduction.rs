@@ -216,6 +216,7 @@ impl WaveletFit {
 mod tests {
     use super::*;
     use crate::noise::Process;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
 
     fn ar1(phi: f64, sigma2: f64) -> Process {
         Process::ar1(phi, sigma2).unwrap()
@@ -237,9 +238,9 @@ mod tests {
     fn the_fit_recovers_a_pair_that_exists() {
         let model = Composite::new(vec![n2()[0], ar1(0.9995, 2e-10), ar1(0.9995, 3e-10)]);
         let reduced = reduce(&model, 100.0, 1.0, 800.0).unwrap();
-        assert!((reduced.white / 5e-5 - 1.0).abs() < 1e-6);
-        assert!((reduced.bias.shape() - 0.9995).abs() < 1e-9);
-        assert!((reduced.bias.amplitude() / 5e-10 - 1.0).abs() < 1e-6);
+        assert_relative_eq!(reduced.white, 5e-5, max_relative = 1e-6);
+        assert_abs_diff_eq!(reduced.bias.shape(), 0.9995, epsilon = 1e-9);
+        assert_relative_eq!(reduced.bias.amplitude(), 5e-10, max_relative = 1e-6);
         assert!(reduced.misfit < 1e-9);
     }
 

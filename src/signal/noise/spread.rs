@@ -370,7 +370,8 @@ mod spread_tests;
 mod replicate_tests {
     use super::*;
     use crate::imu::{Axis, Sensor};
-    use crate::noise::contamination::{Operation, Rule};
+    use crate::noise::contamination::Operation;
+    use crate::noise::contamination::tests::contamination;
     use crate::noise::{Composite, Kind, Law, Process, Variation};
 
     const X: Channel = Channel {
@@ -395,29 +396,19 @@ mod replicate_tests {
             contamination: None,
             seed: 3,
         };
-        let first = clean.signal(&model, 1, X, 100).unwrap();
-        assert_ne!(first, clean.signal(&model, 2, X, 100).unwrap());
-        assert_eq!(first, clean.signal(&model, 1, X, 100).unwrap());
+        let first = clean.signal(&model, 2, X, 100).unwrap();
+        assert_ne!(first, clean.signal(&model, 1, X, 100).unwrap());
+        assert_eq!(first, clean.signal(&model, 2, X, 100).unwrap());
 
-        let operation = Operation::Step {
+        let contamination = contamination([Operation::Step {
             at: crate::noise::contamination::Extent::Share(0.5),
             amplitude: 1000.0,
-        };
-        let rule = Rule {
-            sensor: Sensor::Accel,
-            replicate: Some(1),
-            operation,
-            place: String::new(),
-        };
-        let contamination = Contamination {
-            name: "step".into(),
-            rules: vec![rule],
-        };
+        }]);
         let dirty = VirtualImu {
             contamination: Some(&contamination),
             ..clean
         };
-        let stepped = dirty.signal(&model, 1, X, 100).unwrap();
+        let stepped = dirty.signal(&model, 2, X, 100).unwrap();
         assert_eq!(stepped[..50], first[..50]);
         assert!(
             stepped[50..]
@@ -439,21 +430,11 @@ mod replicate_tests {
         let variation = Variation::new(&model.axes[0], "RW", "gamma2", law).unwrap();
         let mut spread = Spread::default();
         spread.axes[0].push(variation);
-        let operation = Operation::Scale {
+        let contamination = contamination([Operation::Scale {
             process: "RW".into(),
             parameter: "gamma2".into(),
             factor: 4.0,
-        };
-        let rule = Rule {
-            sensor: Sensor::Accel,
-            replicate: Some(1),
-            operation,
-            place: String::new(),
-        };
-        let contamination = Contamination {
-            name: "scale".into(),
-            rules: vec![rule],
-        };
+        }]);
         let drawn = VirtualImu {
             model: &model,
             spread: Some(&spread),
@@ -468,6 +449,6 @@ mod replicate_tests {
             imu.model_of(replicate).unwrap().axes[0].processes[1].parameters()[0].1
         };
         let ratio = |replicate| gamma2(&scaled, replicate) / gamma2(&drawn, replicate);
-        assert!((ratio(1) - 4.0).abs() < 1e-14 && (ratio(2) - 1.0).abs() < 1e-14);
+        assert!((ratio(2) - 4.0).abs() < 1e-14 && (ratio(1) - 1.0).abs() < 1e-14);
     }
 }

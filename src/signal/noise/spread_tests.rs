@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::noise::{Kind, Process};
+use approx::assert_abs_diff_eq;
 
 const RATE: f64 = 100.0;
 
@@ -44,10 +45,18 @@ fn beta_has_its_range_and_moments() {
     let n = x.len() as f64;
     let mean = x.iter().sum::<f64>() / n;
     let variance = width * width * a * b / ((a + b) * (a + b) * (a + b + 1.0));
-    assert!((mean - (low + width * 0.75)).abs() < 5.0 * (variance / n).sqrt());
+    assert_abs_diff_eq!(
+        mean,
+        low + width * 0.75,
+        epsilon = 5.0 * (variance / n).sqrt()
+    );
     // The law is lighter-tailed than the normal: the variance's standard deviation is below the normal's.
     let sample = x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-    assert!((sample - variance).abs() < 5.0 * variance * (2.0 / n).sqrt());
+    assert_abs_diff_eq!(
+        sample,
+        variance,
+        epsilon = 5.0 * variance * (2.0 / n).sqrt()
+    );
 }
 
 /// Truncated at 0 from a standard normal about 0: mean √(2/π)·sd, variance (1 − 2/π)·sd².
@@ -67,7 +76,7 @@ fn normal_is_truncated_to_the_domain() {
     let (mean, pi) = (x.iter().sum::<f64>() / n, std::f64::consts::PI);
     assert!(x.iter().all(|v| *v >= 0.0));
     let bound = 5.0 * 2.0 * ((1.0 - 2.0 / pi) / n).sqrt();
-    assert!((mean - 2.0 * (2.0 / pi).sqrt()).abs() < bound, "{mean}");
+    assert_abs_diff_eq!(mean, 2.0 * (2.0 / pi).sqrt(), epsilon = bound);
 }
 
 /// The logarithm of sigma2 and that of the correlation time of phi, −1/ln phi, are normal: the mean of 4000 is within five of
@@ -124,55 +133,70 @@ fn what_is_not_drawn_keeps_its_value() {
 
 #[test]
 fn impossible_laws_are_refused_in_words() {
-    let refusal = |process, parameter, law| {
-        Variation::new(&n1(), process, parameter, law)
-            .unwrap_err()
-            .to_string()
-    };
     let beta = |a, low, width| Law::Beta {
         a,
         b: 1.0,
         low,
         width,
     };
-    let normal = |sd| Law::Normal { sd };
-    assert_eq!(
-        refusal("AR1_2", "phi", normal(0.1)),
-        "the model has no process \"AR1_2\" there, only WN, AR1, RW"
-    );
-    assert_eq!(
-        refusal("AR1", "ph", normal(0.1)),
-        "AR1 has no parameter \"ph\", only phi, sigma2"
-    );
-    assert_eq!(
-        refusal("WN", "sigma2", beta(0.0, 0.0, 1.0)),
-        "a = 0 is not a finite number > 0"
-    );
-    assert_eq!(
-        refusal("AR1", "phi", normal(2.0)),
-        "sd = 2 is not between 0 and 1"
-    );
-    assert_eq!(
-        refusal("WN", "sigma2", normal(f64::NAN)),
-        "sd = NaN is not a finite number ≥ 0"
-    );
     let lognormal = |median, sd| Law::Lognormal {
         median,
         sd,
         median_ci95: None,
         sd_ci95: None,
     };
-    assert_eq!(
-        refusal("WN", "sigma2", lognormal(0.0, 0.1)),
-        "median = 0 is not a finite number > 0"
-    );
-    assert_eq!(
-        refusal("WN", "sigma2", lognormal(1.0, 11.0)),
-        "sd = 11 is not between 0 and 10"
-    );
-    assert!(refusal("AR1", "phi", lognormal(1.5, 0.1)).contains("phi = 1.5 is not between"));
-    assert_eq!(
-        refusal("AR1", "phi", beta(1.0, 0.5, 0.5)),
-        "the distribution reaches refused values: AR1: phi = 1 is not between −1 and 1 (exclusive)"
+    let normal = |sd| Law::Normal { sd };
+    for (process, parameter, law, expected) in [
+        (
+            "AR1_2",
+            "phi",
+            normal(0.1),
+            "the model has no process \"AR1_2\" there, only WN, AR1, RW",
+        ),
+        (
+            "AR1",
+            "ph",
+            normal(0.1),
+            "AR1 has no parameter \"ph\", only phi, sigma2",
+        ),
+        (
+            "WN",
+            "sigma2",
+            beta(0.0, 0.0, 1.0),
+            "a = 0 is not a finite number > 0",
+        ),
+        ("AR1", "phi", normal(2.0), "sd = 2 is not between 0 and 1"),
+        (
+            "WN",
+            "sigma2",
+            normal(f64::NAN),
+            "sd = NaN is not a finite number ≥ 0",
+        ),
+        (
+            "WN",
+            "sigma2",
+            lognormal(0.0, 0.1),
+            "median = 0 is not a finite number > 0",
+        ),
+        (
+            "WN",
+            "sigma2",
+            lognormal(1.0, 11.0),
+            "sd = 11 is not between 0 and 10",
+        ),
+        (
+            "AR1",
+            "phi",
+            beta(1.0, 0.5, 0.5),
+            "the law reaches values that are refused: AR1: phi = 1 is not between −1 and 1 (exclusive)",
+        ),
+    ] {
+        let refusal = Variation::new(&n1(), process, parameter, law).unwrap_err();
+        assert_eq!(refusal.to_string(), expected);
+    }
+    let refusal = Variation::new(&n1(), "AR1", "phi", lognormal(1.5, 0.1)).unwrap_err();
+    assert!(
+        refusal.to_string().contains("phi = 1.5 is not between"),
+        "{refusal}"
     );
 }

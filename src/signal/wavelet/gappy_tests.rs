@@ -4,6 +4,7 @@ use super::*;
 use crate::noise::{Composite, Process, Synthesizer};
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::both;
+use approx::assert_relative_eq;
 use rand::{RngExt, SeedableRng};
 
 fn tuning() -> Tuning {
@@ -46,36 +47,20 @@ fn form(samples: &[f64], there: &[f64], level: u32) -> f64 {
 #[test]
 fn the_expectation_is_exact_whatever_the_holes() {
     const N: usize = 96;
-    let pulse = |i: usize| {
-        (0..N)
-            .map(|t| f64::from(u8::from(t == i)))
-            .collect::<Vec<f64>>()
-    };
-    let step = |i: usize| {
-        (0..N)
-            .map(|t| f64::from(u8::from(t >= i)))
-            .collect::<Vec<f64>>()
+    let of = |is: &dyn Fn(usize) -> bool| -> Vec<f64> {
+        (0..N).map(|t| f64::from(u8::from(is(t)))).collect()
     };
     for (seed, burst) in [(1, 1), (2, 5), (3, 9)] {
         let mut holes = vec![1.0; N];
         lose(&mut holes, 0.15, burst, &mut Generator::seed_from_u64(seed));
-        let there: Vec<f64> = holes
-            .iter()
-            .map(|x| f64::from(u8::from(!x.is_nan())))
-            .collect();
+        let there = of(&|t| !holes[t].is_nan());
         for level in 1..=5 {
             let tau = f64::from(level).exp2();
-            let white: f64 = (0..N).map(|i| form(&pulse(i), &there, level)).sum();
-            let walk: f64 = (1..N).map(|i| form(&step(i), &there, level)).sum();
-            assert!(
-                (white * tau - 1.0).abs() < 1e-11,
-                "{burst}, {level}: {white}"
-            );
+            let white: f64 = (0..N).map(|i| form(&of(&|t| t == i), &there, level)).sum();
+            let walk: f64 = (1..N).map(|i| form(&of(&|t| t >= i), &there, level)).sum();
+            assert_relative_eq!(white, 1.0 / tau, max_relative = 1e-11);
             let expected = (tau * tau + 2.0) / (12.0 * tau);
-            assert!(
-                (walk / expected - 1.0).abs() < 1e-11,
-                "{burst}, {level}: {walk} {expected}"
-            );
+            assert_relative_eq!(walk, expected, max_relative = 1e-11);
         }
     }
 }
@@ -108,15 +93,9 @@ fn without_holes_it_is_the_plain_one() {
     let (classical, robust) = both(&signal, 10, &tuning()).unwrap();
     let found = gappy(&signal, 10, &tuning()).unwrap();
     assert_eq!(found.coverage, [1.0; 10]);
-    for j in 0..10 {
-        assert!(
-            (found.classical[j] / classical[j] - 1.0).abs() < 1e-9,
-            "{j}"
-        );
-        assert!(
-            (found.robust[j].value / robust[j].value - 1.0).abs() < 1e-6,
-            "{j}"
-        );
+    assert_relative_eq!(found.classical[..], classical[..], max_relative = 1e-9);
+    for (found, plain) in found.robust.iter().zip(&robust) {
+        assert_relative_eq!(found.value, plain.value, max_relative = 1e-6);
     }
 }
 

@@ -273,28 +273,11 @@ mod tests {
             [(1.0 + 4.0 + 16.0) / 12.0, (4.5_f64 / 2.0).powi(2)]
         );
         assert_eq!(coefficients(&[1.0, 2.0, 4.0, 8.0], 2).unwrap(), [2.25]);
-        assert_eq!(
-            classical(&[1.0, 2.0, 3.0], 2),
-            Err(WaveletError::TooShort {
-                samples: 3,
-                levels: 2
-            })
-        );
-        assert_eq!(
-            classical(&[], 1),
-            Err(WaveletError::TooShort {
-                samples: 0,
-                levels: 1
-            })
-        );
+        for (samples, levels) in [(3, 2), (0, 1), (8, 64)] {
+            let refused = Err(WaveletError::TooShort { samples, levels });
+            assert_eq!(classical(&vec![1.0; samples], levels), refused);
+        }
         assert_eq!(classical(&[1.0], 0), Err(WaveletError::NoLevels));
-        assert_eq!(
-            classical(&[1.0; 8], 64),
-            Err(WaveletError::TooShort {
-                samples: 8,
-                levels: 64
-            })
-        );
         assert!(matches!(
             classical(&[1.0, f64::NAN], 1),
             Err(WaveletError::NotFinite { index: 1, .. })

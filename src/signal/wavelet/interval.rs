@@ -71,6 +71,7 @@ mod tests {
     use super::*;
     use crate::rng::Generator;
     use crate::wavelet::haar;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
 
@@ -88,7 +89,7 @@ mod tests {
             count as f64 / edof_large_sample(&w, 1)
         };
         let mean = (0..records).map(|_| inverse()).sum::<f64>() / f64::from(records);
-        assert!((mean - 1.0).abs() < 5.5e-4, "{mean}");
+        assert_abs_diff_eq!(mean, 1.0, epsilon = 5.5e-4);
     }
 
     /// Coefficients that never forget, cos(2π k/2^level): Σ s_k²/s_0² over the 32 lags of a sixteenth of the
@@ -101,7 +102,7 @@ mod tests {
             .map(|k| (std::f64::consts::TAU * f64::from(k % 64) / 64.0).cos())
             .collect();
         let expected = f64::from(count) / (4.0 * 33.0);
-        assert!((edof_large_sample(&w, level) / expected - 1.0).abs() < 5e-3);
+        assert_relative_eq!(edof_large_sample(&w, level), expected, max_relative = 5e-3);
     }
 
     /// 400 white signals: a frequency that is really 0.95 lies within 4 standard deviations,

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::rng::Generator;
-use approx::assert_relative_eq;
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 
@@ -55,7 +55,7 @@ fn few_coefficients_read_high_as_said() {
     let read = all.chunks(count).map(|some| m_scale(some, &tuning).value);
     let excess = read.sum::<f64>() / samples as f64 - 1.0;
     let expected = tuning.bias() / (0.6 * count as f64);
-    assert!((excess - expected).abs() < 0.006, "{excess} {expected}");
+    assert_abs_diff_eq!(excess, expected, epsilon = 0.006);
 }
 
 #[test]

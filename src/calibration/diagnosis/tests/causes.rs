@@ -1,41 +1,22 @@
 //! What classical and robust variances differ by, and recordings drift by, without an outlier or another noise.
 
 use super::*;
-use rand::SeedableRng;
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 
 /// Four recordings of Gaussian numbers, of a deviation in steps and a bias that differs, rounded to whole steps; `glitches` of
 /// 30 steps.
 fn rounded(deviation: f64, glitches: usize) -> Vec<Diagnosis> {
     let signal = |file: usize, axis: Axis| {
-        let run = file as u64;
-        let mut generator = StreamKey {
-            seed: 6,
-            scenario: "",
-            run,
-            source: axis.name(),
-            process: "",
-        }
-        .generator();
+        let mut generator = generator(6, 3 * file as u64 + axis as u64);
         let bias = 0.3 * file as f64;
-        let mut number = || (bias + deviation * generator.sample::<f64, _>(StandardNormal)).round();
+        let mut number = || (bias + deviation * normal(&mut generator)).round();
         let mut signal: Vec<f64> = (0..32 * SAMPLES).map(|_| number()).collect();
-        signal
-            .iter_mut()
-            .skip(50)
-            .step_by(600)
-            .take(glitches)
-            .for_each(|x| *x += 30.0);
+        let glitched = signal.iter_mut().skip(50).step_by(600).take(glitches);
+        glitched.for_each(|x| *x += 30.0);
         signal
     };
     let recording = |file: usize| Axis::ALL.map(|axis| signal(file, axis));
-    let model = ModelChoice::Given("WN".parse().unwrap());
-    diagnosed(
-        (0..4).map(recording),
-        &Settings {
-            model,
-            ..settings()
-        },
-    )
+    diagnosed((0..4).map(recording), &settings("WN"))
 }
 
 /// Rounding without an outlier: none is told, in all recordings or in one whose bias lies elsewhere between the steps. At half a
@@ -48,10 +29,9 @@ fn coarse_steps_are_not_taken_for_outliers() {
         let [steps] = all[0].common.as_slice() else {
             panic!("{deviation}: {:?}", all[0].common)
         };
+        assert_eq!(steps.cause, CommonCause::CoarseSteps);
         assert!(
-            steps.cause == CommonCause::CoarseSteps
-                && steps.size.abs() > 0.02
-                && steps.tau_s.iter().all(|tau| *tau <= 256.0),
+            steps.size.abs() > 0.02 && steps.tau_s.iter().all(|tau| *tau <= 256.0),
             "{steps:?}"
         );
     }
@@ -71,80 +51,40 @@ fn coarse_steps_are_not_taken_for_outliers() {
 /// leaves a scale out; the numbers' own variance is known to √(2/n), four times, where the robust scales are to 1.3 %.
 #[test]
 fn coarse_steps_take_no_scale_from_one_recording() {
-    let mut generator = Generator::seed_from_u64(5);
+    let mut generator = generator(5, 0);
     let signal: Vec<f64> = (0..32 * SAMPLES)
-        .map(|_| (0.3 * generator.sample::<f64, _>(StandardNormal)).round())
+        .map(|_| (0.3 * normal(&mut generator)).round())
         .collect();
-    let (classical, robust) = both(&signal, LEVELS, &settings().tuning).unwrap();
-    let (name, axis, samples) = ("run".to_owned(), Some(Axis::X), signal.len());
-    let one = Replicate {
-        name,
-        axis,
-        samples,
-        classical,
-        robust,
-        coverage: Vec::new(),
-        trend: f64::NAN,
-        mean: f64::NAN,
+    let channel = Channel {
+        sensor: Sensor::Accel,
+        axis: Axis::X,
     };
-    let groups = grouped(
-        vec![(
-            Channel {
-                sensor: Sensor::Accel,
-                axis: Axis::X,
-            },
-            one,
-        )],
-        Pool::Axes,
-    );
-    let estimators = vec![Estimator::Gmwm, Estimator::Rgmwm, Estimator::SrAwv];
-    let model = ModelChoice::Given("WN".parse().unwrap());
-    let outcomes = calibrate(
-        &groups,
-        &Settings {
-            model,
-            estimators,
-            ..settings()
-        },
-    )
-    .unwrap();
-    for outcome in outcomes {
+    let one = measured("run".to_owned(), &signal, LEVELS);
+    let groups = grouped(vec![(channel, one)], Pool::Axes);
+    let settings = Settings {
+        estimators: vec![Estimator::Gmwm, Estimator::Rgmwm, Estimator::SrAwv],
+        ..settings("WN")
+    };
+    for outcome in calibrate(&groups, &settings).unwrap() {
         assert!(outcome.curve.ignored.is_empty());
         let (_, sigma2) = outcome.fit.composite.parameters().next().unwrap();
         let allowed = 0.013 + 4.0 * (2.0 / signal.len() as f64).sqrt();
-        assert!(
-            (sigma2 / 0.0956 - 1.0).abs() < allowed,
-            "{}: {sigma2}",
-            outcome.estimator.name()
-        );
+        assert_relative_eq!(sigma2, 0.0956, max_relative = allowed);
     }
 }
 
 /// Sets, of so many, with an alarm of noise and of outliers: five alike recordings of white noise and a ramp, another on each axis,
 /// whose slopes differ by a part, under the model that has it.
 fn alarmed_under_a_drift(differ: f64, sets: u64) -> [u32; 2] {
-    let model = ModelChoice::Given("WN+DR".parse().unwrap());
-    let settings = Settings {
-        model,
-        ..settings()
-    };
+    let settings = settings("WN+DR");
     let mut alarms = [0; 2];
     for seed in 0..sets {
         let recording = |file: usize| {
-            let run = file as u64;
-            let mut generator = StreamKey {
-                seed,
-                scenario: "",
-                run,
-                source: "",
-                process: "",
-            }
-            .generator();
-            let slope = 30.0 * (1.0 + differ * normals(&mut generator)[0]) / (4 * SAMPLES) as f64;
+            let mut generator = generator(seed, file as u64);
+            let slope = 30.0 * (1.0 + differ * normal(&mut generator)) / (4 * SAMPLES) as f64;
             [1.0, -0.7, 0.4].map(|part| {
                 let ramp = (0..4 * SAMPLES).map(|t| part * slope * t as f64);
-                ramp.map(|level| level + generator.sample::<f64, _>(StandardNormal))
-                    .collect()
+                ramp.map(|level| level + normal(&mut generator)).collect()
             })
         };
         let all = diagnosed((0..5).map(recording), &settings);
@@ -170,29 +110,13 @@ fn a_drift_of_the_model_raises_no_alarms() {
 fn a_drift_that_all_share_is_told() {
     let drifting = |count: usize, model: &str| {
         let recording = |file: usize| {
-            let run = file as u64;
-            let mut generator = StreamKey {
-                seed: 3,
-                scenario: "",
-                run,
-                source: "",
-                process: "",
-            }
-            .generator();
+            let mut generator = generator(3, file as u64);
             [3.0, 0.0, 0.0].map(|drift| {
                 let ramp = (0..SAMPLES).map(|t| drift * t as f64 / SAMPLES as f64);
-                ramp.map(|level| level + generator.sample::<f64, _>(StandardNormal))
-                    .collect()
+                ramp.map(|level| level + normal(&mut generator)).collect()
             })
         };
-        let model = ModelChoice::Given(model.parse().unwrap());
-        diagnosed(
-            (0..count).map(recording),
-            &Settings {
-                model,
-                ..settings()
-            },
-        )
+        diagnosed((0..count).map(recording), &settings(model))
     };
     for count in [3, 5] {
         let all = drifting(count, "WN+RW");
@@ -203,7 +127,7 @@ fn a_drift_that_all_share_is_told() {
             drift.cause == CommonCause::Drift && drift.axis == Some(Axis::X),
             "{drift:?}"
         );
-        assert!((drift.size - 5.27).abs() < 4.0 * 0.09, "{drift:?}");
+        assert_abs_diff_eq!(drift.size, 5.27, epsilon = 4.0 * 0.09);
     }
     assert!(
         drifting(2, "WN+RW")

@@ -50,11 +50,7 @@ fn doubts_are_told() {
 fn a_rate_beside_that_of_the_time_column_is_told() {
     let (_files, path) = Files::with("a.csv", sound(20).join("\n"));
     let report = |rate_hz| {
-        let options = ReadOptions {
-            rate_hz: Some(rate_hz),
-            ..ReadOptions::default()
-        };
-        read(std::slice::from_ref(&path), &options)
+        read(std::slice::from_ref(&path), &at(rate_hz))
             .unwrap()
             .1
             .files

@@ -27,8 +27,6 @@ fn a_last_line_with_too_few_columns_is_left_out() {
             ["line 4, the last, is cut off: left out"]
         );
     }
-    let within = WHOLE.replace(",-2.2e-04", "");
-    assert_eq!(refusal(within), "a.csv, line 3: 1 values, but 2 columns");
 }
 
 #[test]
@@ -49,18 +47,6 @@ fn units_below_the_names_are_theirs() {
     assert_close(&samples_with_mean(&recording.signals[0]), &[DEG, 2.0 * DEG]);
     assert_close(&samples_with_mean(&recording.signals[1]), &[1.0, 2.0]);
     assert_close(&[recording.rate_hz], &[100.0]);
-    assert_eq!(
-        refusal("t_s,gyro_x\ns,turns/s\n0,1\n0.01,2\n"),
-        "a.csv, line 1: column \"gyro_x turns/s\" is in an unknown unit"
-    );
-    assert_eq!(
-        refusal("t_s,gx_dps\ns,deg/s\ns,deg/s\n0,1\n"),
-        "a.csv, line 3: column \"t_s\": \"s\" is not a number"
-    );
-    assert_eq!(
-        refusal("t_s,gx_dps\n0,abc\n"),
-        "a.csv, line 2: column \"gx_dps\": \"abc\" is not a number"
-    );
 }
 
 #[test]
@@ -110,19 +96,10 @@ fn lines_before_the_header_are_passed_over() {
 fn sentences_of_an_imu_are_read() {
     let rows = "$VNIMU,-00.0350,+00.4222,-00.6643,+000.087,-000.138,-009.794,+00.000359,+00.001511,-00.001786,+20.7,+084.322*5E\n\
                 $VNIMU,-00.0350,+00.4222,-00.6643,+000.102,-000.151,-009.803,+00.001687,-00.000047,-00.000800,+20.7,+084.322*5A\n";
-    let options = ReadOptions {
-        rate_hz: Some(100.0),
-        ..ReadOptions::default()
-    };
-    let file = tempfile::NamedTempFile::with_suffix(".txt").unwrap();
-    std::fs::write(file.path(), rows).unwrap();
-    let (recordings, _) = read(&[file.path().to_owned()], &options).unwrap();
-    let [x, .., z] = &recordings[0].signals[..] else {
-        panic!("six signals");
-    };
-    assert_close(&samples_with_mean(x), &[0.087, 0.102]);
-    assert_close(&samples_with_mean(z), &[-1.786e-3, -0.8e-3]);
-    assert!(refusal("$GPRMC,,V,,,,,,,,,,N*53\n").ends_with("sentences ($GPRMC), no table"));
+    let signals = read_one("a.txt", rows, &at(100.0)).unwrap().signals;
+    assert_eq!(signals.len(), 6);
+    assert_close(&samples_with_mean(&signals[0]), &[0.087, 0.102]);
+    assert_close(&samples_with_mean(&signals[5]), &[-1.786e-3, -0.8e-3]);
 }
 
 /// Sensor Logger names the sensor in the file's name; beside what the accelerometer measures, it writes what is left without
@@ -152,11 +129,9 @@ fn files_named_after_their_sensor_are_read() {
 
     let files = Files::new();
     files.add("Gravity.csv", accel);
-    let refusal = read(&[files.path()], &ReadOptions::default()).unwrap_err();
+    let refusal = files.told(&read(&[files.path()], &ReadOptions::default()).unwrap_err());
     assert!(
-        refusal
-            .to_string()
-            .contains("Gravity.csv, line 1: no accelerometer"),
+        refusal.starts_with("Gravity.csv, line 1: no accelerometer"),
         "{refusal}"
     );
 }
