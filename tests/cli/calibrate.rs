@@ -276,7 +276,7 @@ fn the_curves_of_wv_give_the_fits_of_their_recording() {
         2,
     );
     assert!(
-        stderr.contains("none.wv.json, head: efficiency = 0 is not a number above 0"),
+        stderr.contains("none.wv.json, head: efficiency = 0 is not above 0"),
         "{stderr}"
     );
     json(dir.path(), &["wv", "runs", "-o", "two.wv.json"]);

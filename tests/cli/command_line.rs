@@ -135,7 +135,7 @@ fn what_the_system_refuses_is_said_in_words() {
         (
             "wv cut.csv.gz",
             "cut.csv.gz: ",
-            "the file is cut off, or not gzipped",
+            "the file is cut off or not gzipped",
         ),
     ] {
         let mut program = nav_sim();

@@ -149,7 +149,7 @@ fn ratios_are_those_that_were_made() {
     }
     // errors are 1; the filters believe 1, 1.75 and 0.9 times (1 to 1.38): the second is underconfident for 20 runs
     let mut lines = ran.stdout.lines();
-    let cost = "against I_awv: II_awv +75 %, II_sr-awv -10 % of the uncertainty of East position";
+    let cost = "uncertainty of East position against I_awv: II_awv +75 %, II_sr-awv -10 %";
     assert_eq!(lines.next(), Some(cost), "{}", ran.stdout);
     let verdict = lines.next().unwrap();
     let words = [
@@ -471,7 +471,7 @@ fn a_table_that_was_changed_is_refused() {
     std::fs::write(&epochs, changed("nan")).unwrap();
     refused("error: a/epochs.csv, line 7: column \"asee_pos_e_m\": NaN is not a finite number");
     std::fs::write(&epochs, changed("2.5")).unwrap();
-    refused("error: a/epochs.csv: is not what its manifest.json says");
+    refused("error: a/epochs.csv: differs from manifest.json");
 }
 
 #[test]

@@ -63,7 +63,8 @@ fn a_demo_replaces_no_file_of_others() {
         let said = String::from_utf8(ran.stderr).unwrap();
         assert!(
             ran.status.code() == Some(2)
-                && (said.contains("is not of this command") || said.contains("or of others")),
+                && (said.contains("is not of this command")
+                    || said.contains("belongs to another demo")),
             "{name}: {said}"
         );
         assert_eq!(std::fs::read_to_string(out.join(name)).unwrap(), "mine");

@@ -47,7 +47,7 @@ fn one_design_is_a_screen_and_what_cannot_be_planned_is_refused() {
     let text = shown("calib_data/consumer_mems.toml --recordings 4 --hours 0.5 --draws 40");
     assert!(
         text.starts_with("4 recordings of 0.5 h would determine ")
-            && text.contains("; known least: "),
+            && text.contains("; least certain: "),
         "{text}"
     );
     assert!(
@@ -63,7 +63,7 @@ fn one_design_is_a_screen_and_what_cannot_be_planned_is_refused() {
         "calib_data/tactical.toml --estimator gmwm",
         "--estimator='gmwm': not one of awv, sr-awv, dr-awv",
     );
-    refused("calib_data/tactical.toml --hours 1e6", "longer than a year");
+    refused("calib_data/tactical.toml --hours 1e6", "over a year");
     refused(
         "calib_data/tactical.toml --hours 1e-4 --recordings 3 --draws 40",
         "more, or longer recordings",

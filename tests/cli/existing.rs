@@ -167,12 +167,12 @@ fn a_fusion_is_known_by_its_configuration_and_the_contents_of_its_files() {
     ] {
         refused(
             &plain(place.path(), &format!("{fuse} {given} {other} -o out")),
-            "holds the result of another",
+            "holds another result",
         );
     }
     let text = fs::read_to_string(place.path().join("copy.csv")).unwrap();
     fs::write(place.path().join("copy.csv"), text.trim_end()).unwrap();
-    refused(&plain(place.path(), &same), "holds the result of another");
+    refused(&plain(place.path(), &same), "holds another result");
 }
 
 /// Another that writes there now is met before the work, even with `--force`; what a killed one left is not in the way

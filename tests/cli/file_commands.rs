@@ -39,7 +39,7 @@ fn check_looks_at_every_file() {
         said.contains("bad.toml, line 2") && said.contains("worse.toml, line 1"),
         "{said}"
     );
-    assert!(said.contains("2 of 3 files are refused"), "{said}");
+    assert!(said.contains("2 of 3 files refused"), "{said}");
     assert!(out.contains("tactical.toml: a noise model"), "{out}");
     // warnings stay with --quiet, and have their hints
     let (_, _, said) = check(&["timeless.csv", "bad.toml", "--quiet"]);
@@ -312,7 +312,7 @@ fn check_hints_at_what_helps() {
     );
     let (_, found, _) = check("whole.csv", &table(0..0));
     assert!(
-        found.starts_with("whole.csv: read as a static recording, 1 channels"),
+        found.starts_with("whole.csv: read as a static recording, 1 channel"),
         "{found}"
     );
 }

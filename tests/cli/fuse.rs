@@ -361,7 +361,7 @@ fn bad_imu_data_and_flags_are_refused() {
                 .replace("accel_z_m_s2", "accel_z_mg")
         },
         "",
-        &["far from 9.81 m/s²"],
+        &["not 9.81 m/s²"],
     );
     refused(
         imu,
@@ -552,7 +552,7 @@ fn useless_fusions_are_refused_or_said() {
     let twice = "fuse rec/imu.csv rec/gnss.csv imu.toml --outage 60:70 --outage 65:75 -o out -v";
     let ran = done(place.path(), twice);
     assert!(
-        ran.stderr.contains("overlap or touch") && ran.stdout.contains("60–75 s"),
+        ran.stderr.contains("overlapping outages are merged") && ran.stdout.contains("60–75 s"),
         "{}",
         ran.stdout
     );

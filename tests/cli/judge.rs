@@ -177,7 +177,7 @@ fn standard_deviations_may_be_in_a_file_of_their_own() {
     assert!(
         alone
             .stdout
-            .starts_with("undecided: the solution states no standard deviations"),
+            .starts_with("undecided: no standard deviations in the solution"),
         "{}",
         alone.stdout
     );

@@ -87,7 +87,7 @@ fn models_and_curves_say_what_they_are_of() {
     let curve = "calibrate --curve c.csv --rate-hz 100 --model WN --bootstrap 0";
     let told = |more: &str| plain(place.path(), &format!("{curve}{more}")).stderr;
     assert!(
-        told("").contains("taken as of an accelerometer"),
+        told("").contains("taken as an accelerometer"),
         "{}",
         told("")
     );
@@ -119,7 +119,7 @@ fn check_knows_its_own_records() {
     assert!(
         lines[..2]
             .iter()
-            .all(|line| line.contains("a record that nav-sim wrote")),
+            .all(|line| line.contains("a record beside a result")),
         "{lines:?}"
     );
     assert!(lines[2].contains("wavelet-variance curves"), "{lines:?}");

@@ -120,7 +120,7 @@ fn wv_writes_a_page_and_a_picture_where_it_is_told() {
                 .starts_with(b"\x89PNG\r\n\x1a\n")
         );
     } else {
-        let said = "curves.PNG: neither page nor picture\n\nhint: name a file that ends in .html or .svg (.png with";
+        let said = "curves.PNG: neither page nor picture\n\nhint: end the name in .html or .svg (.png with";
         assert!(ran.code == 2 && ran.stderr.contains(said), "{}", ran.stderr);
     }
     let ran = nav_sim(dir, "wv static --plot curves");
@@ -131,7 +131,7 @@ fn wv_writes_a_page_and_a_picture_where_it_is_told() {
     );
     let ran = nav_sim(dir, "wv static --plot static/replicate_1.csv");
     assert!(
-        ran.code == 2 && ran.stderr.contains("not a page or picture"),
+        ran.code == 2 && ran.stderr.contains("neither page nor picture"),
         "{}",
         ran.stderr
     );

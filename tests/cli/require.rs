@@ -322,7 +322,7 @@ fn requests_that_mean_nothing_are_refused() {
     ];
     refused(
         &window,
-        ["--start 70 beside --outage 60:90", "a length alone"],
+        ["--start 70 beside --outage 60:90", "given by its length"],
     );
     refused(
         &["--outage", "1e5", "--require", "p95_m<=5"],
@@ -343,7 +343,7 @@ fn requests_that_mean_nothing_are_refused() {
     refused(&nowhere, ["--catalogue nowhere: no such directory", "hint"]);
     // the poorest IMU keeps them: to look further made a noise without a finite variance, and a panic
     for (loose, shown) in [("1e6", "1.00e6 m:"), ("1e300", "1.00e300 m:")] {
-        let said = format!("no IMU is too poor for p95_m ≤ {shown}");
+        let said = format!("every IMU keeps p95_m ≤ {shown}");
         refused(
             &["--outage", "60:90", "--require", &format!("p95_m<={loose}")],
             [&said, "a smaller limit"],
@@ -360,7 +360,7 @@ fn requests_that_mean_nothing_are_refused() {
             "-o",
             "x.toml",
         ],
-        ["cannot be used with", "--out"],
+        ["not for MODEL", "--out"],
     );
 }
 

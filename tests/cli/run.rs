@@ -374,7 +374,7 @@ fn a_recording_that_is_too_short_is_refused_by_how_much() {
     );
     assert!(
         ran.stderr
-            .contains("hint: each run takes a window as long as the trajectory"),
+            .contains("hint: record for longer: each run takes a window"),
         "{}",
         ran.stderr
     );
@@ -578,7 +578,7 @@ fn motion_in_a_static_recording_is_said() {
     let ran = nav_sim(place.path(), command);
     assert!(
         ran.stderr
-            .contains("imu.csv: not static? The mean over a second of accel.x"),
+            .contains("imu.csv: not static? One-second means of accel.x"),
         "{}",
         ran.stderr
     );

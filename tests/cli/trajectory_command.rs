@@ -98,8 +98,7 @@ fn check_speaks_json_and_exits_with_3_beyond_a_limit() {
         "{err}"
     );
     assert!(
-        err.contains("hint: a higher --rate-hz")
-            && err.contains("; a vehicle that does move so deserves"),
+        err.contains("hint: a higher --rate-hz") && err.contains("; a vehicle that moves so needs"),
         "{err}"
     );
 }

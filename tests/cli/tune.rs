@@ -177,10 +177,7 @@ fn a_truth_that_is_none_is_refused() {
         let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
         assert!(words.iter().all(|word| said.contains(word)), "{said}");
     };
-    refused(
-        &["model.toml"],
-        ["--truth is not given", "hint: give models"],
-    );
+    refused(&["model.toml"], ["neither --truth", "hint: give models"]);
     refused(
         &["truth.toml", "--truth", "."],
         ["recordings, not a model", "--estimator gmwm"],
@@ -286,7 +283,7 @@ fn the_sigma_that_covers_the_errors_of_aiding_is_found() {
     let refused = tune(dir.path(), &[&model, "--scenario", "car.toml"]).code(2);
     let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
     assert!(
-        said.contains("belong to a trajectory") && said.contains("--trajectory"),
+        said.contains("need a trajectory") && said.contains("--trajectory"),
         "{said}"
     );
     let kind = |sigma: f64| {

@@ -318,7 +318,10 @@ fn a_change_between_calibrations_is_told_from_chance() {
     );
     assert!((ratio(&other) * ratio(&turned) - 1.0).abs() < 1e-12);
     let unjudged = done(dir, "compare imu.toml louder.toml -o found.json").stdout;
-    assert!(unjudged.starts_with("not judged: no figure"), "{unjudged}");
+    assert!(
+        unjudged.starts_with("not judged: no shared figure"),
+        "{unjudged}"
+    );
 
     done(dir, "run drive.toml imu.toml --runs 2 --seed 1 -o out");
     for (words, problem) in [

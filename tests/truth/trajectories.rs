@@ -138,7 +138,7 @@ fn too_slow_a_rate_for_the_rotation_is_refused() {
         .unwrap_err()
         .to_string();
     assert!(
-        e.contains("within one sample at") && e.contains("too slow a rate for it"),
+        e.contains("within one sample at") && e.contains("the rate is too low"),
         "{e}"
     );
     assert!(

@@ -99,12 +99,12 @@ fn what_is_assumed_is_said() {
     );
     // 3.24 s / 1.8926
     assert!(
-        doubts[0].ends_with("a correlation time above 1.71 s would"),
+        doubts[0].ends_with("a correlation time above 1.71 s would not"),
         "{doubts:?}"
     );
     let doubts = doubts_with(&[(Sensor::Gyro, Figure::CorrelationTime, "0.001 s")]);
     assert!(
-        doubts[0].starts_with("gyro: at 0.00189 s the white noise alone"),
+        doubts[0].starts_with("gyro: at 0.00189 s the white noise hides"),
         "{doubts:?}"
     );
     // one that ends at 1.8926·3 s: √(1 + 3.24/5.678) = 1.25

@@ -111,7 +111,8 @@ fn the_layout_is_the_published_one() {
         &n2(),
         &Composite::default(),
     )));
-    let expected = "schema = 1
+    let expected = "#:schema schemas/model.schema.json
+schema = 1
 rate_hz = 100.0
 
 [accel]

@@ -77,7 +77,7 @@ fn bad_requests_are_refused_with_a_hint() {
             "hint: did you mean \"AR1\"?",
         ],
     );
-    check(calibrate(&["--model", "2*WN"], 2), &["2 WN are one WN"]);
+    check(calibrate(&["--model", "2*WN"], 2), &["2 WN equal one WN"]);
     check(
         calibrate(&["--trim", "2"], 2),
         &[
@@ -106,7 +106,7 @@ fn bad_requests_are_refused_with_a_hint() {
     );
     check(
         calibrate(&["--estimator", "gmwm"], 2),
-        &["gmwm takes one recording at a time; there are 2"],
+        &["gmwm takes one recording; there are 2"],
     );
     let before = std::fs::read(dir.path().join("runs/run0.csv")).unwrap();
     check(
@@ -115,7 +115,7 @@ fn bad_requests_are_refused_with_a_hint() {
     );
     check(
         refusal(dir.path(), &["wv", "runs", "-o", "runs/run0.csv"], 2),
-        &["run0.csv is an input of this command"],
+        &["run0.csv is an input and would be overwritten"],
     );
     assert_eq!(
         std::fs::read(dir.path().join("runs/run0.csv")).unwrap(),
@@ -199,7 +199,7 @@ fn what_was_drawn_is_recorded_and_copies_are_refused() {
         "--rate-hz",
         "50",
     ];
-    assert!(refusal(dir.path(), &curve, 2).contains("the curve says its rate, 50 Hz"));
+    assert!(refusal(dir.path(), &curve, 2).contains("the curve is at 50 Hz"));
 
     let copy = dir.path().join("runs/run2.csv");
     // With other line ends: the samples count, not the bytes.

@@ -125,7 +125,7 @@ fn jumps_are_left_out_and_named() {
     let times = serde_json::json!([30.0, 31.0, 55.0, 80.0]);
     assert_eq!(summary["outliers"]["t_s"], times, "{summary}");
     assert_eq!(summary["fixes"]["rejected"], 4);
-    let warning = "warning: 4 fixes (4.0 %) are outliers";
+    let warning = "warning: 4 outliers (4.0 %";
     assert!(
         ran.stderr.contains(warning) && ran.stderr.contains("30, 31, 55, 80 s"),
         "{}",
@@ -172,7 +172,7 @@ fn a_model_that_is_too_quiet_is_told() {
         .into_iter()
         .zip(model.lines().filter(|l| l.contains("WN")))
     {
-        let start = format!("warning: {sensor}: the white noise of the recording is ");
+        let start = format!("warning: {sensor}: the recording has ");
         let told = ran.stderr.lines().find(|l| l.starts_with(&start));
         let told = told.unwrap_or_else(|| panic!("{}", ran.stderr));
         let ratio = sigma2(told) / sigma2(made);

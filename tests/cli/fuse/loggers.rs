@@ -51,8 +51,8 @@ fn inputs_as_loggers_and_receivers_have_them() {
         );
         assert_eq!(ran.code, 2);
         for text in [
-            &format!("{name}, line 1: a header that names the columns is missing"),
-            "7 of them (t_s, latitude",
+            &format!("{name}, line 1: no header with column names"),
+            "7 (t_s, latitude",
         ] {
             assert!(ran.stderr.contains(text), "{}", ran.stderr);
         }
@@ -175,7 +175,7 @@ fn a_window_before_the_start_is_no_outage() {
     );
     assert!(
         ran.stderr
-            .contains("outage 1–3 s ends before the start of the solution"),
+            .contains("outage 1–3 s ends before the solution starts"),
         "{}",
         ran.stderr
     );
@@ -239,14 +239,17 @@ fn files_of_other_kinds_are_named() {
         "rec/gnss.csv",
         gpx,
         "",
-        &["gnss.csv, line 1: XML, as GPX", "hint: write its points"],
+        &[
+            "gnss.csv, line 1: XML such as GPX",
+            "hint: write its points",
+        ],
     );
     let increments = |text: &str| text.replacen("accel_x_m_s2", "dv_x_ft_s", 1);
     refused(
         "rec/imu.csv",
         increments,
         "",
-        &["column \"dv_x_ft_s\" is in a unit", "_m_s, _mps"],
+        &["column \"dv_x_ft_s\" is in an unknown unit", "_m_s, _mps"],
     );
     let place = recorded();
     let ran = nav_sim(

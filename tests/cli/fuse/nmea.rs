@@ -135,15 +135,12 @@ fn sentences_give_the_solution_of_the_table() {
         gnss[0][4], gnss[0][5], gnss[0][6]
     );
     let (given, said) = fused(place.path(), "day.csv", "bare.txt", &same);
-    assert!(
-        said.contains("as given where the file states none"),
-        "{said}"
-    );
+    assert!(said.contains("as given where the file has none"), "{said}");
     near(&given, 0.0);
 
     let (_, said) = fused(place.path(), "day.csv", "log.nmea", "");
     assert!(
-        said.contains("speed and course are not used") && said.contains("--gnss-sigma"),
+        said.contains("speed and course are unused") && said.contains("--gnss-sigma"),
         "{said}"
     );
     let ran = nav_sim(place.path(), "fuse day.csv bare.txt imu.toml -o none");

@@ -34,7 +34,7 @@ fn errors_of_second_order_are_not_to_be_tuned_away() {
             .find(|line| line.contains("the filter is overconfident"))
             .unwrap();
         assert!(
-            warning.contains("too large for a linear filter; another MODEL or nav-sim tune"),
+            warning.contains("too large for a linear filter: another MODEL or nav-sim tune"),
             "{warning}"
         );
     }
@@ -145,7 +145,7 @@ fn a_verdict_of_linear_theory_says_until_where_it_holds() {
         "{verdict}"
     );
     assert!(
-        both.stdout.contains("by covariance analysis doubtful"),
+        both.stdout.contains("covariance analysis: doubtful"),
         "{}",
         both.stdout
     );
