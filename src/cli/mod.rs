@@ -8,7 +8,7 @@ use crate::commands::with_commands;
 use crate::io::{contamination_file, file_kind, fusion_files, model_file, trajectory_file};
 use clap::builder::Resettable;
 use clap::error::{ContextKind, ErrorKind};
-use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_signal::lanes::Level;
 use serde_json::json;
@@ -442,7 +442,7 @@ mod schema_tests;
 /// Make a directory with everything to start from: a commented file of every kind, trajectories, virtual IMUs
 ///
 /// scenario.toml, imu.toml, motion.toml, contamination.toml, initial.toml and examples/quick_study.toml say
-/// what each key means. The others are those of the repository; the examples of every --help work inside the directory. Files
+/// what each key means. Editors take the schemas from schemas/. The others are those of the repository; the examples of every --help work inside the directory. Files
 /// that exist already are left alone.
 #[derive(clap::Args)]
 struct InitArgs {
@@ -452,7 +452,15 @@ struct InitArgs {
 }
 
 fn init(args: &InitArgs, session: &Session) -> Result<String, Failure> {
-    let (written, kept) = crate::init::write_start_files(&args.directory)?;
+    let schema = |of: &SchemaKind| {
+        let name = of.to_possible_value()?.get_name().to_owned();
+        Some((name, crate::report::json(&schema_of(*of))))
+    };
+    let schemas: Vec<_> = SchemaKind::value_variants()
+        .iter()
+        .filter_map(schema)
+        .collect();
+    let (written, kept) = crate::init::write_start_files(&args.directory, &schemas)?;
     for path in &kept {
         session.say(format!("kept {path}"));
     }

@@ -11,7 +11,7 @@ use crate::io::toml_file::TomlSource;
 use crate::io::{contamination_file, curve_file, datasheet, scenario_file};
 use crate::parse;
 use crate::report::six_digits;
-use nav_sim_document::{Document, Note, Tone};
+use nav_sim_document::{Document, Note, Tone, counted};
 use nav_sim_logs::Stamp;
 use nav_sim_navigation::fusion::alignment::moves;
 use nav_sim_navigation::gnss::FixSigma;
@@ -71,7 +71,7 @@ impl Command for CheckFiles {
                     let hint = own.advice().map(|advice| format!("; {advice}"));
                     format!("{failure}{}", hint.unwrap_or_default())
                 }));
-                let message = format!("{wrong} of {} files are refused", files.len());
+                let message = format!("{wrong} of {} files refused", files.len());
                 Some(if failures.iter().any(|failure| failure.code() == 1) {
                     Failure::could_not(message)
                 } else {
@@ -106,7 +106,7 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
         },
         FileKind::Study => {
             let cells = Study::read(path, &[])?.cells(beside)?.len();
-            return Ok(format!("a study of {cells} cells"));
+            return Ok(format!("a study of {}", counted(cells, "cell")));
         }
         FileKind::Model => inputs::model(path, context).map(|_| "a noise model")?,
         FileKind::Log => {
@@ -167,7 +167,8 @@ fn check(path: &Path, rate_hz: Option<f64>, context: &Context<'_>) -> Result<Str
                 .iter()
                 .map(|r| {
                     let (channels, rate_hz) = (r.signals.len(), six_digits(r.rate_hz));
-                    format!("{channels} channels of {} samples at {rate_hz} Hz", r.len())
+                    let channels = counted(channels, "channel");
+                    format!("{channels} of {} samples at {rate_hz} Hz", r.len())
                 })
                 .collect();
             described.dedup();

@@ -8,7 +8,7 @@ use crate::io::input::listed;
 use crate::io::model_file::{self, ModelFile, PROGRAM, TurnOn, known};
 use crate::parse;
 use crate::report::csv::merged;
-use nav_sim_document::{Document, Importance, Table, Tone, readable, seconds, window};
+use nav_sim_document::{Document, Importance, Table, Tone, counted, readable, seconds, window};
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
     Drift, HardestLimit, ImuParameters, ImuSearch, IntensityBound as Bound, Limit, LimitQuantity,
@@ -147,7 +147,10 @@ impl Require {
     /// Reads the files and assembles the requirements.
     fn requirements(&self, context: &Context<'_>) -> Result<Requirements> {
         if self.limits.is_empty() {
-            return refused("no limit given", "give --require 'p95_m<=5', or another");
+            return refused(
+                "no limit given",
+                "give one, such as --require 'p95_m<=5' or --require 'yaw_deg<=1'",
+            );
         }
         let mut scenario = self.settings.read()?;
         if self.vehicle.is_some() {
@@ -743,7 +746,8 @@ impl Requirements {
         let mut lines = vec![answer, format!("asked: {}", self.in_words(&outages))];
         if open > 0 {
             lines.push(format!(
-                "{open} units are not ranked: their data sheets lack figures (--verbose lists them)"
+                "{} not ranked: data sheets lack figures (--verbose lists them)",
+                counted(open, "unit")
             ));
         }
         let tone = Tone::from(!met.is_empty());

@@ -5,7 +5,7 @@ use crate::app::{Answer, Command, Context, Failure, Inputs, Out, OutputFile, Res
 use crate::io::model_file::{self, ModelFile};
 use crate::io::{contamination_file, recordings};
 use crate::parse;
-use nav_sim_document::{Document, Tone};
+use nav_sim_document::{Document, Tone, counted};
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::contamination::{Contamination, Rule};
 use nav_sim_signal::noise::{Model, ReplicateError, VirtualImu};
@@ -244,7 +244,8 @@ impl Answer for Synthesis {
         } = &self.drawn;
         let (replicates, axes, seed) = (self.models.len(), axes.join(" "), self.seed);
         let line = format!(
-            "{replicates} replicates of {samples} samples at {rate_hz} Hz, {axes}, seed {seed}"
+            "{} of {samples} samples at {rate_hz} Hz, {axes}, seed {seed}",
+            counted(replicates, "replicate")
         );
         Document::new("Synthesised recordings", Tone::Good, [line])
     }

@@ -31,6 +31,6 @@ mod document;
 pub use chart::{Chart, ChartAxis, Colour, Mark, Panel, PointInterval, Series, Size, Stroke};
 pub use document::{Block, Document, Importance, NOTES, Note, Tone};
 pub use draw::{escape, one_line};
-pub use number::{readable, seconds, short_names, shortest, six_digits, window};
+pub use number::{counted, readable, seconds, short_names, shortest, six_digits, window};
 pub use picture::{FORMS, encode, svg};
 pub use table::{Cell, Table};

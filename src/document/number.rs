@@ -26,6 +26,13 @@ pub fn window(start_s: f64, end_s: f64) -> String {
     format!("{}–{} s", seconds(start_s), seconds(end_s))
 }
 
+/// `1 cell`, `2 cells`: a regular noun with its number.
+#[must_use]
+pub fn counted(count: usize, noun: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {noun}{plural}")
+}
+
 /// A number for people: three significant digits, or four figures before the point.
 #[must_use]
 pub fn readable(x: f64) -> String {

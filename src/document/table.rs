@@ -120,7 +120,8 @@ impl Table {
 impl Table {
     /// A table of the entries of a result, by its own JSON.
     ///
-    /// `rows` is the path of the entries, with `*` for each of a list: `/designs/*/horizontal_p95/*`. A column is a
+    /// `rows` is the path of the entries, with `*` for each of a list: `/designs/*/horizontal_p95/*`; `N|B` are the entries
+    /// of these names, `!N|B` all others. A column is a
     /// title and a key of the entry: `p95_m`, or `../../hours` of what holds it. After `|` stands the text where the
     /// value is missing, else `–`; a list is an interval, `1 … 2`; a key of braces, `{start_s}–{end_s} s`, is a text with values in it. A key with `*`
     /// makes a column for each of the list, with a title from its entries: `("RMSE {after_s} s", "ends/*/rmse_m")`.
@@ -199,6 +200,19 @@ fn places(json: &Value, path: &str) -> Vec<String> {
                 fields.keys().map(|key| format!("{place}/{key}")).collect()
             }
             ("*", _) => Vec::new(),
+            (names, Some(Value::Object(fields))) if names.contains('|') => {
+                let others = names.strip_prefix('!');
+                let listed = || others.unwrap_or(names).split('|');
+                let keys: Vec<&str> = match others {
+                    None => listed().filter(|name| fields.contains_key(*name)).collect(),
+                    Some(_) => fields
+                        .keys()
+                        .map(String::as_str)
+                        .filter(|key| listed().all(|name| name != *key))
+                        .collect(),
+                };
+                keys.iter().map(|key| format!("{place}/{key}")).collect()
+            }
             (part, _) => vec![format!("{place}/{part}")],
         };
         places = places.iter().flat_map(of).collect();

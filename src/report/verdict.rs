@@ -28,7 +28,7 @@ pub(crate) fn verdict_lines(summary: &Summary) -> Vec<String> {
         lines.insert(0, line);
         return lines;
     }
-    let beside = format!("by covariance analysis {analysed}");
+    let beside = format!("covariance analysis: {analysed}");
     match format!("{}; {beside}", lines[0]) {
         both if both.chars().count() <= WIDTH => lines[0] = both,
         _ => lines.push(beside),
@@ -433,7 +433,7 @@ mod verdict_tests {
         assert!(
             lines
                 .join("\n")
-                .ends_with("by covariance analysis overconfident"),
+                .ends_with("covariance analysis: overconfident"),
             "{lines:?}"
         );
         found.is_contradicted = true;

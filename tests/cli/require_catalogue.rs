@@ -306,7 +306,7 @@ fn the_catalogue_is_ranked_without_a_directory() {
         "{shown}"
     );
     assert!(
-        shown.contains("\n15 units are not ranked") && shown.contains("\n  stim300    met "),
+        shown.contains("\n15 units not ranked") && shown.contains("\n  stim300    met "),
         "{shown}"
     );
     assert!(

@@ -19,7 +19,7 @@ use crate::io::{atomic, input, source};
 use crate::report::{first_names, in_order};
 use clap::Args;
 use indexmap::IndexMap;
-use nav_sim_document::{Importance, Note};
+use nav_sim_document::{Importance, Note, counted};
 use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::simulation::RunResult;
 use rayon::prelude::*;
@@ -174,7 +174,7 @@ impl BatchRequest {
         if let Some((name, failure)) = failures.first() {
             let more = match failures.len() - 1 {
                 0 => String::new(),
-                n => format!(" (and {n} more cells)"),
+                n => format!(" (and {} more)", counted(n, "cell")),
             };
             return Err(Failure::could_not(format!("cell {name}: {failure}{more}"))
                 .or_hint_if(failure.advice()));
@@ -191,9 +191,9 @@ impl BatchRequest {
             return merged();
         }
         context.remark(format!(
-            "{} of {} cells are missing: {}",
+            "{} of {} missing: {}",
             missing.len(),
-            cells.len(),
+            counted(cells.len(), "cell"),
             first_names(&missing)
         ));
         Ok(BatchOutcome::Partial(missing))
@@ -284,8 +284,13 @@ fn estimate(
     let left: Vec<&RunBlock<'_>> = units.iter().filter(|unit| !place.has_unit(unit)).collect();
     let passes = units.iter().filter(|unit| unit.first == 0).count();
     let mut text = format!(
-        "{} cells in {passes} passes: {done} done, {} to do, {changed} changed",
-        cells.len(),
+        "{} in {}: {done} done, {} to do, {changed} changed",
+        counted(cells.len(), "cell"),
+        if passes == 1 {
+            "1 pass".to_owned()
+        } else {
+            format!("{passes} passes")
+        },
         cells.len() - done
     );
     // analyses are not timed
@@ -323,12 +328,12 @@ impl BatchOutcome {
                 is_resumable: true,
                 left,
             } => Some(
-                Failure::stopped(format!("stopped; {left} units left"))
+                Failure::stopped(format!("stopped; {} left", counted(*left, "unit")))
                     .hint("the same command continues"),
             ),
             // the same command would end the same way: no code for "to be resumed"
             Self::Stopped { left, .. } => Some(
-                Failure::could_not(format!("stopped; {left} units left"))
+                Failure::could_not(format!("stopped; {} left", counted(*left, "unit")))
                     .hint("a longer --time-limit"),
             ),
         }
@@ -664,7 +669,8 @@ impl RunValidator {
             if !self.inputs.contains_key(&path) {
                 self.inputs.insert(
                     path.clone(),
-                    input::input(&role, &path).map_err(|e| e.hint("relative paths"))?,
+                    input::input(&role, &path)
+                        .map_err(|e| e.hint("paths are relative to the study's file"))?,
                 );
             }
             inputs.push(Input {

@@ -10,7 +10,7 @@ use crate::report::verdict::{tone, verdict_counts};
 use crate::report::{first_names, json};
 use indexmap::IndexMap;
 use nav_sim_document::{
-    Chart, ChartAxis, Colour, Document, Importance, Panel, Series, Table, Tone,
+    Chart, ChartAxis, Colour, Document, Importance, Panel, Series, Table, Tone, counted,
 };
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::Serialize;
@@ -219,8 +219,8 @@ impl StudyAnswer {
         let missing = &self.missing;
         let message = || {
             format!(
-                "{} cells are missing: {}",
-                missing.len(),
+                "{} missing: {}",
+                counted(missing.len(), "cell"),
                 first_names(missing)
             )
         };

@@ -41,7 +41,7 @@ impl Calibration {
             (policy.as_str(), "{../../name} {name} ({unit})"),
             ("value", "value|not observed"),
             (interval, "ci95|not determined"),
-            ("averages of", "averages"),
+            ("averaging time", "averages"),
         ];
         if self.outcomes.len() > 2 {
             let columns = [
@@ -53,7 +53,12 @@ impl Calibration {
             ];
             document.table(Table::of(json, "/fits/*", &columns));
         }
-        document.table(Table::of(json, "/fits/*/figures/*", &columns));
+        for figures in ["N|B|K", "!N|B|K"] {
+            let table = Table::of(json, &format!("/fits/*/figures/{figures}"), &columns);
+            if !table.is_empty() {
+                document.table(table);
+            }
+        }
         for (importance, note) in self.notes() {
             document.note(importance, note);
         }
@@ -348,7 +353,7 @@ fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
     format!("{name}: {spec} fits{p}{off}")
 }
 
-/// `2 of 6 recordings are abnormal: run4 (accel outliers), run5 (accel noise, gyro noise)`; none of a single recording.
+/// `2 of 6 recordings abnormal: run4 (accel outliers), run5 (accel noise, gyro noise)`; none of a single recording.
 pub(crate) fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> Option<String> {
     let names = in_order(diagnoses.iter().map(|d| d.name.as_str()));
     let count = names.len();
@@ -391,7 +396,7 @@ pub(crate) fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> 
     }
     let named = first_names(&abnormal);
     Some(format!(
-        "{} of {count} recordings are abnormal: {named}",
+        "{} of {count} recordings abnormal: {named}",
         abnormal.len()
     ))
 }
@@ -825,7 +830,7 @@ fn figures(outcome: &Outcome, rate_hz: f64) -> BTreeMap<String, Value> {
     if let Some(practical) = outcome.practical(rate_hz) {
         let (pair, ends) = (&practical.walk, &practical.intervals);
         let [white, walk] = match sensor {
-            Sensor::Accel => ["velocity random walk N", "accel. random walk K"],
+            Sensor::Accel => ["velocity random walk N", "acceleration random walk K"],
             Sensor::Gyro => ["angle random walk N", "rate random walk K"],
         };
         let none = format!("none up to {}", duration(practical.range_s));

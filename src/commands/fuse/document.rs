@@ -7,8 +7,8 @@ use crate::report::verdict::{deciding, drive_line};
 use crate::report::{error_charts, reduction_doubt, reduction_line, tone};
 use glam::DVec3;
 use nav_sim_document::{
-    Chart, ChartAxis, Colour, Document, Importance, Mark, Panel, Series, Table, readable, seconds,
-    window,
+    Chart, ChartAxis, Colour, Document, Importance, Mark, Panel, Series, Table, counted, readable,
+    seconds, window,
 };
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::frames::NavState;
@@ -352,8 +352,8 @@ fn rejected(outliers: &Outliers) -> String {
         t_s => format!("; too many in a row: used again from {}", times(t_s)),
     };
     format!(
-        "{} fixes ({:.1} %) are outliers (--gate): at {}{reopened}",
-        outliers.t_s.len(),
+        "{} ({:.1} % of the fixes, --gate): at {}{reopened}",
+        counted(outliers.t_s.len(), "outlier"),
         100.0 * outliers.share,
         times(&outliers.t_s)
     )

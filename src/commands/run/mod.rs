@@ -283,7 +283,7 @@ impl Run {
         let path = self.truth.as_ref().unwrap_or(&self.model).display();
         let Some(spread) = &file.spread else {
             return refused(
-                format!("{path}: no [spread] to draw parameters from"),
+                format!("{path}: no [spread] to draw from"),
                 "nav-sim calibrate writes one where three recordings differ; else leave --spread out",
             );
         };

@@ -20,7 +20,7 @@
 use super::file_kind::FileKind;
 use super::recordings::facts;
 use super::recordings::timing::USUAL_RATES_HZ;
-use super::toml_file::{OneOrEach, TomlSource};
+use super::toml_file::{OneOrEach, TomlSource, schema_path};
 use super::{Failure, atomic, file_kind};
 use crate::report::readable;
 use nav_sim_calibration::duration;
@@ -700,7 +700,11 @@ pub fn write(path: &Path, file: &ModelFile) -> Result<(), Failure> {
 
 /// The text of a model file. A sensor whose three axes are alike is written once.
 pub fn to_toml(file: &ModelFile) -> String {
-    let mut out = format!("schema = {SCHEMA}\nrate_hz = {:?}\n", file.model.rate_hz);
+    let mut out = format!(
+        "#:schema {}\nschema = {SCHEMA}\nrate_hz = {:?}\n",
+        schema_path("model"),
+        file.model.rate_hz
+    );
     for sensor in Sensor::ALL {
         let tables = Axis::ALL.map(|axis| processes(file, Channel { sensor, axis }));
         write_axes(&mut out, sensor, &tables, |name, table| {

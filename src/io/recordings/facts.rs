@@ -6,6 +6,7 @@ use crate::io::table::{Column, Table, find, normalised};
 use crate::io::{Failure, Place, help};
 use crate::report::{readable, six_digits};
 use nav_sim_calibration::percent;
+use nav_sim_document::counted;
 use nav_sim_signal::facts::{self, Marks, RepeatedRows};
 use nav_sim_signal::imu::{Recording, Sensor, Signal};
 use nav_sim_signal::noise::{Composite, Kind, Model, Process};
@@ -49,7 +50,8 @@ pub(crate) fn drop_copies(table: &mut Table) -> Option<String> {
     let copies = facts::copies(&stamps.values, &axes(table, |_| true));
     leave_out(table, &copies);
     let count = copies.len();
-    (count > 0).then(|| format!("{count} rows copy the row before, stamp and values: left out"))
+    let rows = counted(count, "row");
+    (count > 0).then(|| format!("{rows} left out: copies of the row before, stamp and values"))
 }
 
 fn leave_out(table: &mut Table, rows: &[usize]) {
@@ -66,7 +68,10 @@ fn lost(table: &Table) -> (Vec<usize>, Option<String>) {
     let accel = axes(table, |channel| channel.sensor == Sensor::Accel);
     let rows = facts::zero_rows(&axes(table, |_| true), &accel);
     let (count, share) = (rows.len(), percent(rows.len() as f64 / table.rows() as f64));
-    let text = format!("{count} rows ({share}) are zero in all columns: missing samples");
+    let text = format!(
+        "{} ({share}) zero in all columns: missing samples",
+        counted(count, "row")
+    );
     (rows, (count > 0).then_some(text))
 }
 

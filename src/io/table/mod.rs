@@ -7,7 +7,7 @@ use super::suggest::nearest;
 use super::{Failure, Place, help, logs, source};
 use crate::failure::is_damage;
 use chrono::NaiveDateTime;
-use nav_sim_document::one_line;
+use nav_sim_document::{counted, one_line};
 use nav_sim_logs::npy::Array;
 use nav_sim_logs::{Clock, Content, LogChannel, LogFormat, in_seconds, npy};
 pub(crate) use quantity::find;
@@ -524,7 +524,8 @@ impl Table {
         let kept: Vec<usize> = (0..all).filter(is_whole).collect();
         self.keep(&kept);
         let count = all - kept.len();
-        (count > 0).then(|| format!("{count} rows left out: values not finite, or out of range"))
+        let rows = counted(count, "row");
+        (count > 0).then(|| format!("{rows} left out: values not finite, or out of range"))
     }
 
     /// Refuses a table without one of the quantities that are needed; a column that nearly has the name of a missing one

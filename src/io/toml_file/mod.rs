@@ -47,6 +47,11 @@ fn span_of(table: &DeTable<'_>, path: &str) -> (Range<usize>, bool) {
     (span, !path.is_empty())
 }
 
+/// Path of the schema of a kind of file, below a directory of `init`: the `#:schema` line of a file leads editors there.
+pub(crate) fn schema_path(kind: &str) -> String {
+    format!("schemas/{kind}.schema.json")
+}
+
 /// A TOML text and the name it goes by in messages.
 #[derive(Debug)]
 pub(crate) struct TomlSource {

@@ -373,7 +373,7 @@ fn references_are_used_but_for_what_jumps() {
     let said = warnings;
     assert_eq!(
         said[0],
-        "a.csv: 1 rows left out: values not finite, or out of range"
+        "a.csv: 1 row left out: values not finite, or out of range"
     );
     assert!(
         said[1].starts_with("a.csv, line 302: a jump of 2") && said[1].contains("and 3 more"),

@@ -1,4 +1,4 @@
-//! What the filter believes of the inertial noise: a noise model in the form of filter states.
+//! Noise model of the filter: inertial noise in the form of filter states.
 //!
 //! ```
 //! use nav_sim_navigation::ekf::{Belief, FilterStates};
@@ -75,12 +75,12 @@ impl BiasGroup {
         }
     }
 
-    /// Whether it is zero for all time.
+    /// Returns true if it is zero for all time.
     fn is_empty(&self) -> bool {
         self.innovation == DVec3::ZERO && self.initial == DVec3::ZERO
     }
 
-    /// Whether it is an unknown constant.
+    /// Returns true for an unknown constant.
     pub fn is_constant(&self) -> bool {
         self.innovation == DVec3::ZERO && self.phi == DVec3::ONE
     }
@@ -110,7 +110,8 @@ impl BiasGroup {
     }
 }
 
-/// What the filter believes: white noise of a sample, bias states and unknown constants, for each sensor.
+/// Noise model of the filter: white noise of a sample, bias states and unknown constants, for each
+/// sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Belief {
     /// Rate the parameters belong to (Hz).
@@ -354,8 +355,8 @@ impl AxisBelief {
 /// Scale-factor error that the filter of 21 states expects (1): 300 ppm, that of KF-GINS's demonstration.
 const SCALE_SIGMA: f64 = 300e-6;
 
-/// How the noise model becomes states of the filter. Unknown constants (turn-on bias, scale factors) that are
-/// asked for beside it, and drifts (DR) of the model, add three states each to any of them.
+/// Representation of the noise model in the filter. Unknown constants (turn-on bias, scale factors)
+/// and drifts (DR) of the model add three states each to any of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "WrittenStates")]
 #[schemars(!try_from)]
@@ -383,7 +384,7 @@ impl FilterStates {
         }
     }
 
-    /// Whether the model's processes are reduced to one bias an axis.
+    /// Returns true if the model's processes are reduced to one bias per axis.
     pub const fn is_reduced(self) -> bool {
         !matches!(self, Self::Full)
     }

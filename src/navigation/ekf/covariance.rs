@@ -54,7 +54,7 @@ pub(super) struct Sources<'a> {
     steps: &'a [BiasGroup],
     /// Bias groups of each sensor.
     pub biases: [usize; 2],
-    /// What the unknowns of each sensor are multiplied by.
+    /// Factors on the unknowns of each sensor.
     pub regressors: [&'a [Regressor]; 2],
 }
 
@@ -616,7 +616,7 @@ impl<L: Real> EarthTerms<L> {
 pub(crate) struct EarthStep<L> {
     /// The terms.
     pub terms: EarthTerms<L>,
-    /// How long they act (s).
+    /// Duration (s).
     pub dt: f64,
 }
 

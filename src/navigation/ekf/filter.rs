@@ -25,12 +25,12 @@ pub struct Ekf {
     pub(super) estimates: Vec<Vec3>,
     /// Covariance of the error state.
     pub p: Covariance,
-    /// What is believed of a sample at the belief's own rate.
+    /// Noise model at the filter's own rate.
     pub(super) belief: Belief,
     /// The same of a sample of `dt` seconds: the step of each block behind the navigation's, white variances.
     pub(super) steps: Vec<BiasGroup>,
     white: [DVec3; 2],
-    /// What the unknowns of each sensor are multiplied by in the last sample.
+    /// Factors on the unknowns of each sensor in the last sample.
     pub(super) regressors: [Vec<Regressor>; 2],
     dt: f64,
     /// Samples of the belief's rate since the start.
@@ -424,7 +424,7 @@ impl Ekf {
         super::update::apply_correction(self);
     }
 
-    /// What the last update took out of the state of the first lane.
+    /// Correction of the state of the first lane by the last update.
     pub(crate) fn correction(&self) -> DVector<f64> {
         DVector::from_iterator(
             self.p.dim(),
@@ -436,7 +436,7 @@ impl Ekf {
 // Unknown constants of a sensor that act on its samples multiplied by something known: the regressor. The
 // error of a sample is their product, axis by axis; a bias is the case whose regressor is 1.
 
-/// What the constant is, and so what it is multiplied by.
+/// Kind of an unknown constant, which determines its factor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum UnknownKind {
     /// The slope of a drift (units per sample of the model), times the samples since the filter's start: a
@@ -455,7 +455,7 @@ pub struct Unknown {
     pub sigma: DVec3,
 }
 
-/// What an unknown constant is multiplied by in the last sample.
+/// Factor on an unknown constant in the last sample.
 #[derive(Debug, Clone)]
 pub(super) struct Regressor {
     kind: UnknownKind,

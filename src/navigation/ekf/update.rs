@@ -173,7 +173,7 @@ pub(crate) enum GainSource {
     Given(Arc<[SharedUpdate]>, usize),
 }
 
-/// How a fix is used.
+/// Measurement update with a fix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FixUpdate {
@@ -199,10 +199,10 @@ pub fn update(ekf: &mut Ekf, fix: &Fix) -> Lanes {
     }
 }
 
-/// What a scalar measurement found: estimate less measured, and the variance that the filter states of that.
+/// Innovation of a scalar measurement (estimate minus measured) and its variance by the filter.
 type Innovation = [Lanes; 2];
 
-/// Of the scalars of a fix.
+/// Innovations of the components of a fix.
 type Innovations = SmallVec<[Innovation; 6]>;
 
 /// Normalised innovation squared.
@@ -274,7 +274,8 @@ pub(crate) fn update_height(ekf: &mut Ekf, h: &Lanes, sigma_m: f64) -> Lanes {
     nis(use_scalars(ekf, &[height])[0])
 }
 
-/// Where the antenna is and how it moves about the IMU, and the measurement rows that follow.
+/// Position and velocity of the antenna with respect to the IMU, and the measurement rows that
+/// follow.
 struct Antenna<L> {
     /// Lever arm in n (m).
     arm_n: Vec3<L>,
@@ -465,7 +466,8 @@ fn along<L: Real>(axis: usize, states: Vec3<L>) -> Vec3<L> {
     }
 }
 
-/// How the velocity of a point, in b, depends on the errors of the navigation and of the gyroscope.
+/// Derivative of the velocity of a point, in b, with respect to the errors of navigation and
+/// gyroscope.
 struct BodyRows<L> {
     c_b_n: Mat3<L>,
     /// Velocity of the point in b (m/s).

@@ -233,7 +233,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// What came out; smoothed where a tape ran along.
+    /// Solution; smoothed if the states were recorded.
     fn end(self) -> Solution {
         let Self {
             mut filter,
@@ -388,7 +388,7 @@ impl Filter {
         }
     }
 
-    /// What the mounting adds to the covariance of the vehicle's attitude error in n (rad²).
+    /// Covariance of the mounting in the vehicle's attitude error in n (rad²).
     fn of_mounting(&self, q_b_n: DQuat) -> Matrix3<f64> {
         let axes = DVec3::AXES.map(|axis| to_nalgebra(q_b_n * (axis * self.mounting_sigma_b)));
         axes.iter().map(|axis| axis * axis.transpose()).sum()
@@ -555,7 +555,7 @@ impl<'a> Bridges<'a> {
         Some(spread)
     }
 
-    /// How far the mean of a window of so many samples is from its bridge.
+    /// Distances of the means of windows of this many samples from their bridges.
     fn of_windows(&self, steps: usize) -> Spread {
         let mut off: [Vec<f64>; 6] = Default::default();
         let whole = steps + 2 * BESIDE;
@@ -596,7 +596,7 @@ impl<'a> Bridges<'a> {
 /// Most memory that a tape may take (bytes).
 const MOST_BYTES: f64 = 2e9;
 
-/// What is kept of the way of a filter: an instant for every row and every fix that was used.
+/// States recorded for the smoother: an instant for every row and every fix that was used.
 struct Tape {
     marks: Vec<Mark>,
     /// Covariance at the last mark, after its fix.
@@ -610,7 +610,7 @@ struct Mark {
     t_s: f64,
     /// The filter after the fix.
     after: Snapshot,
-    /// What fixes took out of the state.
+    /// Correction of the state by fixes.
     correction: Option<DVector<f64>>,
     /// To the next mark.
     link: Option<Link>,

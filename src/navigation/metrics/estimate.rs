@@ -155,7 +155,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for PerState<T> {
             .filter_map(|name| by_name.remove(*name))
             .collect();
         let values = values.try_into().map(Self);
-        values.map_err(|_| D::Error::custom("states"))
+        values.map_err(|_| D::Error::custom("expected a value for each state"))
     }
 }
 

@@ -68,7 +68,7 @@ impl Truth<'_> {
         };
         match self {
             Self::Model(model) => check_model(model),
-            Self::Drawn([]) => refused("draw"),
+            Self::Drawn([]) => refused("no model drawn"),
             Self::Drawn(models) => {
                 let labels = |model: &Model| model.axes.each_ref().map(Composite::labels);
                 let first = labels(&models[0]);

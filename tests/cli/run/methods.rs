@@ -122,7 +122,7 @@ fn fixes_too_rare_for_the_reduction_are_blamed_on_their_rate() {
         "{ type = \"RW\", gamma2 = 1e-14 }, { type = \"AR1\"",
     );
     fs::write(place.path().join("walk.toml"), walk).unwrap();
-    let full = "hint: raise it, or take the full filter (--filter full)";
+    let full = "hint: raise it, or use --filter full";
     for (command, hint) in [
         (
             "run drive.toml walk.toml --runs 2 --scenario rare.toml -o out",
@@ -134,14 +134,14 @@ fn fixes_too_rare_for_the_reduction_are_blamed_on_their_rate() {
         ),
         (
             "tune walk.toml --truth walk.toml --scenario rare.toml",
-            "hint: raise it: the verdict is of",
+            "hint: raise it: the verdict includes",
         ),
     ] {
         let ran = nav_sim(place.path(), command);
         assert_eq!(ran.code, 2, "{}", ran.stderr);
         for words in [
             "error: rare.toml: gnss.rate_hz = 0.001 is refused",
-            "at most 231.7 s apart",
+            "at most 231.7 s",
             hint,
         ] {
             assert!(ran.stderr.contains(words), "{command}: {}", ran.stderr);
@@ -164,7 +164,7 @@ fn runs_stand_beside_what_is_expected_of_them() {
             .lines()
             .next()
             .unwrap()
-            .ends_with("by covariance analysis consistent"),
+            .ends_with("covariance analysis: consistent"),
         "{}",
         ran.stdout
     );
@@ -200,7 +200,7 @@ fn few_runs_do_not_hide_a_filter_that_is_wrong() {
         "{verdict}"
     );
     assert!(
-        verdict.ends_with("; by covariance analysis overconfident"),
+        verdict.ends_with("; covariance analysis: overconfident"),
         "{verdict}"
     );
     assert!(
@@ -296,7 +296,7 @@ fn requirements_decide_the_exit_code() {
     refused(
         "run drive.toml imu.toml --outage none --seed 1 --require p95_m<=5 -o out",
         2,
-        "--require p95_m<=5: p95_m is of",
+        "--require p95_m<=5: p95_m needs",
     );
     refused(
         "run drive.toml imu.toml --require p95<=5 -o out",

@@ -203,7 +203,7 @@ fn rows_that_are_no_measurements_are_left_out_and_counted() {
     let (copied, said) = kept(&table(stamps, &twice), None);
     assert_eq!(
         said,
-        ["6000 rows copy the row before, stamp and values: left out"]
+        ["6000 rows left out: copies of the row before, stamp and values"]
     );
     assert_eq!((copied.rate_hz, copied.len()), (100.0, 6000));
 
@@ -212,7 +212,7 @@ fn rows_that_are_no_measurements_are_left_out_and_counted() {
     let (lost, said) = kept(&written(100.0, &lost), None);
     assert_eq!(
         said,
-        ["100 rows (1.7 %) are zero in all columns: missing samples"]
+        ["100 rows (1.7 %) zero in all columns: missing samples"]
     );
     assert_eq!(level(&lost).1, 100);
 

@@ -18,12 +18,12 @@ use std::ops::Range;
 /// Yaw error over that of attitude at a pitch of 80°: 1/cos(pitch).
 const STEEP: f64 = 5.76;
 
-/// How a filter's covariance stands to that of its true errors, at one instant.
+/// Ratio of a filter's covariance to that of its true errors, at one instant.
 #[derive(Debug, Clone, Copy)]
 pub struct Consistency {
     /// Time from the start (s).
     pub after_s: f64,
-    /// Whether a measurement is used here.
+    /// True if a measurement is used here.
     pub measured: bool,
     /// Standard deviations that the filter states (m, m/s, degrees).
     pub sigma: [f64; REPORTED],
@@ -45,7 +45,7 @@ impl Consistency {
     }
 }
 
-/// What a pass finds.
+/// Result of a pass.
 #[derive(Debug, Clone)]
 pub struct Assessment {
     /// At every report (1 Hz), after the measurements.
@@ -94,9 +94,9 @@ pub struct Instant {
     pub after_s: f64,
     /// Time on the trajectory (s).
     pub t_s: f64,
-    /// Whether a measurement is used here.
+    /// True if a measurement is used here.
     pub measured: bool,
-    /// Whether a fix is used here.
+    /// True if a fix is used here.
     pub fix: bool,
     /// Covariance of the errors.
     pub covariance: [Nav; NAV],
@@ -221,7 +221,7 @@ impl<'a> FilterPass<'a> {
         self.track
     }
 
-    /// As [`assess`], of the filter's own belief.
+    /// Runs [`assess`] for the filter's own belief.
     pub fn assess(&self, belief: &Belief, truth: &Model) -> Assessment {
         self.errors_as_expected(belief, truth).assessment()
     }
@@ -342,7 +342,7 @@ impl Judged {
         m
     }
 
-    /// How the filter's covariance stands to that of its true errors.
+    /// Ratio of the filter's covariance to that of its true errors.
     pub fn consistency(&self) -> Consistency {
         let moments = self.errors.moments();
         let [p, t] = [self.believed, moments].map(Square::from);
@@ -532,7 +532,7 @@ struct Mean {
 }
 
 impl<'a> Errors<'a> {
-    /// Those of the start.
+    /// Covariances at the start.
     fn at_start(track: &Track, sides: &'a Sides, truth: &'a TruthSide) -> Self {
         let begin = if truth.starts_off {
             track.start

@@ -183,7 +183,8 @@ impl Search<'_> {
     }
 }
 
-/// Where the search starts: about the mean of the optima of two IMUs on three trajectories, all axes of a sensor alike.
+/// Start of the search: about the mean of the optima of two IMUs on three trajectories, all axes of
+/// a sensor alike.
 const START: Factors = [0.3, -0.3, 1.0, 0.3, -0.3, 1.0, 0.3, 0.0, 0.4, 0.3, 0.0, 0.4];
 /// Cost of a factor e: what the fixes do not tell stays near the wavelet reduction.
 const RIDGE: f64 = 5e-4;
@@ -224,9 +225,9 @@ impl Steep {
     }
 }
 
-/// What costs beside the divergence: a single state whose ratio is a tenth off, at an outage's end or over the whole way,
-/// since the divergence alone gives one state away for eight; and the mean NEES, since the divergence is that of a filter
-/// that is rather underconfident.
+/// Costs beside the divergence: for a single state whose ratio is a tenth off, at an outage's end
+/// or over the whole way, since the divergence alone sacrifices one state for eight; and for the
+/// mean NEES, since the divergence prefers a filter that is rather underconfident.
 fn steep(assessment: &Assessment) -> Vec<Steep> {
     let ends = &assessment.outage_ends;
     let of_end = ENDS * OFF_WEIGHT / ends.len() as f64;
@@ -259,8 +260,9 @@ fn steep(assessment: &Assessment) -> Vec<Steep> {
     all
 }
 
-/// What the divergence is made of: P⁻¹ P_true as L⁻¹ P_true L⁻ᵀ. Where that is near the identity, the divergence is half of
-/// the squares of what its elements are off, and so its second derivative with respect to each of them is the weight of the instant.
+/// Parts of the divergence: P⁻¹ P_true as L⁻¹ P_true L⁻ᵀ. Near the identity the divergence is half
+/// the sum of squares of the deviations of its elements, so that its second derivative with respect
+/// to each is the weight of the instant.
 fn shape(law: &ErrorLaw) -> impl Iterator<Item = Part> {
     let reports = law.reports.get(1..).unwrap_or_default();
     let of_ends = if law.outage_ends.is_empty() {

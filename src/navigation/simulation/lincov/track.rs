@@ -36,8 +36,9 @@ pub(super) type Nav = [f64; NAV];
 /// Longest step (s): a bias is represented by its mean over the step.
 const STEP_S: f64 = 0.2;
 
-/// What happens to the navigation error over a step: x⁺ = `m` x + `b` e, e the errors of the biases (estimate
-/// less truth) of the signals, their means over the step. Columns; `b` of the signals that the track follows.
+/// Propagation of the navigation error over a step: x⁺ = `m` x + `b` e, with e the mean errors of
+/// the biases (estimate minus truth) of the signals over the step. Columns; `b` of the signals that
+/// the track follows.
 #[derive(Debug, Clone)]
 pub(super) struct Step {
     pub samples: u32,
@@ -48,7 +49,7 @@ pub(super) struct Step {
     pub white: Vec<[Nav; NAV]>,
 }
 
-/// What is measured.
+/// Measured quantity.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Measured {
     /// This component of a fix's position.
@@ -57,7 +58,7 @@ pub(super) enum Measured {
     Velocity,
     /// The height of a barometer.
     Height,
-    /// What a vehicle measures of itself, along this axis.
+    /// Aiding measurement of the vehicle, along this axis.
     Aid(Aid, usize),
 }
 
@@ -84,7 +85,7 @@ impl Measured {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
     pub h: [f64; NAV + 3],
-    /// What errors of the gyroscope are proportional to.
+    /// Motion and temperature to which errors of the gyroscope are proportional.
     felt: Surroundings,
     /// Variance of its white noise, as the filter believes.
     pub r: f64,
@@ -93,7 +94,7 @@ pub(super) struct Row {
     pub what: Measured,
     /// Velocity of the point of the vehicle (m/s) and acceleration (m/s²), in b.
     motion: [DVec3; 2],
-    /// Whether outages withhold it.
+    /// True if outages withhold it.
     pub of_gnss: bool,
 }
 
@@ -147,7 +148,7 @@ pub(super) struct Mark {
     pub after_s: f64,
     /// Time on the trajectory (s).
     pub t_s: f64,
-    /// Whether a fix is used.
+    /// True if a fix is used.
     pub fix: bool,
     /// Scalar measurements, in sequence: the same in each copy of a track.
     pub rows: Arc<[Row]>,
@@ -169,7 +170,7 @@ pub struct Track {
     pub(super) outages: usize,
     /// Covariance of the navigation error at the start, as the filter believes.
     pub(super) start: [Nav; NAV],
-    /// Whether it truly starts without error.
+    /// True if it starts without error.
     pub(super) perfect: bool,
 }
 
@@ -270,7 +271,7 @@ impl Track {
         track
     }
 
-    /// Whether the strapdown makes no error along it.
+    /// Returns true if the strapdown makes no error along it.
     pub(super) fn is_closed(&self) -> bool {
         self.marks.iter().all(|mark| mark.closure == [0.0; NAV])
     }
@@ -297,7 +298,7 @@ struct Linearisation<'a> {
     samples: Peekable<IdealSamples<'a>>,
     first: ImuSample,
     ins: Strapdown<f64>,
-    /// What the IMU feels over the last sample.
+    /// Motion and temperature of the IMU over the last sample.
     felt: Surroundings,
     dt: f64,
     noise_hz: f64,
@@ -628,8 +629,9 @@ const MOST_STRETCH: f64 = 5.0;
 const REPORT_S: f64 = 10.0;
 
 impl Track {
-    /// As [`Self::merged`], with a report every ten, and white noise through its mean over a step as well: a tenth faster
-    /// for the hundreds of passes of a search, and within 1e-3 in every ratio.
+    /// Merges like [`Self::merged`], with a report every ten, and white noise through its mean over
+    /// a step as well: a tenth faster for the hundreds of passes of a search, and within 1e-3 in
+    /// every ratio.
     pub fn coarse(&self) -> Self {
         let mut track = self.with_legs(Step::joined);
         let mut reports = 0;
@@ -822,7 +824,7 @@ pub(super) const RECTIFIED: usize = 33;
 /// The first that is multiplied by the warming.
 pub(super) const WARMED: usize = 36;
 
-/// Where a signal acts: sensor, axis, and what it is multiplied by.
+/// Sensor and axis of a signal, and the quantity that multiplies it.
 const fn place(signal: usize) -> (usize, usize, Felt) {
     match signal {
         0..SCALED => (signal / 3, signal % 3, Felt::Unit),
@@ -884,9 +886,9 @@ pub(super) struct Source {
 /// An error of measurements that lasts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Outer {
-    /// Of a component of a fix's position.
+    /// Error of a component of a fix's position.
     Position(usize),
-    /// Of what a vehicle measures of itself.
+    /// Error of an aiding measurement.
     Vehicle(AidPart),
 }
 
@@ -904,7 +906,8 @@ const NONE: Source = Source {
     outer: None,
 };
 
-/// What a source does over a step: the mean of its samples' errors is `mean`·s + w₁, and s⁺ = `decay`·s + w₂.
+/// Propagation of a source over a step: the mean of its samples' errors is `mean`·s + w₁, and s⁺ =
+/// `decay`·s + w₂.
 pub(super) struct StepOfSource {
     pub signal: usize,
     mean: f64,
@@ -1024,7 +1027,7 @@ impl Source {
         self.after + self.ramp * samples
     }
 
-    /// What the source does over a step of `samples` samples, exactly.
+    /// Propagates the source over a step of `samples` samples, exactly.
     fn over(&self, samples: u32) -> StepOfSource {
         let n = f64::from(samples);
         let mut step = StepOfSource {
@@ -1092,7 +1095,7 @@ impl Sources {
             .for_each(|(white, more)| *white += more);
     }
 
-    /// What a filter estimates of them: nothing at the start, and nothing drives its estimates but corrections.
+    /// Estimates of them by a filter: zero at the start, driven by corrections only.
     fn estimates(&self) -> Self {
         Self {
             states: self.states.iter().map(Source::estimate).collect(),
@@ -1100,7 +1103,7 @@ impl Sources {
         }
     }
 
-    /// Those a filter believes in: one for each bias state.
+    /// Sources in a filter's model: one for each bias state.
     pub(super) fn of_belief(belief: &Belief) -> Self {
         let of_sensor = |sensor: Sensor| {
             let groups = belief.groups[sensor as usize].iter();
@@ -1159,7 +1162,7 @@ impl Sources {
             .collect()
     }
 
-    /// What a belief expects beside its noise model, as it expects it: turn-on biases and scale factors.
+    /// Turn-on biases and scale factors that a belief has beside its noise model, as sources.
     pub(super) fn beside_model(belief: &Belief) -> Vec<Source> {
         // drifts are of the noise model
         let mut states = Self::multiplied(belief);
@@ -1214,7 +1217,7 @@ impl Sources {
 /// The states `b` of a filter and `t` of the truth, as `Joint` has them.
 pub(super) struct Sides {
     pub states: Vec<Source>,
-    /// How many of them are `b`, which come first.
+    /// Number of the states `b`, which come first.
     pub estimated: usize,
     /// Signals that they reach: most have neither scale factors nor what comes after them.
     pub signals: usize,
@@ -1271,7 +1274,7 @@ impl Sides {
         (NAV + self.signals).div_ceil(LANES)
     }
 
-    /// What they do over a step of the track.
+    /// Propagation over a step of the track.
     pub(super) fn over(&self, step: &Step) -> &Inputs {
         let found = self
             .inputs
@@ -1281,7 +1284,7 @@ impl Sides {
     }
 }
 
-/// What sources do over steps of one length.
+/// Propagation of sources over steps of one length.
 pub(super) struct Inputs {
     pub sources: Vec<StepOfSource>,
     /// Their decays.

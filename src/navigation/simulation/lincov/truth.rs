@@ -1,4 +1,4 @@
-//! What makes the true errors: independent sources, alone or together.
+//! Sources of the true errors: independent, alone or together.
 
 use super::track::{CROSSED, Measured, Outer, PUSHED, RECTIFIED, SCALED, Source, Sources, WARMED};
 use crate::ekf::Belief;
@@ -11,29 +11,29 @@ use crate::sensors::gnss::GnssSettings;
 use crate::simulation::plan::Experiment;
 use std::ops::Range;
 
-/// What makes the true errors along a track, whatever the filter believes.
+/// True errors along a track, independent of the filter.
 #[derive(Debug, Clone, Default)]
 pub struct TruthSide {
     pub(super) inertial: Sources,
-    /// Whether the start is off, as the filter believes it to be.
+    /// True if the start is in error by the filter's initial covariance.
     pub(super) starts_off: bool,
-    /// Whether the white noise of positions, velocities, heights and each aid is there.
+    /// True for each white noise that is present: positions, velocities, heights and each aid.
     noise: [bool; Measured::KINDS],
-    /// Whether the strapdown integrates the samples with the error that it has at the IMU's rate.
+    /// True if the strapdown has its integration error at the IMU's rate.
     pub(super) integrates: bool,
 }
 
-/// What may be true of an IMU and its receiver: a noise model at the IMU's rate, and what is wrong beside it. Where
-/// these settings are silent, errors are as the filter expects them.
+/// Candidate truth of an IMU and its receiver: a noise model at the IMU's rate, and the errors
+/// beside it. Without a setting, errors are as the filter expects them.
 #[derive(Debug, Clone)]
 pub struct TrueErrors {
-    /// What makes the inertial errors.
+    /// Model of the inertial errors.
     pub model: Model,
-    /// What is wrong with the true IMU beside its noise.
+    /// Errors of the true IMU beside its noise.
     pub imu: ImuSettings,
     /// The true receiver, whose positions may have correlated errors.
     pub gnss: GnssSettings,
-    /// What is truly wrong with the vehicle's own measurements.
+    /// True errors of the aiding measurements.
     pub aiding: AidingSettings,
 }
 
@@ -61,7 +61,7 @@ pub struct NamedSource {
     /// The process of a sensor's noise model that it is; none of what no noise model has, and of drifts, which are one
     /// source for both sensors.
     pub process: Option<(Sensor, Kind)>,
-    /// What it does.
+    /// Its effect.
     pub side: TruthSide,
 }
 
@@ -174,7 +174,7 @@ impl TruthSide {
         all
     }
 
-    /// Whether a measurement has its white noise.
+    /// Returns true if a measurement has its white noise.
     pub(super) const fn has_noise(&self, measured: Measured) -> bool {
         self.noise[measured.kind()]
     }
@@ -236,7 +236,7 @@ fn processes(model: &Model, sensor: Sensor, drifts: &mut Vec<Source>) -> Vec<Nam
     found
 }
 
-/// What is wrong with a sensor of the true IMU beside its noise.
+/// Errors of a sensor of the true IMU beside its noise.
 pub(super) fn defects(imu: &ImuSettings, sensor: Sensor) -> Vec<NamedSource> {
     let (bias, ppm) = imu.deviations(sensor);
     let first = 3 * sensor as usize;
@@ -283,7 +283,7 @@ fn correlated(gnss: &GnssSettings, imu_hz: f64) -> Option<NamedSource> {
     inertial("gnss.correlated".to_owned(), sigmas.map(state).collect())
 }
 
-/// What is wrong with the vehicle's own measurements beside white noise: parts of one name are one source.
+/// Errors of the aiding measurements beside white noise: parts of one name are one source.
 fn lasting(aiding: &AidingSettings, imu_hz: f64) -> Vec<NamedSource> {
     let mut found = Vec::new();
     for AidError { part, law, .. } in aiding.errors() {
@@ -312,8 +312,9 @@ const LARGE_DEG: f64 = 5.0;
 /// Time that an alignment may take (s).
 const SETTLED_S: f64 = 120.0;
 
-/// Where the heading is hardly observable: `while_fixed` are the times from the start (s) at which fixes are used,
-/// and the standard deviations of yaw there (degrees). The first two minutes belong to the alignment.
+/// Warns where the heading is hardly observable: `while_fixed` are the times from the start (s) at
+/// which fixes are used, and the standard deviations of yaw there (degrees). The first two minutes
+/// belong to the alignment.
 pub fn weak_heading(while_fixed: impl Iterator<Item = (f64, f64)>) -> Option<String> {
     let settled = while_fixed.filter(|(after_s, _)| *after_s >= SETTLED_S);
     let worst = settled.max_by(by_value);

@@ -16,7 +16,7 @@ use crate::noise::{Kind, Model, Process};
 use crate::simulation::{NEES_DOF, REPORTED};
 use rayon::prelude::*;
 
-/// How a model becomes a filter.
+/// Makes a filter of a model.
 pub type Filter<'a> = dyn Fn(&Model) -> Result<Belief, BeliefError> + Sync + 'a;
 
 /// Condition under which a filter counts as consistent.
@@ -35,7 +35,7 @@ nav_sim_signal::named!(Aim { Worst = "worst", Mean = "mean" });
 pub struct Task<'a> {
     /// The noise model that the filter is made of.
     pub model: &'a Model,
-    /// What may make the errors; at least one.
+    /// Candidate truths; at least one.
     pub truths: &'a [TrueErrors],
     /// The trajectory with its fixes and outages.
     pub track: &'a Track,
@@ -59,7 +59,7 @@ const OVERCONFIDENT: f64 = 200.0;
 const TOLERANCE: f64 = 0.005;
 /// An error that exceeds its sigma by less than this share is as large as stated.
 const EXACT: f64 = 1e-3;
-/// How close the factors come to the smallest, as a logarithm.
+/// Tolerance of the logarithm of the factors.
 const RESOLUTION: f64 = 0.005;
 
 impl Task<'_> {
@@ -307,7 +307,8 @@ fn smallest(
 pub struct FilterConsistency {
     /// Expected NEES, mean over time and truths; 9 is right.
     pub nees: f64,
-    /// Where errors are largest against what is stated, at an outage's end or over the whole run (without outages: at any time).
+    /// Largest ratio of true to stated errors, at an outage's end or over the whole run (without
+    /// outages: at any time).
     pub largest: Departure,
     /// Smallest and largest ratio of any state and of all together: what `run` calls the filter by.
     pub range: [f64; 2],
@@ -331,7 +332,7 @@ pub struct Departure {
 }
 
 impl FilterConsistency {
-    /// Of one filter under several truths.
+    /// Consistency of one filter under several truths.
     fn of(assessments: &[Assessment]) -> Self {
         let count = assessments.len() as f64;
         let mean_nees = |a: &Assessment| mean(a.reports.iter().map(|r| r.nees));
@@ -439,7 +440,7 @@ fn states(
 
 // Factors on the variances of a noise model.
 
-/// What is multiplied, and by what.
+/// Factor on the noise of a sensor.
 #[derive(Debug, Clone, Copy)]
 pub struct Factor {
     /// The sensor.
@@ -449,7 +450,8 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Whether the search ended at the largest factor that it tries, e^12: the factor says nothing then.
+    /// Returns true if the search ended at the largest factor that it tries, e^12, which means
+    /// nothing.
     pub fn is_at_limit(&self) -> bool {
         self.on_variance.ln().abs() > MAX_LN - 1e-6
     }
@@ -508,9 +510,9 @@ pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
 
 // Where a function that falls crosses zero.
 
-/// How a crossing is sought.
+/// Settings of the search for a crossing.
 pub(crate) struct Crossing {
-    /// Where the variable may go.
+    /// Range of the variable.
     pub bounds: (f64, f64),
     /// First step away from the start; it doubles until there is a bracket.
     pub step: f64,
