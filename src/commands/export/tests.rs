@@ -451,7 +451,7 @@ fn names_of_models_forge_nothing() {
     }
 }
 
-/// Of a model that does not fit, the figures of its reading are exported.
+/// The figures of its reading are exported of a model that does not fit.
 #[test]
 fn a_reading_is_exported_in_the_place_of_the_processes() {
     let whites = |n_a, n_g| model(vec![white(n_a)], vec![white(n_g)]);
