@@ -66,17 +66,3 @@ fn outages_last_in_the_mean_as_long_as_the_drive_lets_them() {
         );
     }
 }
-
-#[test]
-fn a_question_says_how_many_starts_were_tried() {
-    let question = |lasts_s| {
-        let asked = at_rest(lasts_s, OutageRequest::Length(60.0), None).unwrap();
-        asked.in_words(&asked.outages())
-    };
-    let words = "p95_m ≤ 5.00 after an outage of 60 s";
-    assert_eq!(
-        question(180.0),
-        format!("{words} (the worst of 61 starts, 1060 to 1120 s)")
-    );
-    assert_eq!(question(60.0), format!("{words} (from 1000 s on)"));
-}

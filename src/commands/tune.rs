@@ -679,7 +679,7 @@ mod tests {
         }
     }
 
-    /// Where an error is largest: the outage where there are several, the truth where there are several.
+    /// The place of the largest error: the outage where there are several, the truth where there are several.
     #[test]
     fn the_largest_error_has_a_place() {
         let mut tuned = tuned();

@@ -49,7 +49,7 @@ fn examples(help: &str) -> Vec<String> {
     examples
 }
 
-/// What fails of the examples of the commands that are wanted.
+/// Failures of the examples of the commands that are wanted.
 fn failures(wanted: impl Fn(&str) -> bool) -> String {
     let mut failures = Vec::new();
     let is_wanted = |(command, _): &(String, String)| wanted(command.split(' ').next().unwrap());

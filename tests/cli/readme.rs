@@ -35,7 +35,7 @@ fn pages() -> Vec<PathBuf> {
     pages
 }
 
-/// What a block contains when it has been run; the output of a shell block goes to `printed`.
+/// The contents of a block that has been run; the output of a shell block goes to `printed`.
 fn executed(
     place: &Place,
     info: &str,
@@ -101,7 +101,7 @@ fn run(page: &Path, place: &Place, at_night: bool) -> Result<String, String> {
     Ok(text)
 }
 
-/// Whether two texts have the same words, the same whole numbers below 1000, and the same other numbers to a hundredth: another
+/// True of two texts with the same words, the same whole numbers below 1000, and the same other numbers to a hundredth: another
 /// processor may round otherwise.
 fn alike(a: &str, b: &str) -> bool {
     let is_number = |c: char| c.is_ascii_digit() || c == '.';
@@ -156,7 +156,7 @@ fn transcripts_are_what_the_program_does() {
     all_run(markdown(&["tests/cli/transcripts"]), false);
 }
 
-/// How a page differs from what its blocks do in a directory.
+/// The difference of a page from the output of its blocks in a directory.
 fn failure(page: &Path, place: &Place, at_night: bool) -> Option<String> {
     match run(page, place, at_night) {
         Err(failure) => Some(failure),

@@ -172,8 +172,7 @@ fn a_unit_alone_is_judged_as_in_a_catalogue() {
     }
 }
 
-/// Where `run` says of an outage that its errors are beyond linear theory, the answer of `require` and the ranking of a catalogue do
-/// too: of an IMU, of an outage.
+/// The answer of `require` and the ranking of a catalogue call the same outages beyond linear theory as `run` does, for each IMU.
 #[test]
 fn an_answer_is_beyond_linear_theory_where_run_is() {
     let place = place();

@@ -122,7 +122,7 @@ fn defects_beside_the_noise_are_judged_as_run_judges_them() {
     }
 }
 
-/// Where the filter leaves out how the IMU is mounted, no noise of the IMU stands for it: the sigma of the constraint does,
+/// No noise of the IMU stands for a mounting that the filter leaves out: the sigma of the constraint does,
 /// and with the sigma that is found `run` calls the filter what it is.
 #[test]
 fn the_sigma_that_covers_the_errors_of_aiding_is_found() {

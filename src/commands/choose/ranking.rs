@@ -204,8 +204,8 @@ mod ranking_tests {
     use super::*;
     use nav_sim_calibration::Estimator;
 
-    fn fold(scores: &[f64]) -> Fold {
-        let score = |&log_score: &f64| Score {
+    fn fold(scores: [f64; 2]) -> Fold {
+        let score = |log_score: f64| Score {
             all: EndScore {
                 rmse_m: 10.0 - log_score,
                 believed_m: 10.0,
@@ -219,7 +219,7 @@ mod ranking_tests {
         Fold {
             recording: "a".to_owned(),
             windows: 16,
-            scores: scores.iter().map(score).collect(),
+            scores: scores.map(score).to_vec(),
         }
     }
 
@@ -235,14 +235,12 @@ mod ranking_tests {
         );
     }
 
-    fn ranked(estimators: &[Estimator], folds: &[&[f64]]) -> Ranking {
-        let candidates: Vec<Candidate> = estimators
-            .iter()
-            .map(|e| Candidate::new(*e, "WN".parse().unwrap()))
-            .collect();
-        let named = |(k, scores): (usize, &&[f64])| Fold {
+    fn ranked(second: Estimator, folds: &[[f64; 2]]) -> Ranking {
+        let candidate = |estimator| Candidate::new(estimator, "WN".parse().unwrap());
+        let candidates = [Estimator::Awv, second].map(candidate);
+        let named = |(k, scores): (usize, &[f64; 2])| Fold {
             recording: format!("r{k}"),
-            ..fold(scores)
+            ..fold(*scores)
         };
         let folds: Vec<Fold> = folds.iter().enumerate().map(named).collect();
         Ranking::new(&candidates, &folds)
@@ -260,14 +258,13 @@ mod ranking_tests {
     /// Recordings differ by far more than candidates; what counts is the difference on each.
     #[test]
     fn differences_are_paired() {
-        let two = [Estimator::Awv, Estimator::SrAwv];
         let found = ranked(
-            &two,
+            Estimator::SrAwv,
             &[
-                &[-10.0, -11.0],
-                &[-50.0, -51.1],
-                &[-20.0, -20.9],
-                &[-90.0, -91.0],
+                [-10.0, -11.0],
+                [-50.0, -51.1],
+                [-20.0, -20.9],
+                [-90.0, -91.0],
             ],
         );
         assert!(found.tells && found.candidates[0].index == 0 && !found.candidates[1].tied);
@@ -277,14 +274,13 @@ mod ranking_tests {
     /// One recording against three: it decides, and the interval says that nothing is known.
     #[test]
     fn a_recording_that_decides_is_named() {
-        let two = [Estimator::Awv, Estimator::SrAwv];
         let found = ranked(
-            &two,
+            Estimator::SrAwv,
             &[
-                &[-10.0, -11.0],
-                &[-10.0, -11.0],
-                &[-10.0, -11.0],
-                &[-30.0, -10.0],
+                [-10.0, -11.0],
+                [-10.0, -11.0],
+                [-10.0, -11.0],
+                [-30.0, -10.0],
             ],
         );
         assert_eq!((found.candidates[0].index, found.tells), (1, false));
@@ -293,22 +289,23 @@ mod ranking_tests {
 
     #[test]
     fn three_recordings_tell_nothing_and_single_estimators_never_win() {
-        let two = [Estimator::Awv, Estimator::Gmwm];
-        let found = ranked(&two, &[&[-10.0, -1.0], &[-10.0, -1.1], &[-10.0, -0.9]]);
+        let found = ranked(
+            Estimator::Gmwm,
+            &[[-10.0, -1.0], [-10.0, -1.1], [-10.0, -0.9]],
+        );
         assert!(!found.tells && found.candidates[0].index == 0 && !found.candidates[1].eligible);
     }
 
     #[test]
     fn a_candidate_that_diverges_is_last() {
-        let two = [Estimator::Awv, Estimator::SrAwv];
         let diverged = f64::NEG_INFINITY;
         let found = ranked(
-            &two,
+            Estimator::SrAwv,
             &[
-                &[diverged, -11.0],
-                &[-1.0, -11.0],
-                &[-1.0, -11.0],
-                &[-1.0, -11.0],
+                [diverged, -11.0],
+                [-1.0, -11.0],
+                [-1.0, -11.0],
+                [-1.0, -11.0],
             ],
         );
         assert_eq!(
