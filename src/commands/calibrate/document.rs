@@ -417,7 +417,7 @@ fn fit_name(outcome: &Outcome, outcomes: &[Outcome]) -> String {
     }
 }
 
-/// An amplitude known to no better than this factor, either way, is told.
+/// An amplitude known to no better than this factor, either way, is reported.
 const FACTOR: f64 = 3.0;
 /// The wavelet variance of an AR1 peaks at this many correlation times.
 const PEAK: f64 = 3.78;

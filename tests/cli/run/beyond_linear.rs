@@ -233,7 +233,10 @@ fn a_comparison_names_the_runs_beyond_linear_theory() {
             .contains("sampled: the method is not that of the reference; the runs are not paired")
     );
     let told = compared.stdout;
-    assert!(told.starts_with("against level: tilted "), "{told}");
+    assert!(
+        told.starts_with("uncertainty of East position against level: tilted "),
+        "{told}"
+    );
     assert!(told.contains("\n1 of 3 filters doubtful, most: "), "{told}");
 }
 
