@@ -129,7 +129,7 @@ pub(crate) fn model_practical(
     Ok(Value::Object(sensors).to_string())
 }
 
-/// Longest averaging time at which a minimum of the Allan deviation is believed (s).
+/// Longest averaging time at which a minimum of the Allan deviation is trusted (s).
 const LONGEST_S: f64 = 10_000.0;
 
 /// Units of a sensor and of its rate, as columns have them.

@@ -1,4 +1,4 @@
-//! Jobs that leave Python free: other threads run, Ctrl-C ends them, progress is told.
+//! Jobs that leave Python free: other threads run, Ctrl-C ends them, progress is reported.
 
 use crate::error;
 use nav_sim::app::Reporter;
@@ -68,7 +68,7 @@ impl JobMonitor {
 
     fn reached(&self) -> (u64, u64) {
         let total = self.total.load(Ordering::Relaxed);
-        // a step that is counted between the two is told next time
+        // a step that is counted between the two is reported next time
         (self.done.load(Ordering::Relaxed).min(total), total)
     }
 }

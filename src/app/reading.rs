@@ -112,7 +112,7 @@ impl RecordingRequest {
         self.axes.iter().flatten()
     }
 
-    /// The sensor whose signals alone are asked for.
+    /// The sensor whose signals alone are requested.
     pub(crate) fn sensor(&self) -> Option<Sensor> {
         let of_sensor = |sensor: &Sensor| {
             let mut channels = self.channels().peekable();
@@ -154,7 +154,7 @@ pub struct VarianceRequest {
     pub scales: Option<Scales>,
 }
 
-/// Scales that are asked for.
+/// Scales that are requested.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Scales {
     /// The first ones.

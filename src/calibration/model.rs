@@ -42,7 +42,7 @@ impl ModelSpec {
         ])
     }
 
-    /// A sum of processes that can be told apart.
+    /// A sum of processes that can be distinguished.
     pub(crate) fn of(kinds: impl IntoIterator<Item = Kind>) -> Self {
         let mut kinds: Vec<Kind> = kinds.into_iter().collect();
         kinds.sort_unstable();

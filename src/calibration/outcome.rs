@@ -262,7 +262,7 @@ pub struct Inference {
     pub alike: Option<f64>,
     /// Parameters that are known to differ between recordings; none where [`alike`](Self::alike) does not say that these differ.
     pub varying: Vec<ParameterSpread>,
-    /// Alike processes that cannot be told apart, and the simpler model.
+    /// Alike processes that cannot be distinguished, and the simpler model.
     pub indistinct: Option<IndistinctProcesses>,
     /// Intervals of N, K and B.
     pub practical: PracticalIntervals,
@@ -383,7 +383,7 @@ pub enum Undetermined {
     BeyondSearch,
     /// The draws leave the amplitude of its process open by more than a factor of 100: in some of them it all but vanishes.
     Open,
-    /// These processes, which are alike, cannot be told apart.
+    /// These processes, which are alike, cannot be distinguished.
     Indistinct(Vec<usize>),
 }
 
@@ -412,7 +412,7 @@ impl Goodness {
     }
 }
 
-/// Processes of one kind that cannot be told apart.
+/// Processes of one kind that cannot be distinguished.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IndistinctProcesses {
     /// Their positions in the model.
@@ -469,11 +469,11 @@ pub struct ModelRanking {
 
 // Departure of a curve from the model that was fitted to it: where it matters, and where it is most certain.
 
-/// Scales missed by more standard deviations than this are told.
+/// Scales missed by more standard deviations than this are reported.
 const MISSED: f64 = 4.0;
 /// Scales off by more standard deviations than this are what speaks against a model whose scales are off together.
 const DOUBTFUL: f64 = 2.0;
-/// Standard deviation (relative) to which a wavelet variance must be known for its distance from the model to be told.
+/// Standard deviation (relative) to which a wavelet variance must be known for its distance from the model to be reported.
 const KNOWN: f64 = 0.1;
 
 /// A curve at one level, against the model.
@@ -596,7 +596,7 @@ mod departure_tests {
     use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
     /// Twelve scales that are off by one deviation each are what chance brings: P(chi-square of 12 > 12) = 0.4457 (tables). Off by
-    /// three each, none is missed by itself, and together they are impossible. What is told is of the scales that are known;
+    /// three each, none is missed by itself, and together they are impossible. What is reported is of the scales that are known;
     /// what speaks against the model is the scale where it is worst.
     #[test]
     fn scales_are_judged_together_and_told_as_far_as_they_are_known() {

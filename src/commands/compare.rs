@@ -24,7 +24,7 @@ mod models;
 
 /// Compare runs: verdicts, and ratios of ASEE and RMSE per outage and state; or two calibrations
 ///
-/// ASEE, the averaged standard estimation error, is what a filter believes of its error. A cell holds the mean over the
+/// ASEE, the averaged standard estimation error, is what a filter states of its error. A cell holds the mean over the
 /// outage of (ASEE ratio − 1)·100 ± half its 95 % interval (or its ends, where it is wide): of the runs, and of the
 /// calibrations of models with draws beside them, as calibrate writes them. Scenario and estimator are those of the directories' names
 /// (II_sr-awv, or II/sr-awv); --table prints the layout of the paper's Table I. All states are in the JSON file; a page

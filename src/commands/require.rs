@@ -328,7 +328,7 @@ impl Requirements {
 
 /// Lengths of an outage on the curves of units (s).
 const CURVE_S: [u32; 7] = [1, 3, 10, 30, 60, 120, 300];
-/// Longest outage that is looked at (s).
+/// Longest outage that is examined (s).
 const LONGEST_S: f64 = 600.0;
 /// Advice for confirming a figure of the covariance analysis.
 const CONFIRM: &str = "confirm with nav-sim run --method both";
@@ -405,7 +405,7 @@ fn bound(which: usize, found: &Bound) -> Value {
 
 // Which IMU a limit on the errors after an outage needs, what a given one makes of it, and a ranking.
 
-/// The outage that is asked for.
+/// The outage that is requested.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum OutageRequest {
     /// One of this length (s), from every second on.
@@ -593,8 +593,8 @@ impl Requirements {
         (stated != TurnOn::default()).then_some(stated)
     }
 
-    /// Errors after outages of growing length, at the places that the outage asked for has, each as far as the trajectory
-    /// goes; the longest outage within the limits; the hardest limit after the outage asked for, none where no place has one
+    /// Errors after outages of growing length, at the places that the outage requested has, each as far as the trajectory
+    /// goes; the longest outage within the limits; the hardest limit after the outage requested, none where no place has one
     /// of that length.
     fn bridged(&self, scenario: &Scenario, model: &Model) -> Result<Bridged, RequireError> {
         let long = self.long_outages();
@@ -699,7 +699,7 @@ impl Requirements {
     /// Units whose figures are all stated, the best first, then the others by name.
     ///
     /// # Errors
-    /// When a model has no filter, with its name, or the longest outage is asked for.
+    /// When a model has no filter, with its name, or the longest outage is requested.
     fn ranked(&self, units: &[CatalogueUnit]) -> Result<PlainAnswer> {
         let ranked = |unit: &CatalogueUnit| {
             let judged = self.judge_model(&unit.scenario, &unit.model);

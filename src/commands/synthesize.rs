@@ -164,7 +164,7 @@ impl Command for Synthesize {
 }
 
 impl Synthesize {
-    /// The channels to make: those asked for that the model has.
+    /// The channels to make: those requested that the model has.
     fn wanted(&self, file: &ModelFile, context: &Context<'_>) -> Result<Vec<Channel>> {
         let (missing, present): (Vec<Channel>, Vec<Channel>) = Channel::ALL
             .into_iter()

@@ -51,7 +51,7 @@ pub struct Tune {
 const RARE_FIXES: &str =
     "raise it: the verdict includes the 15-state filter, whatever --filter tunes";
 
-/// Longest schedule of outages that is looked at where no trajectory says how long (s).
+/// Longest schedule of outages that is examined where no trajectory says how long (s).
 const DAY_S: f64 = 86_400.0;
 
 impl Command for Tune {

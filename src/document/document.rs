@@ -13,7 +13,7 @@ pub enum Tone {
     Good,
     /// Grey: the figures at hand do not decide.
     Undecided,
-    /// Amber: to be looked at.
+    /// Amber: to be examined.
     Doubtful,
     /// Red: not to be believed, or a limit not met.
     Bad,

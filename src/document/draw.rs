@@ -547,7 +547,7 @@ struct LegendEntry<'a> {
     series: Vec<&'a Series>,
 }
 
-/// Names that are told. One name alone is told by the axis.
+/// Names that are reported. One name alone is told by the axis.
 struct Legend<'a>(Vec<LegendEntry<'a>>);
 
 impl<'a> Legend<'a> {
@@ -672,7 +672,7 @@ const MANY: usize = 150;
 struct Frame {
     x: AxisScale,
     y: AxisScale,
-    /// Points of a line that can be told apart.
+    /// Points of a line that can be distinguished.
     most: usize,
 }
 

@@ -70,7 +70,7 @@ impl Table {
         self
     }
 
-    /// The same with so many columns that name a row.
+    /// The same with this many columns that name a row.
     #[must_use]
     pub fn with_keys(self, keys: usize) -> Self {
         Self { keys, ..self }

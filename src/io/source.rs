@@ -74,7 +74,7 @@ pub(crate) fn table(path: &Path) -> io::Result<Box<dyn BufRead>> {
     Ok(Box::new(BufReader::with_capacity(BUFFER, unpacked)))
 }
 
-/// Most of a file that is looked at to tell what it is (bytes).
+/// Most of a file that is examined to tell what it is (bytes).
 const HEAD: u64 = 1 << 20;
 
 /// The beginning of a file as text, unpacked when its name ends in `.gz`.

@@ -113,7 +113,7 @@ impl LogInput {
         self.array().map(u64::from_le_bytes)
     }
 
-    /// So many bytes, which are there and not too many: both are known before anything is allocated.
+    /// This many bytes, which are there and not too many: both are known before anything is allocated.
     pub(crate) fn bytes(&mut self, count: u64, limit: u64) -> Result<Vec<u8>, LogError> {
         self.expect(count)?;
         if count > limit {

@@ -71,7 +71,7 @@ impl Archive {
             return Err(LogError::too_large(offset, bytes, limit));
         }
         let array = npy::read_from(&mut file, bytes, offset)?;
-        // the checksum is looked at where the file ends
+        // the checksum is examined where the file ends
         let rest = io::copy(&mut file, &mut io::sink());
         rest.map_err(|e| LogError::malformed(offset, e.to_string()))?;
         Ok(array)

@@ -96,7 +96,7 @@ impl Layout {
         Some(layout)
     }
 
-    /// A field of so many numbers.
+    /// A field of this many numbers.
     fn field(&self, name: &str, count: usize) -> Option<UlogField> {
         let field = self.fields.get(name).copied();
         field.filter(|field| field.count == count)

@@ -251,7 +251,7 @@ impl Scenario {
     /// The outages on a trajectory that lasts from `span_s.0` to `span_s.1`.
     ///
     /// # Errors
-    /// One asked for that does not begin on the trajectory, or withholds no fix.
+    /// One requested that does not begin on the trajectory, or withholds no fix.
     pub fn outages_on(&self, span_s: (f64, f64), seed: u64) -> Result<PlacedOutages, OutageError> {
         let fixes = Fixes::Every {
             interval_s: 1.0 / self.gnss.rate_hz,
@@ -259,7 +259,7 @@ impl Scenario {
         self.outages().on(&FixedData { span_s, fixes }, seed)
     }
 
-    /// The outages asked for: the paper's two when nothing is said.
+    /// The outages requested: the paper's two when nothing is said.
     fn outages(&self) -> OutagePlan {
         let said =
             self.outage.is_some() || self.outage_periodic.is_some() || self.outage_random.is_some();

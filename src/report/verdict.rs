@@ -362,7 +362,7 @@ mod verdict_tests {
     use nav_sim_navigation::metrics::epochs;
     use nav_sim_navigation::simulation::{OutageRecord, RunRecord, RunResult};
 
-    /// Runs whose errors are `scale` times what the filter believes, in every state and at every time.
+    /// Runs whose errors are `scale` times what the filter states, in every state and at every time.
     fn summary(runs: u64, scale: f64) -> Summary {
         let square = scale * scale;
         let outage = OutageRecord {

@@ -104,8 +104,8 @@ fn present(axis: &[f64]) -> Cow<'_, [f64]> {
 }
 
 /// Chance that all axes have the value of the row before. An axis explains its own share of such rows, but no more than its
-/// step does: differences of a rounded Gaussian are zero 0.27 times in so many steps as their median has; ten leaves room for
-/// numbers of so many digits, whose steps differ by ten.
+/// step does: differences of a rounded Gaussian are zero 0.27 times in this many steps as their median has; ten leaves room for
+/// numbers of this many digits, whose steps differ by ten.
 /// Rows that are `held` are none of chance.
 fn chance(axes: &[&[f64]], held: f64) -> f64 {
     let most: Vec<f64> = axes
@@ -367,7 +367,7 @@ pub fn moving(recording: &Recording) -> (usize, usize) {
     if width < 10 || seconds < 10 {
         return (0, seconds);
     }
-    // 3.4 deviations of a median of so many; Gaussian tail of the means of all seconds and axes
+    // 3.4 deviations of a median of this many; Gaussian tail of the means of all seconds and axes
     let sampling = 1.0 + 4.0 / (seconds as f64).sqrt();
     let z = (2.0 * (12.0 * seconds as f64 / LEVEL).ln()).sqrt();
     let mut moves = vec![false; seconds];
@@ -562,7 +562,7 @@ fn sign_correlation(a: &[i8], b: &[i8], tests: f64) -> Option<f64> {
 /// Marks of the samples of a sensor, to be found again in another recording: hashes of some of its windows of 64 rows.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Marks {
-    /// One window in so many is kept, a power of two.
+    /// One window in this many is kept, a power of two.
     one_in: u64,
     hashes: HashSet<u64>,
 }

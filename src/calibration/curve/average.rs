@@ -376,7 +376,7 @@ impl Term {
 // Differences of replicates beyond their noise, one number for all scales: what limits the weight of scales that are known
 // far better than recordings agree.
 
-/// Replicates from which on a scatter is told.
+/// Replicates from which on a scatter is reported.
 const LEAST: usize = 3;
 
 /// Variance b² of ln nu between replicates: the mean over the scales of s²/(noise + b²) is 1, s² the variance from replicate

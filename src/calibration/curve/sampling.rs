@@ -114,7 +114,7 @@ impl SamplingLaw {
         first
     }
 
-    /// Degrees of freedom of the classical wavelet variance of a signal of so many samples.
+    /// Degrees of freedom of the classical wavelet variance of a signal of this many samples.
     pub(crate) fn edof(&self, samples: usize) -> Vec<f64> {
         let count = |i: usize| crate::wavelet::coefficient_count(samples, i as u32 + 1) as f64;
         let of_level = |(i, e): (usize, &f64)| {

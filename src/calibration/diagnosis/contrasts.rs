@@ -338,7 +338,7 @@ pub(super) struct ScaleWindow {
 }
 
 impl ScaleWindow {
-    /// All windows over so many scales.
+    /// All windows over this many scales.
     fn all(levels: usize) -> Vec<Self> {
         let of_width = |width: usize| {
             (0..(levels + 1).saturating_sub(width)).map(move |first| Self { first, width })
@@ -444,7 +444,7 @@ impl Noise {
 // The largest F over all windows and files is compared with what it is in sets of alike recordings, drawn by
 // the sampling law, that differ as much as these do (their excess variance at each scale, of which the axes share as
 // much as they do among the others of the furthest; independent from scale to scale: more chances of a large F than
-// real differences, which hang together, have). Then the furthest is taken out and the others are looked at again.
+// real differences, which hang together, have). Then the furthest is taken out and the others are examined again.
 
 /// Probability of an alarm in a set of alike recordings, for one sensor and one question.
 pub(super) const FALSE_ALARM: f64 = 0.025;

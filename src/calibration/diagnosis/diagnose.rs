@@ -80,14 +80,14 @@ fn of_sensor(
 //
 // What is allowed for is the noise of a quantizer, of uniform numbers. Where the same spectrum is of Gaussian numbers (a
 // dithered output of velocity or angle increments, the difference of white noise), the robust variance reads it as it is, and
-// the classical one seems too high by what was allowed. That is told apart: the two variances then agree.
+// the classical one seems too high by what was allowed. That is reported apart: the two variances then agree.
 //
 // Where the steps of a quantiser are comparable with the noise the two variances differ without an outlier: there nothing is said
 // of outliers.
 
 /// Standard deviations of the median: by chance 3 in 10⁷, of a normal law, at each of some ten scales.
 const ALARM: f64 = 5.0;
-/// Classical over robust, less one, from which it is told: less than that hardly moves a fit.
+/// Classical over robust, less one, from which it is reported: less than that hardly moves a fit.
 const LEAST: f64 = 0.02;
 /// Standard deviation of a median of many Gaussian numbers, times the root of how many: √(π/2). Of few it is less (1 of one,
 /// 1.16 of three), and the alarm the rarer.

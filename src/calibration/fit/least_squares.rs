@@ -11,7 +11,7 @@ use std::fmt::Display;
 /// Fits a model to a curve. The rate (Hz) is what a GM is sampled at.
 ///
 /// AR1 and GM processes are sought with correlation times between a sixth of a sample (phi = e^−6) and twenty times the
-/// longest scale; phi is positive. A fit that ends there is told ([`Fit::at_end`]).
+/// longest scale; phi is positive. A fit that ends there is reported ([`Fit::at_end`]).
 ///
 /// # Errors
 /// When the curve has fewer scales than the model parameters, or numbers that are no wavelet variances.
@@ -564,7 +564,7 @@ pub(crate) fn score(ratio: f64, edof: f64) -> f64 {
 
 // A model fitted to a curve.
 
-/// A fitted model. That the iterations did not converge is told, not an error.
+/// A fitted model. That the iterations did not converge is reported, not an error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
     /// The model: processes in the order of [`Kind::ALL`](crate::noise::Kind::ALL), alike ones by ascending correlation time.

@@ -242,7 +242,7 @@ fn goodness(outcome: &Outcome, draws: &[Fit]) -> Goodness {
 // Intervals of two replicates, known to one degree of freedom at every scale, cover less than they say (87 and 93 % of
 // 300 sets, white noise and random walk); of three and more 93 to 96 %.
 
-/// The inference of an outcome; where alike processes cannot be told apart, with the intervals of the simpler model.
+/// The inference of an outcome; where alike processes cannot be distinguished, with the intervals of the simpler model.
 pub(crate) fn inference(
     group: &Group,
     outcome: &Outcome,
@@ -252,7 +252,7 @@ pub(crate) fn inference(
 ) -> Inference {
     let mut own = by_bootstrap(group, outcome, settings, bootstrap, advance);
     if let Some((simple, processes, p_value)) = simpler(group, outcome, settings) {
-        // By recursion: the simpler model may itself have processes that are not told apart.
+        // By recursion: the simpler model may itself have processes that are not distinguished.
         let intervals = inference(group, &simple, settings, bootstrap, &|_| {}).intervals;
         let indistinct = IndistinctProcesses {
             processes,

@@ -127,7 +127,7 @@ fn holding(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
     }
 }
 
-/// The processes of a draw in the order of the model; none where one has vanished. Alike ones are told apart by
+/// The processes of a draw in the order of the model; none where one has vanished. Alike ones are distinguished by
 /// their correlation times: those that are there, in the draw and in the model, keep their order, and so many of
 /// them are paired as can be, the nearest.
 pub(super) fn matched<'a>(estimate: &Fit, fit: &'a Fit) -> Vec<Option<&'a Process>> {

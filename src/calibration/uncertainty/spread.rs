@@ -254,7 +254,7 @@ impl ReplicateSpread {
                 .map(|_| generator.sample::<f64, _>(StandardNormal) / freedom.sqrt())
                 .collect()
         };
-        // One signal to a recording: what is the recording's and what is the signal's cannot be told apart,
+        // One signal to a recording: what is the recording's and what is the signal's cannot be distinguished,
         // and need not.
         let is_whole = recordings == signals || recordings < 2;
         let of_recordings: Vec<Vec<f64>> = (0..if is_whole { 0 } else { recordings })
@@ -844,7 +844,7 @@ mod axes_tests {
     use rand::RngExt;
     use rand_distr::StandardNormal;
 
-    /// White noise of three axes, the second with so many times the variance of the others.
+    /// White noise of three axes, the second with this many times the variance of the others.
     fn set(seed: u64, recordings: usize, factor: f64) -> Vec<Replicate> {
         let recording = |k: usize| {
             let (run, axis) = (k as u64, Axis::ALL[k % 3]);
@@ -877,7 +877,7 @@ mod axes_tests {
 
     /// By Bonferroni at most 2.5 % of sets of alike axes: of 100 at most 8 (2.5 and four standard deviations of 1.6), whatever the
     /// number of recordings. Axes of which one has 1.4 times the variance (7 deviations of one recording's first scale, of
-    /// 1024 degrees: √(2·2/1024) = 0.0625 of 0.34) are told.
+    /// 1024 degrees: √(2·2/1024) = 0.0625 of 0.34) are reported.
     #[test]
     fn axes_are_told_apart_where_they_differ() {
         for (recordings, estimator) in [

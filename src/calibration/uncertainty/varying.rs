@@ -28,7 +28,7 @@ use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
 
-/// Recordings from which on a spread is told.
+/// Recordings from which on a spread is reported.
 const LEAST: usize = 3;
 
 /// The laws of the parameters that are known to differ. `intervals`: of the parameters of the outcome.
@@ -258,7 +258,7 @@ impl Differences {
         })
     }
 
-    /// A standard deviation that no root exceeds: with it Q is below the least quantile that is asked for.
+    /// A standard deviation that no root exceeds: with it Q is below the least quantile that is requested.
     fn range(&self) -> f64 {
         let all = || self.axes.iter().flat_map(|axis| &axis.values);
         let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
@@ -299,14 +299,14 @@ impl Differences {
     }
 }
 
-// Whether alike processes of a model, two AR1 say, can be told apart at all.
+// Whether alike processes of a model, two AR1 say, can be distinguished at all.
 //
 // With one of them less the objective is larger. By how much it would be if the simpler model were true is drawn from
 // that model. Where the gain is no larger than chance makes it, the two are not determined one by one: the model is not
 // regular there, and no interval around them means anything ([Davies](crate::bibliography::Davies77)). What is
 // determined then are the parameters of the simpler model.
 
-/// Two processes are told apart when chance makes so large a gain with no more than this probability: that of
+/// Two processes are distinguished when chance makes so large a gain with no more than this probability: that of
 /// [`auto`](crate::selection) for keeping a process.
 const LEVEL: f64 = 0.01;
 /// Draws after which it is clear, in most cases, and draws at most.
@@ -399,7 +399,7 @@ fn probability(group: &Group, outcome: &Outcome, simple: &Outcome, settings: &Se
 }
 
 impl IndistinctProcesses {
-    /// The intervals of the larger model: none of those that cannot be told apart, the simpler model's of the others.
+    /// The intervals of the larger model: none of those that cannot be distinguished, the simpler model's of the others.
     pub(crate) fn adopt(&self, outcome: &Outcome, intervals: &mut [ParameterInterval]) {
         let removed = self.processes.last().copied().unwrap_or(usize::MAX);
         for interval in intervals {
@@ -473,7 +473,7 @@ mod indistinct_tests {
     }
 
     /// Intervals that hold the truth, intervals there are, the widest of them (upper over lower end), and sets in which the two
-    /// cannot be told apart.
+    /// cannot be distinguished.
     fn count(sets: u64, ratio: f64) -> (u32, u32, f64, u32) {
         let phis = phis(ratio);
         let (mut held, mut there, mut widest, mut indistinct) = (0, 0, 1.0_f64, 0);
@@ -503,7 +503,7 @@ mod indistinct_tests {
         (held, there, widest, indistinct)
     }
 
-    /// Level 1 %: of 12 sets of two AR1 that are one, two or more are told apart with a probability of 0.6 %. The parameters of
+    /// Level 1 %: of 12 sets of two AR1 that are one, two or more are distinguished with a probability of 0.6 %. The parameters of
     /// the one lie within their intervals in 9 of 12 or more (0.02 % have fewer, at 95 %).
     #[test]
     fn two_processes_that_are_one_are_reported_as_one() {

@@ -681,7 +681,7 @@ impl RunValidator {
         let mut options = asked.options.clone();
         options.insert("seed".to_owned(), vec![seed.to_string()]);
         let manifest = Manifest::new(Run::NAME, options.clone(), inputs.clone());
-        // What the filter believes: its states, and its model where something else makes the errors.
+        // What the filter states: its states, and its model where something else makes the errors.
         options.remove("states");
         if let Some(set) = options.get_mut("set") {
             set.retain(|setting| !setting.starts_with("filter.states="));
@@ -1009,7 +1009,7 @@ fn compute(
         }
     }
     while !prepared.is_empty() {
-        // turn-on biases that models state make other noise of cells that asked for the same
+        // turn-on biases that models state make other noise of cells that requested the same
         let first = prepared.remove(0);
         let (mut pass, rest): (Vec<_>, Vec<_>) = prepared
             .into_iter()

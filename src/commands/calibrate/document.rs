@@ -429,7 +429,7 @@ fn fit_name(outcome: &Outcome, outcomes: &[Outcome]) -> String {
 /// Ratio of wavelet variances of two axes above which one may be in another unit: half of (m/s²)² in g², 96, the smallest
 /// square of a usual conversion.
 const OTHER_UNIT: f64 = 48.0;
-/// An amplitude known to no better than this factor, either way, is told.
+/// An amplitude known to no better than this factor, either way, is reported.
 const FACTOR: f64 = 3.0;
 /// The wavelet variance of an AR1 peaks at this many correlation times.
 const PEAK: f64 = 3.78;

@@ -139,7 +139,7 @@ pub(crate) fn measure(
 }
 
 impl Calibration {
-    /// Adds intervals and goodness of fit, if they are asked for, diagnoses and turn-on biases to fits.
+    /// Adds intervals and goodness of fit, if they are requested, diagnoses and turn-on biases to fits.
     pub(crate) fn new(
         groups: Vec<Group>,
         mut outcomes: Vec<Outcome>,

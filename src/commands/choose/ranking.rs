@@ -9,7 +9,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 /// Fewest recordings of which an interval over recordings says anything: with three, its half-width is 2.5 times their
 /// standard deviation.
 const FEWEST: usize = 4;
-/// A recording whose errors are this many times as large in NEES as any filter believes is described by no candidate.
+/// A recording whose errors are this many times as large in NEES as any filter assumes is described by no candidate.
 const FAILS: f64 = 2.0 * 9.0;
 
 /// A mean over recordings.

@@ -23,7 +23,7 @@ mod targets;
 
 pub use targets::Target;
 
-/// Longest averaging time at which a minimum is believed of a model that no calibration made (s).
+/// Longest averaging time at which a minimum is trusted of a model that no calibration made (s).
 const LONGEST_S: f64 = 10_000.0;
 
 /// Write a noise model as the parameters of another program
@@ -288,7 +288,7 @@ fn check(
 
 /// A pair is in doubt when its Allan deviation is off by more than this.
 const TOLERANCE: f64 = 1.5;
-/// Shares of the Allan variance, and differences of axes, that are told.
+/// Shares of the Allan variance, and differences of axes, that are reported.
 const NOTABLE: f64 = 0.1;
 
 /// A quantity of a sensor.

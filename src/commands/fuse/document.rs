@@ -359,7 +359,7 @@ fn rejected(outliers: &Outliers) -> String {
     )
 }
 
-/// Noise that is believed instead of the model's, and the line to paste there.
+/// Noise that is used instead of the model's, and the line to paste there.
 fn own_noise(noise: &OwnNoise) -> String {
     let OwnNoise {
         sensor,

@@ -113,7 +113,7 @@ pub struct Fuse {
     /// GNSS fixes (.csv, .txt, .pos, .nmea, also .gz)
     #[arg(value_name = "GNSS")]
     gnss: PathBuf,
-    /// Noise model that the filter believes
+    /// Noise model that the filter assumes
     #[arg(value_name = "MODEL")]
     model: PathBuf,
     /// Initial state: a file (TOML), auto (level from the IMU, heading from the GNSS course), or only the heading,
@@ -1016,10 +1016,10 @@ pub struct FuseSummary {
     /// Vehicle motion model, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vehicle: Option<Value>,
-    /// White noise of the recording that is believed instead of the model's.
+    /// White noise of the recording that is used instead of the model's.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub imu_noise: Vec<OwnNoise>,
-    /// Errors at the ends of windows that were withheld in a second run; none where outages were asked for.
+    /// Errors at the ends of windows that were withheld in a second run; none where outages were requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub withheld: Option<Withheld>,
     /// Fixes, NIS, errors at the ends of outages and against the reference.

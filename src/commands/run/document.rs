@@ -292,7 +292,7 @@ fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
     )
 }
 
-/// Every state: what the filter believes and how wrong it is.
+/// Every state: what the filter states and how wrong it is.
 fn states(epochs: &[EpochMetrics], outages: &[(f64, f64)]) -> Vec<Chart> {
     let chart = |(i, state): (usize, &&str)| {
         let series = vec![

@@ -47,7 +47,7 @@ mod document;
 pub struct Run {
     /// Trajectory: motion profile (.toml) or table (.csv)
     pub trajectory: PathBuf,
-    /// Noise model that the filter believes
+    /// Noise model that the filter assumes
     model: PathBuf,
     /// Noise model that makes the INS errors (default: MODEL itself)
     #[arg(long, value_name = "MODEL2", conflicts_with = "static")]
@@ -559,7 +559,7 @@ impl Answer for RunAnswer {
 pub struct NavigateInputs {
     /// The reference trajectory.
     pub trajectory: Trajectory,
-    /// The noise model that the filter believes, at the rate of the IMU.
+    /// The noise model that the filter assumes, at the rate of the IMU.
     pub model: Model,
     /// Source of the true IMU's errors.
     pub truth: TrueImu,
@@ -572,7 +572,7 @@ pub struct NavigateInputs {
 /// The source of the errors of the true IMU, in addition to the defects in the scenario.
 #[derive(Debug)]
 pub enum TrueImu {
-    /// The model that the filter believes.
+    /// The model that the filter assumes.
     AsBelieved,
     /// Another model, at the rate of the IMU.
     Model(Model),
@@ -667,7 +667,7 @@ fn with_runs(
         belief,
         model: inputs.truth_model(),
     };
-    // beside runs that were asked for alone it may be impossible
+    // beside runs that were requested alone it may be impossible
     let expected = possible.ok().and_then(|()| analysis.expected());
     if method != Method::MonteCarlo && expected.is_none() {
         return Err(

@@ -16,7 +16,7 @@
 //! [[accel]]
 //! operation = "scale"              # process = "RW", parameter = "gamma2", factor
 //! ```
-//! With `of_samples` the burst's lengths are meant for a record of so many samples and are scaled to the
+//! With `of_samples` the burst's lengths are meant for a record of this many samples and are scaled to the
 //! record's length. What the operations do, and in which order: [`nav_sim_signal::noise::contamination`].
 
 use super::Failure;

@@ -40,7 +40,7 @@ pub(super) struct Repair {
     pub(super) breaks: Vec<usize>,
     /// A warning of interpolated samples.
     interpolated: Option<String>,
-    /// Stretches of one value, to be told with their times.
+    /// Stretches of one value, to be reported with their times.
     frozen: Vec<(Channel, f64, Range<usize>)>,
 }
 
@@ -148,7 +148,7 @@ fn repeated(name: impl Display, repeats: &RepeatedRows, rate_hz: f64) -> String 
     }
 }
 
-/// Repairs a table of a static recording before its time is looked at.
+/// Repairs a table of a static recording before its time is examined.
 ///
 /// # Errors
 /// When the rows make a noise model worthless.

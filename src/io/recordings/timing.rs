@@ -343,7 +343,7 @@ pub(crate) fn median_step(times: &[f64]) -> f64 {
     *steps.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Rates beyond these are looked at twice (Hz).
+/// Rates beyond these (Hz) make a warning.
 pub(crate) const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 0.5..=20_000.0;
 
 /// The units of time and their length (s).

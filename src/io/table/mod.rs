@@ -923,7 +923,7 @@ impl HeaderLines {
     }
 }
 
-/// The header of so many columns.
+/// The header of this many columns.
 fn layout(headers: &[&str], columns: usize) -> Option<Vec<String>> {
     let names = headers.iter().map(|header| header.split(' '));
     let found = names

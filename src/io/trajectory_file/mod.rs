@@ -1249,7 +1249,7 @@ pub(crate) fn tum(
     text
 }
 
-/// The nearest number of so many decimals; no negative zero.
+/// The nearest number of this many decimals; no negative zero.
 fn tidy(x: f64, decimals: i32) -> f64 {
     let scale = 10_f64.powi(decimals);
     (x * scale).round() / scale + 0.0

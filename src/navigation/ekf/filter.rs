@@ -39,7 +39,7 @@ pub struct Ekf {
     earth_age: f64,
     /// Angular rate of the last sample less its bias (rad/s), for the lever arm's velocity.
     pub(super) omega_ib_b: Vec3,
-    /// The transition since it was last looked at, where a smoother needs it.
+    /// The transition since it was last examined, where a smoother needs it.
     pub(super) transition: Option<Transition>,
     pub(super) scratch: Scratch,
     pub(super) level: Level,
@@ -311,7 +311,7 @@ fn attitude_covariance(state: &NavState, sigma_deg: [f64; 3]) -> Matrix3<f64> {
 }
 
 /// Brings the covariance up to the time of the last sample (the Earth terms lag by up to
-/// `EARTH_STEP_S`): to be called before it is looked at.
+/// `EARTH_STEP_S`): to be called before it is examined.
 pub fn settle(ekf: &mut Ekf) {
     dispatch(ekf.level, Settle(ekf));
 }
@@ -404,7 +404,7 @@ impl Ekf {
     }
 
     /// Sets the first lane to a snapshot less an estimated error, whose covariance is `p`. The other lanes, and what the
-    /// next sample needs of the ones before, are left as they are: the filter is then to be looked at only.
+    /// next sample needs of the ones before, are left as they are: the filter is then to be examined only.
     pub(crate) fn show(&mut self, snapshot: &Snapshot, error: &DVector<f64>, p: &DMatrix<f64>) {
         self.nominal.set_lane(0, &snapshot.nominal);
         let regressors = self.regressors.iter_mut().flatten().map(|r| &mut r.value);

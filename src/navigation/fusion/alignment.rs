@@ -145,7 +145,7 @@ struct StartSearch<'a> {
     belief: &'a Belief,
     /// Standard deviations of the biases, which spoil a levelling: accelerometer (m/s²), gyroscope (rad/s).
     bias: [f64; 2],
-    /// Gravity at the fix that is looked at (m/s²).
+    /// Gravity at the fix that is examined (m/s²).
     g: f64,
 }
 
@@ -262,7 +262,7 @@ impl<'a> StartSearch<'a> {
         }
     }
 
-    /// The solution from a start over so many seconds, its rows those of the start and the end.
+    /// The solution from a start over this many seconds, its rows those of the start and the end.
     fn until(&self, settings: &Settings, start: &Start, seconds: f64) -> Option<Solution> {
         let recorded = self.recorded.until(start.t_s + seconds);
         fuse(&recorded, self.belief, start, settings, None).ok()
@@ -773,9 +773,9 @@ fn level(f_b: DVec3, f_h: DVec3) -> RollPitchYaw {
 
 // Which of two starts the fixes that follow speak for: the filter is run from both, and its innovations tell.
 
-/// Length of the recording that is tried first (s). Doubled until the two starts are told apart.
+/// Length of the recording that is tried first (s). Doubled until the two starts are distinguished.
 const TRIAL_S: f64 = 60.0;
-/// A heading that the smoother moves by more than so many of its standard deviations is not known as well as it says.
+/// A heading that the smoother moves by more than this many of its standard deviations is not known as well as it says.
 const MOVED: f64 = 3.0;
 /// Largest standard deviation of a start (degrees).
 const WIDEST_DEG: f64 = 30.0;

@@ -18,11 +18,11 @@ use serde::Serialize;
 /// Lags that are tried (s), the longer ones where none of the others fits, and the step from one to the next.
 const LONGEST_S: [f64; 2] = [60.0, 600.0];
 const STEP_S: f64 = 0.1;
-/// Shortest lag that is told: turns between fixes a second apart, of receivers that filter them, lie off by less (s).
+/// Shortest lag that is reported: turns between fixes a second apart, of receivers that filter them, lie off by less (s).
 const SHORTEST_S: f64 = 0.5;
 /// Times from the beginning of a turn to its end (s): of fixes nearer to one another the course is mostly noise.
 const APART_S: (f64, f64) = (0.9, 5.0);
-/// Most turns that are looked at.
+/// Most turns that are examined.
 const MOST: usize = 2000;
 /// Fewest turns of which anything is said.
 const FEWEST: usize = 30;
@@ -177,7 +177,7 @@ impl TurnedAngle {
 const TRIED: (i32, f64) = (5, 0.2);
 /// Time from one position to the next where positions alone tell the turns (s).
 const BASELINE_S: f64 = 2.0;
-/// Most of a recording that is looked at (s).
+/// Most of a recording that is examined (s).
 const MOST_S: f64 = 1200.0;
 /// NIS per component of a fix that contradicts, however much, and of one before the start: a wrong delay makes some starts
 /// be given up for later ones, whose fewer fixes would speak for it.
@@ -259,7 +259,7 @@ fn vertex<T>(tried: &[(f64, f64, T)], least: usize) -> f64 {
     0.5 * TRIED.1 * (before - after) / bend
 }
 
-/// Mean NIS per component of so many fixes, those before the start among them.
+/// Mean NIS per component of this many fixes, those before the start among them.
 fn disagreement(solution: &Solution, fixes: usize) -> f64 {
     let of = |nis: f64, components: usize| (nis / components as f64).min(CONTRADICTS);
     let seen: f64 = solution

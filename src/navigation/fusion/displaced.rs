@@ -236,7 +236,7 @@ const QUANTILE: f64 = 3.090;
 const LEAST: f64 = 0.1;
 /// Pairs of which anything is said.
 const FEWEST: usize = 50;
-/// Largest correlation that is believed: 32 times the standard deviation.
+/// Largest correlation that is trusted: 32 times the standard deviation.
 const LARGEST: f64 = 0.998;
 /// Innovations count as this many times their median deviation at most: normal ones reach it once in 17 000 (4 σ).
 const FAR: f64 = 6.0;

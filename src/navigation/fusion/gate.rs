@@ -1,4 +1,4 @@
-//! Fixes that are left out as outliers: those whose NIS a right filter exceeds once in so many fixes.
+//! Fixes that are left out as outliers: those whose NIS a right filter exceeds once in this many fixes.
 //!
 //! The gate is open at the start and after a gap, where a large NIS may be the solution's, until a fix is as stated. A run
 //! of rejections opens it again: then it is the solution that is wrong.

@@ -328,7 +328,7 @@ fn normalised(errors: &[StatedErrors]) -> Vec<NormalisedErrors> {
 
 /// Farther apart than this all the time is another place (m).
 const APART_M: f64 = 1000.0;
-/// Heights that differ by more (m) and so many times their scatter are counted from another level: geoids are up to 100 m
+/// Heights that differ by more (m) and this many times their scatter are counted from another level: geoids are up to 100 m
 /// from the ellipsoid, and constant over a drive.
 const HEIGHT: (f64, f64) = (5.0, 10.0);
 /// Attitudes this near to other axes are in those (degrees).
@@ -567,7 +567,7 @@ const FITTED: usize = 5000;
 const LEAST: (f64, f64) = (1e-3, 1e-4);
 /// A point farther off is another frame (m).
 const FARTHEST_M: f64 = 30.0;
-/// Rows that are looked at for a rough clock, and how far it is looked for (s), in steps (s).
+/// Rows that are examined for a rough clock, and how far it is looked for (s), in steps (s).
 const LOOKS: usize = 200;
 const SEARCH_S: (f64, f64) = (120.0, 0.5);
 /// Distance at which there is no other clock to look for (m).

@@ -121,7 +121,7 @@ impl<'a> Recorded<'a> {
 }
 
 impl Settings {
-    /// For a trial, of which innovations are looked at and hardly a row.
+    /// For a trial, of which innovations are examined and hardly a row.
     fn trial(&self) -> Self {
         Self {
             rows_hz: 1e-3,

@@ -377,7 +377,7 @@ fn deviations(moments: &[MotionSample], mean: DQuat) -> [BlockSums; 3] {
     blocks
 }
 
-/// The filter's own standard deviations on average: its errors last, and are not less for being looked at often.
+/// The filter's own standard deviations on average: its errors last, and are not less for being examined often.
 fn of_filter(moments: &[MotionSample]) -> DVec3 {
     let weights: DVec3 = moments.iter().map(|m| m.sigma.powf(-2.0)).sum();
     let sums: DVec3 = moments

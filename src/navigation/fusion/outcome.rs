@@ -325,7 +325,7 @@ const NIS_LIMITS: (f64, f64) = (2.0, 4.0);
 const NIS_LOW: f64 = 0.5;
 /// Components of which the mean NIS of a right filter stays below the first limit.
 const FEWEST: usize = 50;
-/// Stretch in which the NIS is looked at by itself (s), and the share of bad ones that is too much.
+/// Stretch in which the NIS is examined by itself (s), and the share of bad ones that is too much.
 const STRETCH_S: f64 = 60.0;
 const BAD_STRETCHES: f64 = 0.1;
 /// Evidence on a solution.

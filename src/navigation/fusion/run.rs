@@ -329,7 +329,7 @@ impl Filter {
         let measured = self.fix(fix);
         let components = fix.components();
         let (z, s) = self.ekf.innovation(&measured);
-        // of so many of the first components
+        // of this many of the first components
         let nis = |n: usize| {
             let (z, s) = (
                 z.rows(0, n).into_owned(),

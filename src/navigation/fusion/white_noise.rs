@@ -25,7 +25,7 @@ const FEWEST: usize = 200;
 const OF_MAD: f64 = 1.482_602;
 /// Loss in −2 ln(likelihood) from which the fixes disagree: odds of e^5. On a drive that hardly tells, it is 5 by chance.
 const DECIDES: f64 = 10.0;
-/// Length of a recording that is looked at (s).
+/// Length of a recording that is examined (s).
 const MOST_S: f64 = 1200.0;
 
 /// White noise of a sensor that is larger than the model's.

@@ -26,22 +26,22 @@ const DECISIVE: [f64; 2] = [1.25, 1.5];
 const FEW: f64 = 10.0;
 /// Level of the coverage of a recorded drive.
 const COVERAGE: f64 = 0.95;
-/// A mean NEES above this is not a matter of tuning: errors are of another order than the filter believes.
+/// A mean NEES above this is not a matter of tuning: errors are of another order than the filter assumes.
 const FAR: f64 = 100.0;
 
 /// Verdict on a filter in one word, the gravest last.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum VerdictKind {
-    /// Errors are as large as the filter believes; other ones would have been found.
+    /// Errors are as large as in the filter's model; other ones would have been found.
     #[default]
     Consistent,
     /// No fault was found, by samples too few to find one.
     Undecided,
-    /// Errors are smaller than the filter believes.
+    /// Errors are smaller than the filter assumes.
     Underconfident,
     /// No fault was found by a method that does not hold here, or something else speaks against the result.
     Doubtful,
-    /// Errors are larger than the filter believes.
+    /// Errors are larger than the filter assumes.
     Overconfident,
     /// A limit that was required is not kept.
     NotMet,
@@ -331,7 +331,7 @@ impl Verdict {
         })
     }
 
-    /// The verdict on normalised squares of so many degrees of freedom each, independent of one another; none without any.
+    /// The verdict on normalised squares of this many degrees of freedom each, independent of one another; none without any.
     pub fn of_windows(squares: impl Iterator<Item = (f64, usize)>) -> Option<Self> {
         let (mut sum, mut degrees, mut windows) = (0.0, 0, 0.0);
         for (square, own) in squares {
@@ -402,7 +402,7 @@ impl Statistic {
     }
 }
 
-/// Between which a right filter's root mean square of so many degrees of freedom lies but with probability `tail` on
+/// Between which a right filter's root mean square of this many degrees of freedom lies but with probability `tail` on
 /// either side.
 fn ratio_limits((dof, samples): (usize, f64), tail: f64) -> (f64, f64) {
     if samples.is_infinite() {

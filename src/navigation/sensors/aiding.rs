@@ -42,7 +42,7 @@ impl AidingSettings {
         Aid::ALL.into_iter().filter_map(rate)
     }
 
-    /// Rate (Hz) of an aid that is set, white noise of a measurement as the filter believes and in truth (m/s or rad), and
+    /// Rate (Hz) of an aid that is set, white noise of a measurement as in the filter's model and in truth (m/s or rad), and
     /// the point whose velocity it measures, from the IMU, in b (m).
     fn common(&self, aid: Aid) -> Option<(f64, f64, Option<f64>, [f64; 3])> {
         Some(match aid {
@@ -87,7 +87,7 @@ impl AidingSettings {
         self.common(aid).map_or(DVec3::ZERO, |(.., arm)| arm.into())
     }
 
-    /// Standard deviations of one measurement's white noise, as the filter believes and in truth (m/s or rad).
+    /// Standard deviations of one measurement's white noise, as in the filter's model and in truth (m/s or rad).
     pub fn sigmas(&self, aid: Aid) -> [f64; 2] {
         let (_, sigma, noise, _) = self.common(aid).unwrap_or_default();
         [sigma, noise.unwrap_or(sigma)]
@@ -480,7 +480,7 @@ impl Walk {
     }
 }
 
-// The settings of each kind of aiding: what a filter believes, and what is true.
+// The settings of each kind of aiding: what a filter states, and what is true.
 
 /// `[aiding.nhc]`: lateral and vertical velocity of a point of the vehicle are zero.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -489,7 +489,7 @@ pub struct NhcSettings {
     /// Measurements per second.
     #[schemars(with = "Measurable")]
     pub rate_hz: f64,
-    /// Standard deviation of one measurement, white, as the filter believes (m/s).
+    /// Standard deviation of one measurement, white, as in the filter's model (m/s).
     #[schemars(with = "Measurable")]
     pub sigma_m_s: f64,
     /// The point that moves neither sideways nor up, with respect to the IMU: front, right, down (m).
@@ -503,11 +503,11 @@ pub struct NhcSettings {
     pub truth: NhcErrors,
 }
 
-/// `[aiding.nhc.truth]`: without it, the white noise is as the filter believes, and there is nothing else.
+/// `[aiding.nhc.truth]`: without it, the white noise is as in the filter's model, and there is nothing else.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct NhcErrors {
-    /// White noise of one measurement (m/s); unless given, what the filter believes.
+    /// White noise of one measurement (m/s); unless given, what the filter states.
     #[schemars(with = "Option<Amount>")]
     pub noise_sigma_m_s: Option<f64>,
     /// Pitch and yaw of the vehicle's axes in those of the IMU (1 σ, degrees), constant in a run.
@@ -531,7 +531,7 @@ pub struct OdometerSettings {
     /// Measurements per second.
     #[schemars(with = "Measurable")]
     pub rate_hz: f64,
-    /// Standard deviation of one measurement, white, as the filter believes (m/s).
+    /// Standard deviation of one measurement, white, as in the filter's model (m/s).
     #[schemars(with = "Measurable")]
     pub sigma_m_s: f64,
     /// The wheel, or the middle of its axle, with respect to the IMU: front, right, down (m).
@@ -544,11 +544,11 @@ pub struct OdometerSettings {
     pub truth: OdometerErrors,
 }
 
-/// `[aiding.odometer.truth]`: without it, the white noise is as the filter believes, and there is nothing else.
+/// `[aiding.odometer.truth]`: without it, the white noise is as in the filter's model, and there is nothing else.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct OdometerErrors {
-    /// White noise of one measurement (m/s); unless given, what the filter believes.
+    /// White noise of one measurement (m/s); unless given, what the filter states.
     #[schemars(with = "Option<Amount>")]
     pub noise_sigma_m_s: Option<f64>,
     /// Scale-factor error (1 σ), constant in a run: the tyre.
@@ -566,18 +566,18 @@ pub struct ZuptSettings {
     /// Measurements per second.
     #[schemars(with = "Measurable")]
     pub rate_hz: f64,
-    /// Standard deviation of one measurement, white, as the filter believes (m/s).
+    /// Standard deviation of one measurement, white, as in the filter's model (m/s).
     #[schemars(with = "Measurable")]
     pub sigma_m_s: f64,
     /// Its true errors.
     pub truth: ZuptErrors,
 }
 
-/// `[aiding.zupt.truth]`: without it, the white noise is as the filter believes, and there is nothing else.
+/// `[aiding.zupt.truth]`: without it, the white noise is as in the filter's model, and there is nothing else.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ZuptErrors {
-    /// White noise of one measurement (m/s); unless given, what the filter believes.
+    /// White noise of one measurement (m/s); unless given, what the filter states.
     #[schemars(with = "Option<Amount>")]
     pub noise_sigma_m_s: Option<f64>,
     /// Forward velocity that is taken for standstill (1 σ, m/s), a Gauss-Markov process.
@@ -595,7 +595,7 @@ pub struct HeadingSettings {
     /// Measurements per second.
     #[schemars(with = "Measurable")]
     pub rate_hz: f64,
-    /// Standard deviation of one measurement, white, as the filter believes (degrees).
+    /// Standard deviation of one measurement, white, as in the filter's model (degrees).
     #[schemars(with = "Measurable")]
     pub sigma_deg: f64,
     /// Sensor of the heading.
@@ -615,11 +615,11 @@ pub enum HeadingSource {
     Antennas,
 }
 
-/// `[aiding.heading.truth]`: without it, the white noise is as the filter believes, and there is nothing else.
+/// `[aiding.heading.truth]`: without it, the white noise is as in the filter's model, and there is nothing else.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct HeadingErrors {
-    /// White noise of one measurement (degrees); unless given, what the filter believes.
+    /// White noise of one measurement (degrees); unless given, what the filter states.
     #[schemars(with = "Option<Amount>")]
     pub noise_sigma_deg: Option<f64>,
     /// Offset (1 σ, degrees), constant in a run.

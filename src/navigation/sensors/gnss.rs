@@ -33,7 +33,7 @@ pub struct GnssSettings {
     #[schemars(inner(range(min = -MAX_LEVER_ARM_M, max = MAX_LEVER_ARM_M)))]
     pub lever_arm_m: [f64; 3],
     /// Standard deviations of a correlated position error north, east, down (m): a Gauss-Markov process beside
-    /// the white noise, in the true receiver only. The filter believes `pos_sigma_m`, white.
+    /// the white noise, in the true receiver only. The filter assumes `pos_sigma_m`, white.
     #[schemars(with = "[Amount; 3]")]
     pub correlated_pos_sigma_m: [f64; 3],
     /// Correlation time of that error (s).

@@ -171,7 +171,7 @@ impl<'a> FixedData<'a> {
         }
     }
 
-    /// An outage asked for by its times, cut where the data end.
+    /// An outage requested by its times, cut where the data end.
     fn place(&self, asked: Outage) -> Result<Outage, OutageError> {
         let (start_s, end_s) = self.span_s;
         let refused = |reason: String, fixes: String| {
@@ -208,7 +208,7 @@ pub enum OutageError {
     /// A value that no data could have.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// One asked for by its times that begins off the data, or into which no fix falls.
+    /// One requested by its times that begins off the data, or into which no fix falls.
     #[error("{message}")]
     Placed {
         /// The refusal.
@@ -332,14 +332,14 @@ impl RandomOutages {
     }
 }
 
-// What outages are asked for, and the one rule of runs, studies and fusions that places them on data.
+// What outages are requested, and the one rule of runs, studies and fusions that places them on data.
 
 /// Requested outages: the union of all kinds.
 #[derive(Debug, Clone, Default)]
 pub struct OutagePlan {
-    /// Windows asked for by their times: they must lie on the data.
+    /// Windows requested by their times: they must lie on the data.
     pub fixed: Vec<Outage>,
-    /// Windows that nobody asked for: cut or left out where the data are shorter.
+    /// Windows that nobody requested: cut or left out where the data are shorter.
     pub default: Vec<Outage>,
     /// Regular ones.
     pub periodic: Option<PeriodicOutages>,
@@ -369,7 +369,7 @@ impl OutagePlan {
         Ok(())
     }
 
-    /// The outages on data: windows asked for must begin on them and withhold a fix, and are cut where the data
+    /// The outages on data: windows requested must begin on them and withhold a fix, and are cut where the data
     /// end; of all other kinds, what lies on the data remains.
     ///
     /// ```
@@ -388,7 +388,7 @@ impl OutagePlan {
     /// ```
     ///
     /// # Errors
-    /// A value that is refused, or a window asked for that does not lie on the data.
+    /// A value that is refused, or a window requested that does not lie on the data.
     pub fn on(&self, data: &FixedData<'_>, seed: u64) -> Result<PlacedOutages, OutageError> {
         self.validate()?;
         let (start_s, end_s) = data.span_s;
@@ -404,7 +404,7 @@ impl OutagePlan {
             }
         }
         let windows = self.windows(data.span_s, seed);
-        // Every fixed window lies on the data by now: fewer windows than were asked for can only come of a
+        // Every fixed window lies on the data by now: fewer windows than were requested can only come of a
         // union.
         if self.fixed.len() > windows.len() {
             remarks.push("overlapping outages are merged".to_owned());

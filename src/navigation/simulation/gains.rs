@@ -58,7 +58,7 @@ impl GainsUsed {
 
 /// Figures of eight runs made both ways may differ by this share; those of many then differ by less (docs/validation.md).
 const AGREEMENT: f64 = 0.03;
-/// One batch in so many is made both ways.
+/// One batch in this many is made both ways.
 const CHECKED: u64 = 64;
 
 /// A filter along the reference, event by event.

@@ -18,7 +18,7 @@ use glam::DVec3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::sync::{Arc, OnceLock};
 
-/// One experiment: a trajectory, what makes the errors, what filters believe, what is measured when.
+/// One experiment: a trajectory, what makes the errors, the filters' models, what is measured when.
 #[derive(Debug, Clone)]
 pub struct Experiment<'a> {
     /// The reference.
@@ -323,7 +323,7 @@ fn antenna(experiment: &Experiment<'_>, t_s: f64, reference: &NavState) -> ([f64
 
 /// Sine of a pitch of 80°.
 const STEEP: f64 = 0.985;
-/// Share of what a filter believes of the constraint that the reference may have of its own: runs and analysis forgive it.
+/// Share of what a filter states of the constraint that the reference may have of its own: runs and analysis forgive it.
 const FORGIVEN: f64 = 0.3;
 
 /// Below these a vehicle stands (m/s, rad/s): a hundredth of the pace of a walk, and what a gyroscope would not show.

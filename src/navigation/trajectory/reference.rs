@@ -17,7 +17,7 @@ const POSITION_JUMP: (f64, f64) = (5.0, 30.0);
 const ATTITUDE_JUMP: (f64, f64) = (10.0 * DEG, 200.0 * DEG);
 /// Steps on either side whose median says where a step should lead.
 const NEIGHBOURS: usize = 5;
-/// A longer step than so many median ones, and than so long (s), is a gap: what is in it is a guess.
+/// A longer step than this many median ones, and than so long (s), is a gap: what is in it is a guess.
 const GAP: (f64, f64) = (1.5, 1.0 + 1e-6);
 /// Length left out on either side of a jump (s): smoothing spreads it.
 const AROUND_JUMP_S: f64 = 1.0;
@@ -26,7 +26,7 @@ const SHORTEST_S: f64 = 5.0;
 
 /// Longest step of positions whose unevenness is that of the positions (s): over longer ones it may be the motion's.
 const FINE_S: f64 = 0.1;
-/// A change of velocity from step to step so many times the median one is a correction.
+/// A change of velocity from step to step this many times the median one is a correction.
 const CORRECTION: f64 = 5.0;
 /// Samples on either side over which the spline spreads a correction.
 const SPREAD: usize = 6;

@@ -108,7 +108,7 @@ impl Windows {
         (2.0 * early >= m && 2.0 * late >= m).then_some([early, late])
     }
 
-    /// w of a window with so many samples.
+    /// w of a window with this many samples.
     fn weight(&self, [early, late]: [f64; 2]) -> f64 {
         2.0 * early * late / (self.half as f64 * (early + late))
     }

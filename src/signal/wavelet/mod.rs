@@ -31,10 +31,10 @@ pub enum WaveletError {
     TooShort {
         /// Samples in the signal.
         samples: usize,
-        /// Levels asked for.
+        /// Levels requested.
         levels: u32,
     },
-    /// No level asked for.
+    /// No level requested.
     #[error("at least one scale is needed")]
     NoLevels,
     /// A sample is not a finite number.

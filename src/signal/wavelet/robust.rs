@@ -619,7 +619,7 @@ impl Tuning {
         if !(Self::EFFICIENCIES.0..=Self::EFFICIENCIES.1).contains(&efficiency) {
             return Err(WaveletError::Efficiency(efficiency));
         }
-        // The efficiency is 0.014 at c = 2.6 and 0.9999 at c = 40: the range asked for lies between.
+        // The efficiency is 0.014 at c = 2.6 and 0.9999 at c = 40: the range requested lies between.
         let (mut low, mut high) = (BRANCH, 40.0);
         // Halved until no number lies between.
         while let middle = 0.5 * (low + high)

@@ -1,4 +1,4 @@
-//! Linear covariance analysis: what a filter believes of its errors, and what they are, without random numbers.
+//! Linear covariance analysis: what a filter states of its errors, and what they are, without random numbers.
 //!
 //! A filter's gains do not depend on the random numbers, except for the small effect of linearising about its own
 //! estimate. One pass along the reference therefore gives its own covariance, and beside it the covariance

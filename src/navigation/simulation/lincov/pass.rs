@@ -398,7 +398,7 @@ fn in_degrees(all: [f64; REPORTED], unit: f64) -> [f64; REPORTED] {
 /// Branches that are followed at a time: what they begin from is kept until then.
 const TOGETHER: usize = 256;
 
-/// Which moments of an outage are looked at.
+/// Which moments of an outage are examined.
 #[derive(PartialEq)]
 pub(crate) enum Moments {
     /// Its end: just before the first fix after it, or at the end of the track.

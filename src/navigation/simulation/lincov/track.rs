@@ -87,7 +87,7 @@ pub(super) struct Row {
     pub h: [f64; NAV + 3],
     /// Motion and temperature to which errors of the gyroscope are proportional.
     felt: Surroundings,
-    /// Variance of its white noise, as the filter believes.
+    /// Variance of its white noise, as in the filter's model.
     pub r: f64,
     /// The same in truth.
     pub noise: f64,
@@ -99,7 +99,7 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// A measurement whose true noise is as the filter believes.
+    /// A measurement whose true noise is as in the filter's model.
     fn new(h: [f64; NAV + 3], felt: Surroundings, r: f64, what: Measured) -> Self {
         Self {
             h,
@@ -168,7 +168,7 @@ pub struct Track {
     steps: Arc<Vec<Step>>,
     pub(super) marks: Vec<Mark>,
     pub(super) outages: usize,
-    /// Covariance of the navigation error at the start, as the filter believes.
+    /// Covariance of the navigation error at the start, as in the filter's model.
     pub(super) start: [Nav; NAV],
     /// True if it starts without error.
     pub(super) perfect: bool,
@@ -255,7 +255,7 @@ impl Track {
         track
     }
 
-    /// The same where a filter believes the vehicle's own measurements to be so much worse; in truth they are as they were.
+    /// The same where a filter assumes the vehicle's own measurements to be so much worse; in truth they are as they were.
     pub fn with_aiding_sigmas(&self, factor: f64) -> Self {
         let mut track = self.clone();
         let believed = |row: &Row| match row.what {
@@ -680,7 +680,7 @@ impl Track {
         let stretch = (drive_s / OUTLINE_DRIVE_S).clamp(1.0, MOST_STRETCH);
         let (mut steps, mut marks) = (Vec::new(), Vec::new());
         let (mut report_s, mut begin_s, mut before_s) = (f64::NEG_INFINITY, 0.0, 0.0);
-        // What becomes one step, and one measurement of each kind: the last of so many, with the mean of their noise.
+        // What becomes one step, and one measurement of each kind: the last of this many, with the mean of their noise.
         let mut step: Option<Step> = None;
         let mut measured: [(Vec<Row>, f64); Measured::KINDS] = Default::default();
         for (i, (leg, mark)) in self.legs(0..self.marks.len()).enumerate() {
@@ -923,7 +923,7 @@ pub(super) struct StepOfSource {
 }
 
 impl StepOfSource {
-    /// `mean` after so many samples.
+    /// `mean` after this many samples.
     #[inline(always)]
     pub(super) fn mean_after(&self, elapsed: f64) -> f64 {
         self.mean + self.ramp * elapsed
@@ -1146,7 +1146,7 @@ impl Sources {
         states
     }
 
-    /// Wheel scale and mounting of a vehicle, as a filter believes in them.
+    /// Wheel scale and mounting of a vehicle, as in a filter's model.
     fn of_vehicle(belief: &Belief) -> Vec<Source> {
         let parts = [
             AidPart::WheelScale,

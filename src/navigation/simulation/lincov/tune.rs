@@ -1,6 +1,6 @@
 //! Smallest factors on a noise model that make the filter made of it consistent.
 //!
-//! What a filter believes is enlarged until it covers its true errors: where the truth is another model, one of
+//! What a filter states is enlarged until it covers its true errors: where the truth is another model, one of
 //! several, or the same model with other parameters. The factors come from the least divergence between the
 //! covariance that the filter states and that of its errors ([`super::Consistency::divergence`]), then one factor
 //! on all of them makes the filter exactly consistent.
@@ -246,7 +246,7 @@ impl Task<'_> {
     }
 }
 
-/// The smallest factor on the standard deviations that a filter believes of a vehicle's own measurements with which it states
+/// The smallest factor on the standard deviations that a filter assumes of a vehicle's own measurements with which it states
 /// its errors, at the ends of outages and over the run; 1 where it does already, none where a factor of a thousand does not help.
 pub fn aiding_factor(track: &Track, belief: &Belief, truth: &TrueErrors) -> Option<f64> {
     let largest = |ln: f64| {
