@@ -4,12 +4,11 @@
 use super::draws_file::{self, DrawsFile, SignalDraws};
 use super::model_file::{self, ModelFile, TurnOn};
 use super::recordings::{ReadOptions, csv, read};
+use super::tests::Files;
 use super::trajectory_file;
 use nav_sim_signal::imu::Channel;
 use nav_sim_signal::noise::{Composite, Model, Process};
 use proptest::prelude::*;
-use std::fs;
-use std::path::PathBuf;
 
 /// An array of `f64` as NumPy writes it: rows, columns, and its numbers row by row.
 pub(super) fn npy([rows, columns]: [usize; 2], values: impl Iterator<Item = f64>) -> Vec<u8> {
@@ -20,21 +19,6 @@ pub(super) fn npy([rows, columns]: [usize; 2], values: impl Iterator<Item = f64>
     bytes.extend(head.as_bytes());
     values.for_each(|x| bytes.extend(x.to_le_bytes()));
     bytes
-}
-
-/// A place of its own for a case.
-struct Case(tempfile::TempDir);
-
-impl Case {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn file(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.0.path().join(name);
-        fs::write(&path, bytes).unwrap();
-        path
-    }
 }
 
 /// A positive number of any size that a variance has.
@@ -124,25 +108,25 @@ proptest! {
 
     #[test]
     fn draws_come_back_bit_by_bit_and_a_part_of_them_is_refused(file in draws(), cut in 0.0..1.0_f64) {
-        let case = Case::new();
+        let case = Files::new();
         let json = serde_json::to_string_pretty(&file).unwrap();
-        let model = case.0.path().join("a.toml");
-        case.file("a.draws.json", &json);
+        let model = case.path().join("a.toml");
+        case.add("a.draws.json", &json);
         prop_assert_eq!(draws_file::read(&model).unwrap().unwrap(), file);
-        case.file("a.draws.json", &json[..(cut * json.len() as f64) as usize]);
+        case.add("a.draws.json", &json[..(cut * json.len() as f64) as usize]);
         prop_assert!(draws_file::read(&model).is_err());
     }
 
     #[test]
     fn an_array_comes_back_bit_by_bit_and_a_part_of_it_is_refused(signals in signals(), cut in 0.0..1.0_f64) {
-        let case = Case::new();
+        let case = Files::new();
         let rows = (0..8).flat_map(|k| signals.iter().map(move |(_, x)| x[k]));
         let bytes = npy([8, 6], rows);
-        let array = nav_sim_logs::npy::read(&case.file("a.npy", &bytes)).unwrap();
+        let array = nav_sim_logs::npy::read(&case.add("a.npy", &bytes)).unwrap();
         prop_assert_eq!(array.values.len(), 8 * 6);
         let of_row = |(i, x): (usize, &f64)| signals[i % 6].1[i / 6].to_bits() == x.to_bits();
         prop_assert!(array.values.iter().enumerate().all(of_row));
-        let part = case.file("b.npy", &bytes[..(cut * bytes.len() as f64) as usize]);
+        let part = case.add("b.npy", &bytes[..(cut * bytes.len() as f64) as usize]);
         let options = ReadOptions { rate_hz: Some(100.0), ..ReadOptions::default() };
         prop_assert!(read(&[part], &options).is_err());
     }
@@ -150,19 +134,19 @@ proptest! {
     /// Packed, the end is known: a part is refused. Ten digits of every sample come back.
     #[test]
     fn a_packed_recording_comes_back_and_a_part_of_it_is_refused(signals in signals(), cut in 0.0..1.0_f64) {
-        let case = Case::new();
+        let case = Files::new();
         let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
         std::io::Write::write_all(&mut packed, csv(100.0, &signals).as_bytes()).unwrap();
         let bytes = packed.finish().unwrap();
         let options = ReadOptions::default();
-        let (recordings, _) = read(&[case.file("a.csv.gz", &bytes)], &options).unwrap();
+        let (recordings, _) = read(&[case.add("a.csv.gz", &bytes)], &options).unwrap();
         for (found, (channel, written)) in recordings[0].signals.iter().zip(&signals) {
             prop_assert_eq!(found.channel, *channel);
             for (a, b) in found.samples.iter().zip(written) {
                 prop_assert!((a + found.mean - b).abs() <= 5.1e-10 * b.abs() + 1e-14, "{} {}", a + found.mean, b);
             }
         }
-        let part = case.file("b.csv.gz", &bytes[..(cut * bytes.len() as f64) as usize]);
+        let part = case.add("b.csv.gz", &bytes[..(cut * bytes.len() as f64) as usize]);
         prop_assert!(read(&[part], &options).is_err());
     }
 
@@ -170,9 +154,9 @@ proptest! {
     /// 2^-30 m each, a few of them; 1e-13 degrees are 11 nm.
     #[test]
     fn a_trajectory_comes_back(drive in drive()) {
-        let case = Case::new();
+        let case = Files::new();
         let again = |name: &str, text: &str| {
-            let (trajectory, _) = trajectory_file::load(&case.file(name, text), None).unwrap();
+            let (trajectory, _) = trajectory_file::load(&case.add(name, text), None).unwrap();
             trajectory_file::csv(&trajectory, None)
         };
         let numbers = |text: &str| -> Vec<f64> {

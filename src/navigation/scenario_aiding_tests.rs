@@ -2,13 +2,16 @@
 
 use super::Scenario;
 use crate::ekf::FilterStates;
+use crate::frames::RollPitchYaw;
 use crate::monte_carlo::run;
 use crate::noise::Model;
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
 use crate::simulation::REPORTED;
-use crate::simulation::lincov::{FilterPass, Judged, Track, TruthSide};
-use crate::tests::{drive, gauss_markov};
+use crate::simulation::lincov::{
+    FilterPass, Judged, STRAPDOWN, Track, TruthSide, strapdown_over_sigma,
+};
+use crate::tests::{drive, gauss_markov, samples};
 use crate::trajectory::Trajectory;
 use crate::units::DEG;
 use approx::{assert_abs_diff_eq, assert_relative_eq};
@@ -157,6 +160,36 @@ fn the_scale_of_a_wheel_moves_a_position_along_the_track() {
     );
 }
 
+/// Where a filter follows zero velocities that creep by a Gauss-Markov process, its position is the integral of that, of variance
+/// 2 σ² τ (t − τ (1 − e^(−t/τ))).
+#[test]
+fn a_creep_that_lasts_moves_a_position_by_its_integral() {
+    let (sigma, tau, seconds) = (0.02, 10.0_f64, 119.0);
+    let trajectory = drive(0.0, "{ kind = 'straight', duration_s = 121 }");
+    let scenario = scenario(&format!(
+        "zupt = {{ rate_hz = 10, sigma_m_s = 0.001, \
+         truth = {{ walk_sigma_m_s = {sigma}, correlation_time_s = {tau} }} }}"
+    ));
+    let outages = [Outage {
+        start_s: 0.5,
+        end_s: seconds,
+    }];
+    let model = gauss_markov(RATE_HZ, [1.0, 1e-12], [1e-3, 1e-6], [200.0; 2]);
+    let track = scenario.track(&trajectory, &model, &outages).unwrap();
+    let beliefs = [scenario.belief(&model, &outages, &track).unwrap()];
+    let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &outages, 5);
+    let creep = TruthSide::sources(&experiment, &model)
+        .into_iter()
+        .find(|source| source.name == "aiding.zupt.creep")
+        .unwrap();
+    let errors = FilterPass::new(&track, &beliefs[0]).errors_at_ends(&creep.side)[0].errors;
+    let lasting_s = seconds - tau * (1.0 - (-seconds / tau).exp());
+    let expected = sigma * (2.0 * tau * lasting_s).sqrt();
+    // along the vehicle; the mean over 0.1 s takes a little of it
+    let [north, east, ..] = errors.rmse();
+    assert_relative_eq!(north.hypot(east), expected, max_relative = 0.01);
+}
+
 /// At rest a velocity error is a random walk of variance q a second, measured every second with variance r: its variance
 /// after a measurement settles at (√(q² + 4 q r) − q)/2, the root of P = (P + q) r/(P + q + r).
 #[test]
@@ -205,4 +238,73 @@ fn a_constraint_that_the_reference_does_not_keep_is_refused() {
         .to_string();
     let expected = "aiding.nhc.sigma_m_s = 0.2: the reference itself";
     assert!(error.starts_with(expected), "{error}");
+}
+
+/// Means over an outage are those of the reports in it; a ratio over a run is a root mean square; and what the strapdown errs
+/// by is looked for at the ends of outages too. Here ten samples a second see a part of a coning of 2 Hz, and the heading runs
+/// away until the end, half a second after the last report.
+#[test]
+fn figures_of_a_pass_are_those_of_its_instants() {
+    let coning = samples(6050, 0.01, |t_s| {
+        let (sin, cos) = (std::f64::consts::TAU * 2.0 * t_s).sin_cos();
+        let attitude = RollPitchYaw {
+            roll: 3.0 * DEG * sin,
+            pitch: 3.0 * DEG * cos,
+            yaw: 0.0,
+        };
+        let q_b_n = attitude.to_quat();
+        (0.8 + 15.0 * t_s / 6.37e6, 0.1, 0.0, q_b_n)
+    });
+    let trajectory = Trajectory::from_samples(&coning).unwrap();
+    let mut scenario = scenario("");
+    scenario.imu.rate_hz = 10.0;
+    let model = gauss_markov(10.0, [2e-6, 5e-9], [1e-4, 1e-6], [200.0; 2]);
+    let outages = [Outage {
+        start_s: 0.0,
+        end_s: 100.0,
+    }];
+    let track = scenario.track(&trajectory, &model, &outages).unwrap();
+    let beliefs = [scenario.belief(&model, &outages, &track).unwrap()];
+    let pass = FilterPass::new(&track, &beliefs[0]);
+    let mut found = pass.assess(&beliefs[0], &model);
+    let window = Outage {
+        start_s: 20.0,
+        end_s: 40.0,
+    };
+    let within = found.reports.iter().filter(|r| window.withholds(r.after_s));
+    let sigmas: Vec<[f64; REPORTED]> = within.map(|r| r.sigma).collect();
+    assert_eq!(sigmas.len(), 20);
+    let means = pass.sigma_means(&[window])[0];
+    for i in 0..REPORTED {
+        let mean = sigmas.iter().map(|sigma| sigma[i]).sum::<f64>() / 20.0;
+        assert_relative_eq!(means[i], mean, max_relative = 1e-12);
+    }
+
+    found.reports.truncate(2);
+    for (report, ratio) in found.reports.iter_mut().zip([1.0, 7.0]) {
+        report.rmse = report.sigma.map(|sigma| ratio * sigma);
+    }
+    for ratio in found.ratio_over_run() {
+        assert_relative_eq!(ratio, 5.0, max_relative = 1e-12);
+    }
+
+    let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &outages, 5);
+    let strapdown = TruthSide::sources(&experiment, &model)
+        .into_iter()
+        .find(|source| source.name == STRAPDOWN)
+        .unwrap();
+    let law = pass.errors(&strapdown.side);
+    let largest = |of: &[Judged]| {
+        of.iter()
+            .flat_map(|judged| std::iter::zip(judged.errors.rmse(), judged.sigma()))
+            .map(|(error, sigma)| error / sigma)
+            .fold(0.0, f64::max)
+    };
+    let [of_reports, of_end] = [&law.reports[1..], &law.outage_ends].map(largest);
+    assert!(of_end > of_reports, "{of_end} {of_reports}");
+    assert_relative_eq!(
+        strapdown_over_sigma(&track, &beliefs[0]),
+        of_end,
+        max_relative = 1e-12
+    );
 }

@@ -72,7 +72,6 @@ fn told_of([tau_s, of_velocity_s]: [f64; 2], runs: u64) -> Told {
             *sum += outcome(solution, &[]).reference.unwrap().nees_mean / runs as f64;
         }
     });
-    println!("{tau_s}, {of_velocity_s} s: {told:.1?} of {runs}");
     told
 }
 

@@ -301,7 +301,6 @@ fn after_a_gap_errors_are_as_large_as_the_filter_says() {
         for seconds in [0.5, 2.0, 5.0] {
             let (imu, ends) = with_gaps(&recording.imu, &places, seconds);
             let found = mean(&imu, &ends, &[-seconds - 2.0, 0.0, 1.0, 10.0]);
-            println!("{seconds} s: {found:.1?} of {upper:.1}");
             assert!(
                 found.as_flattened().iter().all(|f| *f < upper),
                 "{seconds} s: {found:?}"

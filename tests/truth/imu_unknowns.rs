@@ -70,10 +70,6 @@ fn improbability(results: &[&RunResult]) -> (f64, f64) {
 #[track_caller]
 fn assert_matched(results: &[&RunResult], is_matched: bool) {
     let (p, mean) = improbability(results);
-    println!(
-        "{} states, NEES {mean:.2}, p = {p:.1e}",
-        results[0].filter_states
-    );
     match is_matched {
         true => assert!(p > 1e-3, "NEES {mean}, p = {p}"),
         false => assert!(
@@ -216,7 +212,6 @@ fn fusion_with_scale_factors_is_nearer_to_the_reference() {
     };
     let both = "accel_scale_sigma_ppm = 3000.0\ngyro_scale_sigma_ppm = 3000.0\n";
     let (told, unaware) = (nees(both, "21"), nees("", "15"));
-    println!("fuse: {told:?} {unaware:?}");
     // exit code 3: the reference contradicts the solution
     assert_eq!((told.0, told.1, unaware.0, unaware.1), (0, 21, 3, 15));
     assert!(

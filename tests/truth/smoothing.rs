@@ -116,10 +116,6 @@ fn at_rest_the_smoothed_position_is_the_closed_form_of_an_integrated_wiener_proc
             worst[1] = worst[1].max((row.error.unwrap().values[axis] - mean).abs() / sigma);
         }
     }
-    println!(
-        "closed form: deviation {:.1e}, mean {:.1e} of a deviation",
-        worst[0], worst[1]
-    );
     assert!(worst.iter().all(|w| *w < ALLOWED), "{worst:?}");
 }
 
@@ -257,7 +253,6 @@ fn smoothed_errors_are_as_large_as_stated_and_smaller_than_the_filter_s() {
             let [filtered, smoothed] = [&solution.rows, rows(solution)].map(farthest);
             assert!((OUTAGE.end_s - filtered).abs() < 1.5 && (345.0 - smoothed).abs() < 15.0);
         }
-        println!("{name}: RMSE smoothed over filter {ratios:.2?}; in the outage {within:.2}");
     }
 }
 

@@ -1251,3 +1251,26 @@ mod wheel_tests {
         ));
     }
 }
+
+#[cfg(test)]
+mod gap_tests {
+    use super::*;
+    use crate::io::tests::Files;
+    use std::fmt::Write;
+
+    /// Half a step more is a gap, less is not.
+    #[test]
+    fn a_step_of_one_and_a_half_is_a_gap() {
+        let read = |more_s: f64| {
+            let mut text = "t_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s\n".to_owned();
+            for k in 0..40 {
+                let t_s = 0.01 * f64::from(k) + if k < 20 { 0.0 } else { more_s };
+                writeln!(text, "{t_s},0.01,0.02,-9.81,0.001,0.002,0.003").unwrap();
+            }
+            let (_files, path) = Files::with("imu.csv", text);
+            let file = read_imu(&path, None, None).unwrap();
+            file.samples.len()
+        };
+        assert_eq!([0.004, 0.006, 0.009].map(read), [40, 41, 41]);
+    }
+}

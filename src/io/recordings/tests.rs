@@ -66,6 +66,18 @@ fn changed(line: usize, to: &str) -> String {
     lines.join("\n") + "\n"
 }
 
+#[track_caller]
+fn assert_samples(recording: &Recording, signal: usize, expected: &[f64]) {
+    assert_close(&samples_with_mean(&recording.signals[signal]), expected);
+}
+
+/// The one recording of a table, and what is said of it.
+fn outcome(contents: impl AsRef<[u8]>, options: &ReadOptions) -> (Recording, FileReport) {
+    let (_files, path) = Files::with("a.csv", contents);
+    let (mut recordings, mut report) = read(&[path], options).unwrap();
+    (recordings.remove(0), report.files.remove(0))
+}
+
 fn samples_with_mean(signal: &Signal) -> Vec<f64> {
     signal.samples.iter().map(|v| v + signal.mean).collect()
 }
@@ -85,11 +97,8 @@ fn our_columns_in_any_order_and_unit() {
     assert_eq!(channels(&r), ["accel.x", "gyro.z"]);
     assert_close(&[r.rate_hz], &[100.0]);
     let accel: Vec<f64> = [0.5, 0.25, 0.5].map(|v| v * STANDARD_GRAVITY).to_vec();
-    assert_close(&samples_with_mean(&r.signals[0]), &accel);
-    assert_close(
-        &samples_with_mean(&r.signals[1]),
-        &[DEG, 3.0 * DEG, 2.0 * DEG],
-    );
+    assert_samples(&r, 0, &accel);
+    assert_samples(&r, 1, &[DEG, 3.0 * DEG, 2.0 * DEG]);
     assert_close(&[r.signals[1].mean], &[2.0 * DEG]);
     assert!(
         r.signals
@@ -107,7 +116,7 @@ fn tabs_semicolons_crlf_bom_and_missing_last_newline() {
         "sep=,\n\"t_s\",\"gyro_x_rad_s\"\n0,\"1\"\n\n0.01,2\n\n",
     ] {
         let r = read_csv(text);
-        assert_close(&samples_with_mean(&r.signals[0]), &[1.0, 2.0]);
+        assert_samples(&r, 0, &[1.0, 2.0]);
         assert_close(&[r.rate_hz], &[100.0]);
     }
 }
@@ -123,7 +132,7 @@ fn gzip_is_read_also_in_members() {
     };
     let bytes = [pack("t_s,gyro_x_rad_s\n0,1\n"), pack("0.01,2\n")].concat();
     let r = read_one("a.csv.gz", &bytes, &ReadOptions::default()).unwrap();
-    assert_close(&samples_with_mean(&r.signals[0]), &[1.0, 2.0]);
+    assert_samples(&r, 0, &[1.0, 2.0]);
     let cut = refusal(
         "a.csv.gz",
         &bytes[..bytes.len() - 12],
@@ -159,7 +168,7 @@ fn files_of_other_tools() {
     }
     let gnss_ins_sim = "gyro_x (deg/s),gyro_y (deg/s),gyro_z (deg/s)\n1,2,3\n2,3,4\n";
     let r = read_one("gyro-0.csv", gnss_ins_sim, &at(100.0)).unwrap();
-    assert_close(&samples_with_mean(&r.signals[2]), &[3.0 * DEG, 4.0 * DEG]);
+    assert_samples(&r, 2, &[3.0 * DEG, 4.0 * DEG]);
 }
 
 fn xsens(rate: &str, counters: impl Iterator<Item = u32>) -> String {
@@ -202,10 +211,7 @@ fn arrays() {
     };
     let r = read_one("a.npy", array(4, 6), &at(100.0)).unwrap();
     assert_eq!(channels(&r).len(), 6);
-    assert_close(
-        &samples_with_mean(&r.signals[5]),
-        &[5e-3, 11e-3, 17e-3, 23e-3],
-    );
+    assert_samples(&r, 5, &[5e-3, 11e-3, 17e-3, 23e-3]);
 
     let names = ["gyro_x_deg_s", "gyro_y_deg_s", "temperature"]
         .map(String::from)
@@ -215,10 +221,7 @@ fn arrays() {
         ..at(100.0)
     };
     let r = read_one("a.npy", array(4, 3), &named).unwrap();
-    assert_close(
-        &samples_with_mean(&r.signals[0]),
-        &[0.0, 3e-3 * DEG, 6e-3 * DEG, 9e-3 * DEG],
-    );
+    assert_samples(&r, 0, &[0.0, 3e-3 * DEG, 6e-3 * DEG, 9e-3 * DEG]);
     let mut nan = array(4, 6);
     let offset = nan.len() - 8 * 7;
     nan[offset..offset + 8].copy_from_slice(&f64::NAN.to_le_bytes());
@@ -271,7 +274,7 @@ fn bad_cells_and_headers_are_named() {
     };
     for text in ["0,1\n0.01,2\n", "time,speed\n0,1\n0.01,2\n"] {
         let r = read_one("a.csv", text, &named).unwrap();
-        assert_close(&samples_with_mean(&r.signals[0]), &[1.0, 2.0]);
+        assert_samples(&r, 0, &[1.0, 2.0]);
     }
 }
 
@@ -279,8 +282,8 @@ fn bad_cells_and_headers_are_named() {
 fn increments_become_rates() {
     let r =
         read_csv("t_s,dtheta_x_rad,dv_z_m_s\n0,0.001,0.098\n0.01,0.002,0.097\n0.02,0.003,0.099\n");
-    assert_close(&samples_with_mean(&r.signals[1]), &[0.1, 0.2, 0.3]);
-    assert_close(&samples_with_mean(&r.signals[0]), &[9.8, 9.7, 9.9]);
+    assert_samples(&r, 1, &[0.1, 0.2, 0.3]);
+    assert_samples(&r, 0, &[9.8, 9.7, 9.9]);
 }
 
 #[test]

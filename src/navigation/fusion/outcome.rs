@@ -706,6 +706,23 @@ mod assessment_tests {
         assert_eq!(judged(&solution(|_| 1.0, 10)).verdict, Undecided);
     }
 
+    /// However few fixes there are, one beyond the gate is counted, and its NIS as far as the gate lets pass.
+    #[test]
+    fn rejected_fixes_of_a_short_recording_count() {
+        let mut few = solution(|k| if k == 2 { 100.0 } else { 1.0 }, 4);
+        (few.fixes[2].used, few.fixes[2].rejected_above) = (false, Some(15.0));
+        let found = outcome(&few, &[]);
+        let FixCounts {
+            used,
+            withheld,
+            rejected,
+        } = found.fixes;
+        assert_eq!([used, withheld, rejected], [3, 0, 1]);
+        let outliers = found.outliers.unwrap();
+        assert_eq!((outliers.share, outliers.t_s), (0.25, vec![2.0]));
+        assert_eq!(found.nis_per_component, (3.0 * 3.0 + 15.0) / 12.0);
+    }
+
     /// Bad minutes count although the mean over the drive hides them; one wild fix is no bad minute.
     #[test]
     fn bad_minutes_count_and_wild_fixes_do_not() {

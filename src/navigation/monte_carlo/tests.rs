@@ -187,38 +187,6 @@ fn outages_leave_the_past_alone() {
     assert!(with[0].epochs[30].error_sq[0] > without[0].epochs[30].error_sq[0]);
 }
 
-#[test]
-fn matched_models_are_consistent_and_mismatched_ones_are_not() {
-    let runs = 200_u64;
-    let setting = Setting::new(400.0, &[1.0, 0.25]);
-    let results = setting.run(runs);
-    let looks = [41_usize, 100, 200, 300, 400];
-    assert_consistent(&results[0], &looks, runs as f64);
-    for look in looks {
-        let epoch = &results[0].epochs[look];
-        assert_eq!(epoch.count, runs);
-        // binomial(200, 0.05) misses: P(> 24) = 3.0e-5 and P(< 1) = 3.5e-5, of five looks 3e-4
-        let missed = runs - epoch.covered;
-        assert!(
-            (1..=24).contains(&missed),
-            "{missed} of {runs} outside the 95 % ellipsoid"
-        );
-    }
-    let nis = |of: fn(&RunRecord) -> f64| results[0].runs.iter().map(of).sum::<f64>();
-    // Σ NIS is chi-square with 6·fixes degrees of freedom: innovations are white
-    assert_chi_square(
-        nis(|r| r.nis.0 * r.nis.1 as f64),
-        nis(|r| 6.0 * r.nis.1 as f64),
-        1e-5,
-    );
-    let end_of_outage = results[1].epochs[39].nees[0] / runs as f64;
-    // 9 ± 4.9 deviations √(18/200) of the mean of a right filter
-    assert!(
-        end_of_outage > 10.5,
-        "a wrong model must show: {end_of_outage}"
-    );
-}
-
 /// The sum of the NEES over the runs of a matched experiment, which are worth so many independent ones, is chi-square at every
 /// look (99.9 % in all).
 fn assert_consistent(result: &RunResult, looks: &[usize], independent: f64) {
@@ -485,4 +453,14 @@ fn gains_are_not_shared_where_errors_are_large() {
     assert!(!auto.gains.is_shared);
     assert!(auto.gains.largest_difference.unwrap() > 0.03);
     assert!(bits(&auto.epochs) == bits(&own.epochs) && bits(&auto.runs) == bits(&own.runs));
+}
+
+/// More batches than wait together: 64 of eight runs.
+#[test]
+fn no_run_is_left_out_whatever_their_number() {
+    let mut setting = Setting::new(2.0, &[1.0]);
+    setting.outages = vec![outage(0.5, 1.0)];
+    let result = setting.run(520).remove(0);
+    assert!(result.runs.iter().map(|r| r.run).eq(0..520));
+    assert_eq!(result.epochs[0].count, 520);
 }

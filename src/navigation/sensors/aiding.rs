@@ -711,3 +711,45 @@ impl Default for HeadingErrors {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::key;
+    use approx::assert_abs_diff_eq;
+
+    /// A Gauss-Markov error after t has the autocorrelation e^(−t/τ); that of n steps has a deviation of √((1 − ρ²)/n).
+    #[test]
+    fn an_error_lasts_its_correlation_time() {
+        let (n, time_s, step_s) = (20_000, 20.0, 5.0);
+        let law = Law::GaussMarkov { sigma: 1.0, time_s };
+        let mut stream = key(1).generator();
+        let value = normal(&mut stream);
+        let mut walk = Walk {
+            stream,
+            value,
+            at_s: 0.0,
+        };
+        let values: Vec<f64> = (0..n)
+            .map(|k| walk.at(law, f64::from(k) * step_s))
+            .collect();
+        let squares: f64 = values.iter().map(|x| x * x).sum();
+        let found = values.windows(2).map(|x| x[0] * x[1]).sum::<f64>() / squares;
+        let rho = (-step_s / time_s).exp();
+        assert_abs_diff_eq!(
+            found,
+            rho,
+            epsilon = 4.0 * ((1.0 - rho * rho) / f64::from(n)).sqrt()
+        );
+    }
+
+    /// Tyres slip outwards in reverse too, and a driven wheel turns more than the way.
+    #[test]
+    fn slip_has_one_sign_forwards_and_in_reverse() {
+        let (forwards, a_b) = (DVec3::new(8.0, 0.0, 0.0), DVec3::new(1.5, -2.0, 0.0));
+        for v_b in [forwards, -forwards] {
+            assert_eq!(AidPart::Slip.coefficient(1, v_b, a_b), -16.0);
+            assert_eq!(AidPart::WheelSlip.coefficient(0, v_b, a_b), 12.0);
+        }
+    }
+}

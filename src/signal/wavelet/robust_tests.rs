@@ -179,3 +179,22 @@ fn steps_that_move_the_variance_are_seen() {
     // By the exact law 110 are fine, and of the others nine are more than 15 % apart.
     assert!(fine > 80 && apart >= 9, "{fine} {apart}");
 }
+
+/// A robust variance of half the efficiency and 200 degrees of freedom is off the classical one by e^±0.1; three times that is
+/// more than chance. Where nothing is zero no step moved it.
+#[test]
+fn steps_move_a_variance_by_more_than_three_deviations() {
+    let moved = |zeros: f64, exponent: f64| {
+        let robust = RobustVariance {
+            value: 2.0,
+            status: Status::Ok,
+            zeros,
+        };
+        robust.is_moved_by_steps(2.0 * exponent.exp(), 200.0, 0.5)
+    };
+    assert_eq!(
+        [-0.31, -0.29, 0.29, 0.31].map(|x| moved(0.2, x)),
+        [true, false, false, true]
+    );
+    assert!(!moved(0.0, 1.0));
+}

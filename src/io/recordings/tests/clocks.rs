@@ -146,15 +146,14 @@ fn coarse_and_bursting_stamps_keep_the_rate_of_the_whole() {
 
 #[test]
 fn a_unit_that_is_not_said_is_told_by_the_step() {
-    let outcome = |name: &str, step: f64, first: f64, rate_hz: Option<f64>| {
+    let found = |name: &str, step: f64, first: f64, rate_hz: Option<f64>| {
         let text = stamped(name, 100, |k| format!("{}", first + step * k as f64));
-        let (_files, path) = Files::with("a.csv", text);
         let options = ReadOptions {
             rate_hz,
             ..ReadOptions::default()
         };
-        let (recordings, report) = read(&[path], &options).unwrap();
-        (recordings[0].rate_hz, report.files[0].warnings.join("\n"))
+        let (recording, report) = outcome(text, &options);
+        (recording.rate_hz, report.warnings.join("\n"))
     };
     for (name, step, first, guessed) in [
         ("time", 1.0, 0.0, 1000.0),
@@ -167,7 +166,7 @@ fn a_unit_that_is_not_said_is_told_by_the_step() {
         ("timestamp", 1000.0, 1.7e15, 1000.0),
     ] {
         for given in [None, Some(guessed)] {
-            let (rate_hz, warning) = outcome(name, step, first, given);
+            let (rate_hz, warning) = found(name, step, first, given);
             assert_close(&[rate_hz], &[guessed]);
             assert_eq!(warning, "", "{name} {step}");
         }
@@ -213,11 +212,10 @@ fn counters_that_start_again_are_counted_on() {
     ] {
         let at = |k: usize| (turn + step * (k as f64 - 50.5)) % turn;
         let text = stamped(name, 100, |k| format!("{:.6}", at(k)));
-        let (_files, path) = Files::with("a.csv", text);
-        let (recordings, report) = read(&[path], &ReadOptions::default()).unwrap();
-        assert_abs_diff_eq!(recordings[0].rate_hz, 100.0, epsilon = 0.01);
+        let (recording, report) = outcome(text, &ReadOptions::default());
+        assert_abs_diff_eq!(recording.rate_hz, 100.0, epsilon = 0.01);
         assert_eq!(
-            report.files[0].assumptions[0],
+            report.assumptions[0],
             format!("column \"{name}\" starts again 1 times: counted on")
         );
     }
@@ -236,17 +234,16 @@ fn lost_samples_keep_their_places() {
     };
     let is_lost = |k: usize| k % 50 == 25 || (1001..1061).contains(&k);
     let lost = (0..2000).filter(|k| is_lost(*k)).count();
-    let (_files, path) = Files::with("a.csv", stamps(&is_lost));
-    let (recordings, report) = read(&[path], &keep).unwrap();
-    let samples = &recordings[0].signals[0].samples;
-    assert_eq!((samples.len(), report.files[0].samples[0]), (2000, 2000));
+    let (recording, report) = outcome(stamps(&is_lost), &keep);
+    let samples = &recording.signals[0].samples;
+    assert_eq!((samples.len(), report.samples[0]), (2000, 2000));
     assert!((0..2000).all(|k| samples[k].is_nan() == is_lost(k)));
     // also where they are ignored
     let ignored = read_one("a.csv", stamps(&is_lost), &with_gaps(Gaps::Ignore)).unwrap();
-    for rate_hz in [recordings[0].rate_hz, ignored.rate_hz] {
+    for rate_hz in [recording.rate_hz, ignored.rate_hz] {
         assert_relative_eq!(rate_hz, 100.0, max_relative = 1e-6);
     }
-    let warning = &report.files[0].warnings[0];
+    let warning = &report.warnings[0];
     let share = lost as f64 / 20.0;
     let missing = format!("{lost} samples ({share:.2} %) are missing in 40 gaps");
     assert!(warning.contains(&missing), "{warning}");
@@ -261,9 +258,8 @@ fn lost_samples_keep_their_places() {
         .collect();
     let in_blocks: Vec<bool> = (0..2000).map(|k| k % 500 >= 320 && k < 1990).collect();
     for lost in [at_random, in_blocks] {
-        let (_files, path) = Files::with("a.csv", stamps(&|k| lost[k]));
-        let (recordings, _) = read(&[path], &keep).unwrap();
-        let samples = &recordings[0].signals[0].samples;
+        let (recording, _) = outcome(stamps(&|k| lost[k]), &keep);
+        let samples = &recording.signals[0].samples;
         assert!((0..2000).all(|k| samples[k].is_nan() == lost[k]));
     }
     let twice = format!(

@@ -5,10 +5,7 @@ use super::*;
 /// What is no error and yet not as it seems: told, and read.
 #[test]
 fn doubts_are_told() {
-    let warnings = |text: &str, options: &ReadOptions| {
-        let (_files, path) = Files::with("a.csv", text);
-        read(&[path], options).unwrap().1.files.remove(0).warnings
-    };
+    let warnings = |text: &str, options: &ReadOptions| outcome(text, options).1.warnings;
     // seven levels in an order that does not come again
     let level = |k: usize| (k * k % 1009 % 7) as f64 * 1e-3;
     let rows = |step: f64| {
@@ -48,14 +45,7 @@ fn doubts_are_told() {
 
 #[test]
 fn a_rate_beside_that_of_the_time_column_is_told() {
-    let (_files, path) = Files::with("a.csv", sound(20).join("\n"));
-    let report = |rate_hz| {
-        read(std::slice::from_ref(&path), &at(rate_hz))
-            .unwrap()
-            .1
-            .files
-            .remove(0)
-    };
+    let report = |rate_hz| outcome(sound(20).join("\n"), &at(rate_hz)).1;
     assert_eq!(
         (report(100.0).warnings.len(), report(100.05).warnings.len()),
         (0, 0)

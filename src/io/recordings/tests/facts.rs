@@ -170,9 +170,8 @@ fn kept(text: &str, channels: Option<&str>) -> (Recording, Vec<String>) {
         channels: channels.map(Channel::named),
         ..with_gaps(Gaps::Keep)
     };
-    let (_files, path) = Files::with("a.csv", text);
-    let (mut recordings, report) = read(&[path], &options).unwrap();
-    (recordings.remove(0), report.files[0].warnings.clone())
+    let (recording, report) = outcome(text, &options);
+    (recording, report.warnings)
 }
 
 /// Rows some of which, at random, have the values of the row before: the logger had no new sample.

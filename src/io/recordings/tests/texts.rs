@@ -3,9 +3,7 @@
 use super::*;
 
 fn outcome(contents: impl AsRef<[u8]>) -> (Recording, FileReport) {
-    let (_files, path) = Files::with("a.csv", contents);
-    let (mut recordings, mut report) = read(&[path], &ReadOptions::default()).unwrap();
-    (recordings.remove(0), report.files.remove(0))
+    super::outcome(contents, &ReadOptions::default())
 }
 
 /// A logger that lost its power within a row.
@@ -18,10 +16,7 @@ fn a_last_line_with_too_few_columns_is_left_out() {
     );
     for end in ["", "\n"] {
         let (recording, report) = outcome(format!("{}{end}", &WHOLE[..WHOLE.len() - 9]));
-        assert_close(
-            &samples_with_mean(&recording.signals[0]),
-            &[1.1e-4, -2.2e-4],
-        );
+        assert_samples(&recording, 0, &[1.1e-4, -2.2e-4]);
         assert_eq!(
             report.assumptions,
             ["line 4, the last, is cut off: left out"]
@@ -33,19 +28,19 @@ fn a_last_line_with_too_few_columns_is_left_out() {
 fn columns_that_blanks_align_are_read() {
     let (recording, _) =
         outcome("t_s   gyro_x_rad_s  gyro_y_rad_s\n 0.00   1e-3 -2e-3 \n 0.01  -4e-3  5e-3\n");
-    assert_close(&samples_with_mean(&recording.signals[0]), &[1e-3, -4e-3]);
-    assert_close(&samples_with_mean(&recording.signals[1]), &[-2e-3, 5e-3]);
+    assert_samples(&recording, 0, &[1e-3, -4e-3]);
+    assert_samples(&recording, 1, &[-2e-3, 5e-3]);
     assert_close(&[recording.rate_hz], &[100.0]);
 }
 
 #[test]
 fn units_below_the_names_are_theirs() {
     let (recording, report) = outcome("t_s,gx_dps\ns,deg/s\n0,1\n0.01,2\n");
-    assert_close(&samples_with_mean(&recording.signals[0]), &[DEG, 2.0 * DEG]);
+    assert_samples(&recording, 0, &[DEG, 2.0 * DEG]);
     assert_eq!(report.assumptions, ["units by line 2"]);
     let (recording, _) = outcome("time;gyro x;gyro y\n[ms];[deg/s];[rad/s]\n0;1;1\n10;2;2\n");
-    assert_close(&samples_with_mean(&recording.signals[0]), &[DEG, 2.0 * DEG]);
-    assert_close(&samples_with_mean(&recording.signals[1]), &[1.0, 2.0]);
+    assert_samples(&recording, 0, &[DEG, 2.0 * DEG]);
+    assert_samples(&recording, 1, &[1.0, 2.0]);
     assert_close(&[recording.rate_hz], &[100.0]);
 }
 
@@ -53,8 +48,8 @@ fn units_below_the_names_are_theirs() {
 fn a_header_in_iso_8859_1_has_its_units() {
     let header = b"time [s];Acc X [m/s\xb2];Gyr X [\xb0/s]\n".to_vec();
     let (recording, report) = outcome([header, b"0;9.8;1\n0.01;9.7;2\n".to_vec()].concat());
-    assert_close(&samples_with_mean(&recording.signals[0]), &[9.8, 9.7]);
-    assert_close(&samples_with_mean(&recording.signals[1]), &[DEG, 2.0 * DEG]);
+    assert_samples(&recording, 0, &[9.8, 9.7]);
+    assert_samples(&recording, 1, &[DEG, 2.0 * DEG]);
     assert_eq!(
         report.assumptions,
         ["header not in UTF-8, read as ISO-8859-1"]
@@ -68,7 +63,7 @@ fn a_decimal_comma_is_read_where_no_comma_separates() {
         let rows = [["t_s", "gyro_x_rad_s"], ["0,00", "1,5e-3"], ["0,01", "-2"]];
         let text = rows.map(|row| row.join(separator)).join("\n");
         let (recording, _) = outcome(text);
-        assert_close(&samples_with_mean(&recording.signals[0]), &[1.5e-3, -2.0]);
+        assert_samples(&recording, 0, &[1.5e-3, -2.0]);
         assert_close(&[recording.rate_hz], &[100.0]);
     }
 }
@@ -85,7 +80,7 @@ fn lines_before_the_header_are_passed_over() {
         for header in ["TimestampGyro [ns]; GyroX [rad/s]", "t_ns; gyro_x_rad_s"] {
             let text = format!("{before}{header}\n473995414320987;1;\n473995424320987;2;\n");
             let (recording, _) = outcome(text);
-            assert_close(&samples_with_mean(&recording.signals[0]), &[1.0, 2.0]);
+            assert_samples(&recording, 0, &[1.0, 2.0]);
             assert_close(&[recording.rate_hz], &[100.0]);
         }
     }
@@ -116,8 +111,8 @@ fn files_named_after_their_sensor_are_read() {
     let (recordings, report) = read(&[files.path()], &ReadOptions::default()).unwrap();
     assert_eq!(channels(&recordings[0]), ["gyro.x", "gyro.y", "gyro.z"]);
     assert_eq!(channels(&recordings[1]), ["accel.x", "accel.y", "accel.z"]);
-    assert_close(&samples_with_mean(&recordings[0].signals[2]), &[3.0, -3.0]);
-    assert_close(&samples_with_mean(&recordings[1].signals[0]), &[1.0, 0.0]);
+    assert_samples(&recordings[0], 2, &[3.0, -3.0]);
+    assert_samples(&recordings[1], 0, &[1.0, 0.0]);
     assert_close(&[recordings[1].rate_hz], &[100.0]);
     let [without, other] = &report.warnings[..] else {
         panic!("{:?}", report.warnings);
