@@ -30,7 +30,7 @@ fn markdown(directories: &[&str]) -> Vec<PathBuf> {
 
 /// README and the pages of the book.
 fn pages() -> Vec<PathBuf> {
-    let mut pages = markdown(&["docs", "docs/how-to", "docs/answers"]);
+    let mut pages = markdown(&["docs", "docs/how-to"]);
     pages.push(Path::new(ROOT).join("README.md"));
     pages
 }
