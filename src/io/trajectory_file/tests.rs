@@ -327,8 +327,8 @@ fn local(times: impl Iterator<Item = f64>, place: impl Fn(f64) -> (f64, f64, f64
 
 #[test]
 fn other_conventions_of_heading_and_height_are_doubted() {
-    type Row = [f64; 7];
-    let cases: [(fn(&mut Row), &str); 6] = [
+    type Change = fn(&mut [f64; 7]);
+    let cases: [(Change, &str); 6] = [
         (|_| {}, ""),
         // unwrapped: the same angles
         (|row| row[6] -= if row[6] > 0.0 { 360.0 } else { 0.0 }, ""),
