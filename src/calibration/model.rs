@@ -218,7 +218,7 @@ mod tests {
             message("2*WN")
                 .ends_with("2 WN equal one WN: their wavelet variances are proportional")
         );
-        assert!(message("4*AR1+2*GM").contains("6 AR1, GM and MA1 processes; at most 5"));
+        assert!(message("4*AR1+2*GM").contains("6 AR1, GM and MA1 processes: at most 5"));
         assert!(message("99*N2").contains("99 WN"));
     }
 }
