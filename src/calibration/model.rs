@@ -217,9 +217,9 @@ mod tests {
             ),
             (
                 "2*WN",
-                "2 WN are one WN: their wavelet variances are proportional",
+                "2 WN equal one WN: their wavelet variances are proportional",
             ),
-            ("4*AR1+2*GM", "6 AR1, GM and MA1 processes; at most 5"),
+            ("4*AR1+2*GM", "6 AR1, GM and MA1 processes: at most 5"),
             ("99*N2", "99 WN"),
         ] {
             assert!(message(text).contains(expected), "{}", message(text));

@@ -364,7 +364,7 @@ pub(crate) const UBX_SYNC: [u8; 2] = [0xb5, 0x62];
 /// Format of a file by its first bytes, at best [`HEAD`] of them.
 ///
 /// ```
-/// use nav_sim_logs::{Kind, recognise};
+/// use nav_sim_logs::{LogFormat, recognise};
 ///
 /// assert_eq!(recognise(b"\x89MCAP0\r\n\x01"), Some(LogFormat::Mcap));
 /// let kind = recognise(b"SQLite format 3\0\x10\0").expect("a known one");

@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 /// Log whose channels are known.
 ///
 /// ```
-/// use nav_sim_logs::{Content, Error, Log, Stamp, in_seconds};
+/// use nav_sim_logs::{Content, LogError, Log, Stamp, in_seconds};
 ///
-/// # fn main() -> Result<(), Error> {
+/// # fn main() -> Result<(), LogError> {
 /// let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/ros2_zstd.mcap");
 /// let log = Log::open(path.as_ref())?;
 /// // no topic is named, as there is but one

@@ -1,7 +1,7 @@
 //! Arrays of NumPy in a zip archive (PKWARE APPNOTE 6.3.10, 4.3), as `numpy.savez` and `numpy.savez_compressed` write them.
 //!
 //! ```
-//! # fn main() -> Result<(), nav_sim_logs::Error> {
+//! # fn main() -> Result<(), nav_sim_logs::LogError> {
 //! # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/arrays.npz");
 //! let mut archive = nav_sim_logs::npz::Archive::open(path.as_ref())?;
 //! assert!(archive.names().contains(&"gyro".to_owned()));

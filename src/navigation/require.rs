@@ -4,10 +4,10 @@
 //! gains that follow. Errors grow with every noise intensity, so each answer is the zero of a monotone function.
 //!
 //! ```
-//! use nav_sim_navigation::require::{Limit, Quantity, Worst};
+//! use nav_sim_navigation::require::{HardestLimit, Limit, LimitQuantity};
 //!
-//! let limit = Limit { quantity: Quantity::P95, most: 5.0 };
-//! let found = Worst { limit, value: 10.0, place: 0 };
+//! let limit = Limit { quantity: LimitQuantity::P95, most: 5.0 };
+//! let found = HardestLimit { limit, value: 10.0, place: 0 };
 //! // Twice the error allowed.
 //! assert!((found.margin() + 2_f64.ln()).abs() < 1e-15);
 //! ```

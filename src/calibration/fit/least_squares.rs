@@ -622,9 +622,9 @@ mod tests {
                 (variance.cause, degrees.cause),
                 (CalibrationFault::NotPositive, CalibrationFault::Other)
             );
-            let place = format!("at scale 2^2 is {value}: ");
+            let place = format!("at scale 2^2 is {value}, ");
             assert!(variance.to_string().contains(&place), "{variance}");
-            let place = format!("at scale 2^2 are {value}: ");
+            let place = format!("at scale 2^2 are {value}, ");
             assert!(degrees.to_string().contains(&place), "{degrees}");
         }
     }

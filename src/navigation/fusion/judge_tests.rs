@@ -158,10 +158,10 @@ fn simple_transformations_are_named() {
             let v = row.state.v_n;
             row.state.v_n = DVec3::new(v.y, v.x, -v.z);
         }),
-        ("attitude are radians under", &|row| {
+        ("attitude are radians named", &|row| {
             sigmas(row, 2, &|s| s * DEG);
         }),
-        ("attitude are degrees under", &|row| {
+        ("attitude are degrees named", &|row| {
             sigmas(row, 2, &|s| s / DEG);
         }),
         ("attitudes are radians", &|row| {

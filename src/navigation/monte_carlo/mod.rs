@@ -5,7 +5,7 @@
 //! small record per run.
 //!
 //! ```
-//! # use nav_sim_navigation::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
+//! # use nav_sim_navigation::trajectory::profile::{Bank, SegmentKind, Length, Profile, Segment, ProfileStart};
 //! use nav_sim_navigation::ekf::{Belief, FilterStates};
 //! use nav_sim_navigation::metrics::{chi_square_band, epochs};
 //! use nav_sim_navigation::monte_carlo;
@@ -13,8 +13,8 @@
 //! use nav_sim_navigation::sensors::imu::Truth;
 //! use nav_sim_signal::noise::{Composite, Model, Process};
 //!
-//! # let start = Start { t_s: 0.0, lat: 0.9, lon: 0.2, h: 0.0, heading: 0.0, speed: 20.0 };
-//! # let north = Segment { kind: Kind::Straight(Length::Duration(60.0)), climb_m: 0.0, ramp_s: None };
+//! # let start = ProfileStart { t_s: 0.0, lat: 0.9, lon: 0.2, h: 0.0, heading: 0.0, speed: 20.0 };
+//! # let north = Segment { kind: SegmentKind::Straight(Length::Duration(60.0)), climb_m: 0.0, ramp_s: None };
 //! # let drive = Profile { start, bank: Bank::None, ramp_s: 2.0, segments: vec![north] }.build()?;
 //! let axis = Composite::new(vec![Process::white(1e-6)?, Process::random_walk(1e-14)?]);
 //! let model = Model::pooled(100.0, &axis, &axis);

@@ -6,10 +6,10 @@
 //!
 //! ```
 //! use nav_sim_navigation::earth::radii;
-//! use nav_sim_navigation::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
+//! use nav_sim_navigation::trajectory::profile::{Bank, SegmentKind, Length, Profile, Segment, ProfileStart};
 //!
-//! let start = Start { t_s: 0.0, lat: 0.9, lon: 0.2, h: 0.0, heading: 0.0, speed: 20.0 };
-//! let north = Segment { kind: Kind::Straight(Length::Duration(60.0)), climb_m: 0.0, ramp_s: None };
+//! let start = ProfileStart { t_s: 0.0, lat: 0.9, lon: 0.2, h: 0.0, heading: 0.0, speed: 20.0 };
+//! let north = Segment { kind: SegmentKind::Straight(Length::Duration(60.0)), climb_m: 0.0, ramp_s: None };
 //! let drive = Profile { start, bank: Bank::None, ramp_s: 2.0, segments: vec![north] }.build()?;
 //! let arc_m = (drive.state(60.0).lat - start.lat) * radii(start.lat.sin()).meridian;
 //! // 60 s at 20 m/s; the radius changes by 1e-6 on the way.
