@@ -125,10 +125,10 @@ def design(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Answer:
-    """Expected intervals of a planned calibration: `nav-sim design`.
+    """Expected intervals of planned calibrations of a model: `nav-sim design`.
 
-    Without `recordings` (number) or `hours` (each) several are tried. `estimator` as of `calibrate`; `draws` of
-    simulated calibrations; with a `trajectory` their effect there, `outages` as of `run`.
+    Several `recordings` (number) and `hours` (each) by default; `draws` are simulated. With `trajectory` their effect
+    there; `estimator` as of `calibrate`, `outages`, `seed`, `threads`, `progress` of `run`.
     """
     with Staging() as staging:
         return ask(
@@ -167,7 +167,7 @@ def choose(
     threads: int | None = None,
     progress: Progress = None,
 ) -> Choice:
-    """Ranks estimators and models by navigation with three or more recordings: `nav-sim choose`.
+    """Ranks estimators and models along a trajectory from three or more recordings: `nav-sim choose`.
 
     Each recording is the truth of runs whose filters were calibrated on the others. `.model` is the winner's.
     `estimator`, `model`, `filter` and `inflate` ("none", "x10") list the candidates; `rate_hz`, `trim`, `skip_s`

@@ -142,7 +142,7 @@ def test_a_density_is_that_of_the_sheet() -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({}, "no figure is given"),
+        ({}, "no figure gives"),
         ({"unit": "stim301"}, "unit= stim301"),
         ({"arw": "0.15 m"}, "arw='0.15 m': has the unit m"),
         ({"arw": 0.15}, "arw='0.15': has no unit"),

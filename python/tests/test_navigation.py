@@ -148,7 +148,7 @@ def test_attitude_without_a_unit_is_not_guessed(short: Path) -> None:
     angles = ["roll", "pitch", "yaw"]
     bare[angles] = np.radians(bare[angles])
     without_unit = str(refused("", lincov, bare, TACTICAL))
-    assert "the unit of roll, pitch, yaw is not in the name" in without_unit and "_rad" in without_unit
+    assert "no unit in the name of roll, pitch, yaw" in without_unit and "_rad" in without_unit
     named = bare.rename(columns={name: f"{name}_rad" for name in angles})
     np.testing.assert_allclose(Trajectory(named).states()["yaw_deg"], Trajectory(drive).states()["yaw_deg"], atol=1e-9)
 
