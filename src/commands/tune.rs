@@ -719,7 +719,7 @@ mod tests {
             assert_eq!(tuned.fault().is_none(), is_met, "{nees}");
         }
         tuned.without_factor.push(Sensor::Accel);
-        let reason = "the model has no accel noise to multiply, where the truth has some";
+        let reason = "the model has no accel noise to scale, the truth has some";
         for (nees, rmse, fault) in [
             (1.001 * bound, 1.0, Some(reason)),
             (9.0, 1.0, None),

@@ -146,7 +146,7 @@ fn what_cannot_be_averaged_is_refused() {
             8,
             Estimator::DrAwv,
             4,
-            "trimming 4 replicates at each end needs at least 9 replicates; there are 8",
+            "a trim of 4 at each end needs 9 replicates; there are 8",
         ),
         (
             8,

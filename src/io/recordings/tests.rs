@@ -307,7 +307,7 @@ fn a_directory_is_all_its_recordings_in_name_order() {
     assert!(line.ends_with("replicate_1.csv: 21 samples at 100 Hz (time column), 0.21 s; means removed: gyro x 0.003000 rad/s"), "{line}");
     let warnings = report.all_warnings().join("\n");
     assert!(
-        warnings.ends_with("gps.csv: passed over, no column is a known one"),
+        warnings.ends_with("gps.csv: skipped, no column is a known one"),
         "{warnings}"
     );
 

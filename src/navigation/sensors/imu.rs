@@ -375,11 +375,11 @@ mod tests {
             ),
             (
                 recording(&[0.0; 600], 50.0),
-                "r.csv was sampled at 50 Hz, the simulated IMU runs at 100 Hz",
+                "r.csv was sampled at 50 Hz, the simulated IMU at 100 Hz",
             ),
             (
                 partial,
-                "r.csv: channel gyro.y is missing; all six are needed, in one file",
+                "r.csv: no channel gyro.y; all six are needed, in one file",
             ),
         ] {
             let error = Truth::Static(&[recording]).check(100.0, 500).unwrap_err();

@@ -217,22 +217,22 @@ fn what_cannot_be_followed_is_refused() {
         (
             1.0,
             "{ kind = 'straight', duration_s = 1e300 }",
-            "\"duration_s\" makes the trajectory 1.000e300 s long: more than a day",
+            "\"duration_s\" makes the trajectory 1.000e300 s long: over a day",
         ),
         (
             2.0,
             "{ kind = 'straight', distance_m = 1e300 }",
-            "\"distance_m\" makes the trajectory 5.000e299 s long: more than a day",
+            "\"distance_m\" makes the trajectory 5.000e299 s long: over a day",
         ),
         (
             0.0,
             "{ kind = 'straight', distance_m = 5 }",
-            "\"distance_m\" needs a moving vehicle, but it stands still here",
+            "\"distance_m\" needs a moving vehicle, which stands still here",
         ),
         (
             0.0,
             "{ kind = 'turn', angle_deg = 10, radius_m = 5 }",
-            "\"radius_m\" needs a moving vehicle, but it stands still here",
+            "\"radius_m\" needs a moving vehicle, which stands still here",
         ),
         (
             5.0,
@@ -257,7 +257,7 @@ fn what_cannot_be_followed_is_refused() {
         (
             0.0,
             &waypoints(100.0, 0.0),
-            "\"points\" needs a moving vehicle, but it stands still here",
+            "\"points\" needs a moving vehicle, which stands still here",
         ),
     ] {
         assert_eq!(

@@ -341,7 +341,7 @@ fn a_knock_a_dead_band_and_a_misspelt_column_are_told() {
     knocked[3050..3060].iter_mut().for_each(|row| row[2] += 3.0);
     assert_eq!(
         kept(&written(100.0, &knocked), None).1,
-        ["moves in 2 of its 60 seconds, or was knocked"]
+        ["moves in 2 of 60 seconds, or was knocked"]
     );
     let mut dead = rows(8, 6000);
     for x in dead.iter_mut().map(|row| &mut row[5]) {
@@ -375,7 +375,7 @@ fn a_knock_a_dead_band_and_a_misspelt_column_are_told() {
 fn copied_axes_and_exchanged_sensors_are_told() {
     let mut copied = rows(13, 6000);
     copied.iter_mut().for_each(|row| row[4] = row[3]);
-    let text = "gyro.y has the samples of gyro.x: one axis was written twice";
+    let text = "gyro.y repeats gyro.x: one axis was written twice";
     assert_eq!(kept(&written(100.0, &copied), None).1, [text]);
     let degrees: Vec<[f64; 6]> = rows(14, 6000)
         .iter()
