@@ -316,7 +316,7 @@ fn a_directory_is_all_its_recordings_in_name_order() {
     for (paths, expected) in [
         (
             vec![files.path(), again],
-            "replicate_1.csv is given twice: it would count as two replicates",
+            "replicate_1.csv is given twice",
         ),
         (vec![empty.path()], ": no recordings in it"),
         (
