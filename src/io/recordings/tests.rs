@@ -314,10 +314,7 @@ fn a_directory_is_all_its_recordings_in_name_order() {
     let again = files.path().join("replicate_1.csv");
     let empty = Files::new();
     for (paths, expected) in [
-        (
-            vec![files.path(), again],
-            "replicate_1.csv is given twice",
-        ),
+        (vec![files.path(), again], "replicate_1.csv is given twice"),
         (vec![empty.path()], ": no recordings in it"),
         (
             vec!["/no/such".into()],
