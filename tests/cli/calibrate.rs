@@ -252,7 +252,7 @@ fn quantization_is_that_of_increments() {
     let noise = r#"{ type = "WN", sigma2 = 4e-5 }, { type = "QN", q2 = 4e-4 }"#;
     let place = made(noise, "--replicates 4 --axes x");
     let text = place
-        .done("calibrate made --model WN+QN --bootstrap 0 --seed 1 -o m.toml")
+        .done("calibrate made --model WN+QN --bootstrap 0 --seed 1 --verbose -o m.toml")
         .stdout;
     for unit in ["m/s", "rad"] {
         let label = format!("quantization Q ({unit})");

@@ -126,8 +126,7 @@ fn an_abnormal_recording_judges_no_candidate() {
     let ran = place.done(&format!(
         "{choose} awv,dr-awv --model WN+RW --runs 8 -o of_r"
     ));
-    let note =
-        "abnormal, and no judge of candidates (nav-sim calibrate says how): r/replicate_4.csv";
+    let note = "abnormal, ranks no candidate (nav-sim calibrate says how): r/replicate_4.csv";
     assert!(ran.stderr.contains(note), "{}", ran.stderr);
     let ranking = place.json("of_r/ranking.json");
     let folds = ranking["candidates"][0]["folds"].as_array().unwrap().iter();

@@ -32,7 +32,7 @@ fn what_another_command_writes_is_refused_at_once() {
         held.lock().unwrap();
         let refusal = place.ends(&format!("{command} -q"), 2).stderr;
         let expected = format!(
-            "error: {output} is being written by another nav-sim\n\nhint: choose another output with --out, or wait until that is done\n"
+            "error: {output} is being written by another nav-sim\n\nhint: choose another output with --out, or wait until it is done\n"
         );
         assert!(refusal.ends_with(&expected), "{refusal}");
         // not by closing it: a process that another test is starting may share it for a moment

@@ -112,7 +112,7 @@ fn standard_deviations_may_be_in_a_file_of_their_own() {
     }
     let alone = place.done(judge).stdout;
     assert!(
-        alone.contains("the solution states no standard deviations"),
+        alone.contains("no standard deviations in the solution"),
         "{alone}"
     );
     matrices[3][2] = 9.0;

@@ -74,12 +74,12 @@ fn wv_writes_a_page_and_a_picture_where_it_is_told() {
             *b"\x89PNG"
         );
     } else {
-        let message = "error: curves.PNG: not a page or picture\n\nhint: name a file that ends in .html or .svg (.png with the feature `pictures`)\n";
+        let message = "error: curves.PNG: neither page nor picture\n\nhint: end the name in .html or .svg (.png with feature `pictures`)\n";
         assert!(png.code == 2 && png.stderr.ends_with(message), "{png:?}");
     }
     for file in ["curves", "static/replicate_1.csv"] {
         let refused = place.ends(&format!("wv static --plot {file}"), 2).stderr;
-        assert!(refused.contains("not a page or picture"), "{refused}");
+        assert!(refused.contains("neither page nor picture"), "{refused}");
     }
 }
 

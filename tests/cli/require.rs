@@ -263,6 +263,6 @@ fn a_unit_whose_turn_on_bias_is_not_stated_is_open() {
     assert!(value("large") > value("silent"), "{ranked}");
     let alone = place.done(&format!("require {question} units/made.toml"));
     let note =
-        "units/made.toml: what is not stated counts as none, unless by grade: turn-on by grade";
+        "units/made.toml: figures not stated count as zero, unless by grade: turn-on by grade";
     assert!(alone.stderr.contains(note), "{}", alone.stderr);
 }

@@ -63,7 +63,7 @@ fn a_turn_on_bias_is_stored_said_and_expected_by_run() {
 fn recordings_of_one_bias_have_none_and_those_of_another_mounting_tell_nothing() {
     let place = place();
     for (times, note) in [
-        (0.0, "gyro: no turn-on bias seen"),
+        (0.0, "gyro: no turn-on bias: the means"),
         (40.0, "gyro: no turn-on bias stored: means differ"),
     ] {
         recordings(&place, times);

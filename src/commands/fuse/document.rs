@@ -367,7 +367,7 @@ fn own_noise(noise: &OwnNoise) -> String {
         sigma2,
     } = noise;
     format!(
-        "{sensor}: the recording has {times_model:.1} times the model's white noise, which is used instead; to keep it, in [{sensor}] of the model: {{ type = \"WN\", sigma2 = {sigma2:.3e} }}"
+        "{sensor}: the recording has {times_model:.1} times the model's white noise: its own is used; to keep it, in [{sensor}] of the model: {{ type = \"WN\", sigma2 = {sigma2:.3e} }}"
     )
 }
 

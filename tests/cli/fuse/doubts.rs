@@ -75,7 +75,7 @@ fn jumps_are_left_out_and_named() {
     assert_eq!(numbers(&found, "/outliers/t_s"), times);
     assert_eq!(found["fixes"]["rejected"], 4);
     assert!(
-        errors.contains("warning: 4 fixes (4.0 %) are outliers"),
+        errors.contains("warning: 4 outliers (4.0 % of the fixes"),
         "{errors}"
     );
     assert!(rmse_m(&found) < 1.2 * rmse_m(&clean), "{found} {clean}");
@@ -101,7 +101,7 @@ fn a_model_that_is_too_quiet_is_told() {
         "undecided"
     );
     for (sensor, sigma2) in made {
-        let start = format!("warning: {sensor}: the white noise of the recording is ");
+        let start = format!("warning: {sensor}: the recording has ");
         let told = ran
             .stderr
             .lines()

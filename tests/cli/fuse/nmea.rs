@@ -106,7 +106,7 @@ fn sentences_give_the_solution_of_the_table() {
         (
             &format!("day.csv bare.txt {sigma}"),
             0.0,
-            "as given where the file states none",
+            "as given where the file has none",
         ),
     ] {
         let (found, notes) = fused(files);
@@ -123,7 +123,7 @@ fn sentences_give_the_solution_of_the_table() {
         }
     }
     let (_, notes) = fused("day.csv log.nmea");
-    assert!(notes.contains("speed and course are not used"), "{notes}");
+    assert!(notes.contains("speed and course are unused"), "{notes}");
     place.ends("fuse rec/imu.csv log.nmea imu.toml -o none", 2);
     let found = place.done("check log.nmea").stdout;
     assert!(found.contains("100 GNSS fixes"), "{found}");
