@@ -188,7 +188,7 @@ fn impossible_laws_are_refused_in_words() {
             "AR1",
             "phi",
             beta(1.0, 0.5, 0.5),
-            "the law reaches values that are refused: AR1: phi = 1 is not between −1 and 1 (exclusive)",
+            "the distribution reaches refused values: AR1: phi = 1 is not between −1 and 1 (exclusive)",
         ),
     ] {
         let refusal = Variation::new(&n1(), process, parameter, law).unwrap_err();
