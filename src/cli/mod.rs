@@ -165,7 +165,7 @@ fn means_something(option: &str, names: &str) -> bool {
         ),
         "no_progress" => matches!(
             names,
-            "" | "batch" | "calibrate" | "choose" | "demo" | "run"
+            "" | "batch" | "calibrate" | "choose" | "demo" | "run" | "wv"
         ),
         "threads" => {
             !is_shell
@@ -442,7 +442,8 @@ mod schema_tests;
 /// Make a directory with everything to start from: a commented file of every kind, trajectories, virtual IMUs
 ///
 /// scenario.toml, imu.toml, motion.toml, contamination.toml, initial.toml and examples/quick_study.toml say
-/// what each key means. Editors take the schemas from schemas/. The others are those of the repository; the examples of every --help work inside the directory. Files
+/// what each key means. Editors take the schemas from schemas/. The others are those of the repository; the examples of
+/// every --help work inside the directory. Files
 /// that exist already are left alone.
 #[derive(clap::Args)]
 struct InitArgs {

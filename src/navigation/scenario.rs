@@ -15,7 +15,7 @@ use crate::sensors::outage::{
     FixedData, Fixes, Outage, OutageError, OutagePlan, PeriodicOutages, PlacedOutages,
     RandomOutages,
 };
-use crate::simulation::lincov::{Alike, Track, reduced_belief};
+use crate::simulation::lincov::{AxisGrouping, Track, reduced_belief};
 use crate::simulation::{Experiment, ExperimentError, Gains, samples_per};
 use crate::trajectory::Trajectory;
 use crate::units::{Probability, SettingError};
@@ -215,7 +215,7 @@ impl Scenario {
             .map_err(|e| self.blame(e))?;
         if self.filter.states.is_reduced() && self.filter.reduction == Reduction::Covariance {
             // The wavelet reduction is where this search starts, hence made in either case.
-            belief = reduced_belief(model, belief, track, Alike::Level);
+            belief = reduced_belief(model, belief, track, AxisGrouping::Level);
         }
         Ok(belief
             .with_initial(&self.initial)

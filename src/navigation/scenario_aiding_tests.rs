@@ -9,7 +9,7 @@ use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
 use crate::simulation::REPORTED;
 use crate::simulation::lincov::{
-    FilterPass, Judged, STRAPDOWN, Track, TruthSide, strapdown_over_sigma,
+    AssessedInstant, FilterPass, STRAPDOWN, Track, TruthSide, strapdown_over_sigma,
 };
 use crate::tests::{drive, gauss_markov, samples};
 use crate::trajectory::Trajectory;
@@ -54,7 +54,7 @@ pub(crate) fn scenario(aiding: &str) -> Scenario {
 
 /// Errors and beliefs at the end of the outage by the covariance analysis, and the root mean squares of errors and the
 /// mean stated deviations of `runs` runs there.
-fn both(scenario: &Scenario, runs: u64) -> (Judged, [[f64; REPORTED]; 2]) {
+fn both(scenario: &Scenario, runs: u64) -> (AssessedInstant, [[f64; REPORTED]; 2]) {
     let (trajectory, model) = (town(), consumer());
     let outages = [OUTAGE];
     let track = scenario.track(&trajectory, &model, &outages).unwrap();
@@ -294,7 +294,7 @@ fn figures_of_a_pass_are_those_of_its_instants() {
         .find(|source| source.name == STRAPDOWN)
         .unwrap();
     let law = pass.errors(&strapdown.side);
-    let largest = |of: &[Judged]| {
+    let largest = |of: &[AssessedInstant]| {
         of.iter()
             .flat_map(|judged| std::iter::zip(judged.errors.rmse(), judged.sigma()))
             .map(|(error, sigma)| error / sigma)

@@ -125,6 +125,7 @@ fn killed_workers_leave_no_trace() {
     }
     ended(dir, "batch study.toml -o killed --set runs=150", 0);
     assert_eq!(results(&place, "killed"), results(&place, "whole"));
+    println!("{kills} workers killed");
 }
 
 #[test]

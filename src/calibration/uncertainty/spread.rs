@@ -839,7 +839,6 @@ mod alike_tests {
 #[cfg(test)]
 mod axes_tests {
     use super::*;
-    use crate::rng::StreamKey;
     use crate::wavelet::both;
     use rand::RngExt;
     use rand_distr::StandardNormal;
@@ -848,14 +847,7 @@ mod axes_tests {
     fn set(seed: u64, recordings: usize, factor: f64) -> Vec<Replicate> {
         let recording = |k: usize| {
             let (run, axis) = (k as u64, Axis::ALL[k % 3]);
-            let key = StreamKey {
-                seed,
-                scenario: "",
-                run,
-                source: "",
-                process: "",
-            };
-            let mut generator = key.generator();
+            let mut generator = crate::tests::generator(seed, run);
             let sigma = if axis == Axis::Y { factor.sqrt() } else { 1.0 };
             let mut normal = || sigma * generator.sample::<f64, _>(StandardNormal);
             let signal: Vec<f64> = (0..2048).map(|_| normal()).collect();

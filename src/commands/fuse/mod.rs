@@ -901,8 +901,8 @@ fn belief(
     let Some(track) = states.is_reduced().then(drive).flatten() else {
         return Ok((belief.with_initial(initial), None));
     };
-    let belief =
-        lincov::reduced_belief(&model, belief, &track, lincov::Alike::All).with_initial(initial);
+    let belief = lincov::reduced_belief(&model, belief, &track, lincov::AxisGrouping::All)
+        .with_initial(initial);
     let full = Belief::new(&model, FilterStates::Full, interval_s, window_s);
     let full = full
         .ok()

@@ -271,13 +271,13 @@ impl SampleClock {
             let share = 100.0 * lost as f64 / (self.since.len() + lost) as f64;
             report.warn(match options.gaps {
                 Gaps::Ignore => {
-                    format!("{count} gaps or duplicates in time ignored, the first in line {first}")
+                    format!("gaps or duplicates in time ignored: {count}, the first in line {first}")
                 }
                 Gaps::Keep => format!(
                     "{lost} samples ({share:.2} %) are missing in {count} gaps, the first before line {first}"
                 ),
                 Gaps::Refuse | Gaps::Split => format!(
-                    "split at {count} gaps or duplicates in time, the first in line {first}"
+                    "split at gaps or duplicates in time: {count}, the first in line {first}"
                 ),
             });
         }

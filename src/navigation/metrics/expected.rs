@@ -11,7 +11,7 @@ use crate::ekf::Belief;
 use crate::linalg::mean;
 use crate::noise::Model;
 use crate::sensors::outage::Outage;
-use crate::simulation::lincov::{ErrorLaw, FilterPass, Instant, Judged, Track, TruthSide};
+use crate::simulation::lincov::{AssessedInstant, ErrorLaw, FilterPass, Instant, Track, TruthSide};
 use crate::simulation::{
     BIASES, COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord,
 };
@@ -54,7 +54,7 @@ impl Expected {
             .map(|(instant, bias)| epoch(instant, *bias, limit))
             .collect::<Option<_>>()?;
         let ends = experiment.outages.iter().zip(&law.outage_ends);
-        let of_outage = |(window, end): (&Outage, &Judged)| {
+        let of_outage = |(window, end): (&Outage, &AssessedInstant)| {
             let window = (window.start_s, window.end_s);
             let mut outage = outage(window, end, &epochs);
             // A barometer or a vehicle that measures in the outage corrects what grows upwards.
@@ -134,7 +134,7 @@ fn square(instant: &Instant, states: &[usize]) -> QuadraticForm {
     QuadraticForm::of_square(&block(&instant.covariance, states), &mean)
 }
 
-fn epoch(judged: &Judged, bias_asee: [f64; BIASES], limit: f64) -> Option<EpochMetrics> {
+fn epoch(judged: &AssessedInstant, bias_asee: [f64; BIASES], limit: f64) -> Option<EpochMetrics> {
     let (instant, believed) = (&judged.errors, block(&judged.believed, &COVERED));
     let mean = COVERED.map(|s| instant.mean[s]);
     // eᵀ P_f⁻¹ e is not chi-square where P_f is not the covariance of e: a weighted sum of such, whose law is
@@ -157,7 +157,11 @@ fn epoch(judged: &Judged, bias_asee: [f64; BIASES], limit: f64) -> Option<EpochM
     })
 }
 
-fn outage((start_s, end_s): (f64, f64), end: &Judged, epochs: &[EpochMetrics]) -> OutageSummary {
+fn outage(
+    (start_s, end_s): (f64, f64),
+    end: &AssessedInstant,
+    epochs: &[EpochMetrics],
+) -> OutageSummary {
     let accuracy = AccuracySummary::over(within((start_s, end_s), epochs));
     let [p50, p95, p999] = horizontal_quantiles(&end.errors, [0.5, 0.95, NEARLY_ALL]);
     let consistency = end.consistency();

@@ -4,7 +4,7 @@ use super::estimate::{Estimate, PerState, SampleSize, quantile_interval, sample_
 use super::summary::{AccuracySummary, OutageSummary, QuantileSummary, Recovery};
 use crate::linalg::mean;
 use crate::sensors::outage::Outage;
-use crate::simulation::lincov::{FilterPass, Judged, NamedSource};
+use crate::simulation::lincov::{AssessedInstant, FilterPass, NamedSource};
 use crate::simulation::{BIASES, EpochSums, OutageRecord, REPORTED, RunResult};
 use crate::units::{DEG, STANDARD_GRAVITY};
 use rayon::prelude::*;
@@ -201,7 +201,7 @@ impl Budget {
     pub fn at_outage_ends(filter: &FilterPass<'_>, sources: &[NamedSource]) -> Vec<Self> {
         let squares = |source: &NamedSource| -> (String, Vec<[f64; REPORTED]>) {
             // Mean squares, not variances: a deterministic source (drift) has a mean and no variance.
-            let squares = |end: &Judged| end.errors.variances(&end.errors.moments());
+            let squares = |end: &AssessedInstant| end.errors.variances(&end.errors.moments());
             let ends = filter.errors_at_ends(&source.side);
             (source.name.clone(), ends.iter().map(squares).collect())
         };

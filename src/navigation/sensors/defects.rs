@@ -294,7 +294,7 @@ impl Temperature {
 }
 
 /// Quantity to which an error of a sensor's axis is proportional.
-pub(crate) enum Felt {
+pub(crate) enum ErrorInput {
     /// Nothing that changes: a bias.
     Unit,
     /// The sample of this sensor along this axis: scale factors, misalignments, g-sensitivity.
@@ -337,12 +337,12 @@ impl Surroundings {
     }
 
     /// Value of the quantity to which an error is proportional.
-    pub(crate) fn value(&self, of: Felt) -> f64 {
+    pub(crate) fn value(&self, of: ErrorInput) -> f64 {
         match of {
-            Felt::Unit => 1.0,
-            Felt::Sample(sensor, axis) => self.sample[sensor as usize][axis],
-            Felt::Square(axis) => self.square[axis],
-            Felt::Warming => self.warming_k,
+            ErrorInput::Unit => 1.0,
+            ErrorInput::Sample(sensor, axis) => self.sample[sensor as usize][axis],
+            ErrorInput::Square(axis) => self.square[axis],
+            ErrorInput::Warming => self.warming_k,
         }
     }
 }

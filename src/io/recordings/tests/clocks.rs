@@ -40,13 +40,13 @@ fn time_is_checked() {
     };
     let (lengths, _, warning) = of(Gaps::Split);
     assert_eq!(lengths, [9, 10]);
-    let split = "split at 1 gaps or duplicates in time, the first in line 11";
+    let split = "split at gaps or duplicates in time: 1, the first in line 11";
     assert!(warning.contains(split), "{warning}");
     // Ignored, a lost sample leaves the rate of the others.
     let (lengths, rate_hz, warning) = of(Gaps::Ignore);
     assert_eq!(lengths, [19]);
     assert_close(&[rate_hz], &[100.0]);
-    let ignored = "1 gaps or duplicates in time ignored, the first in line 11";
+    let ignored = "gaps or duplicates in time ignored: 1, the first in line 11";
     assert!(warning.contains(ignored), "{warning}");
 }
 

@@ -37,7 +37,7 @@ fn doubts_are_told() {
     assert_eq!(
         warnings(&format!("t_s,gyro_x_rad_s\n{text}"), &split),
         [
-            "split at 1 gaps or duplicates in time, the first in line 972",
+            "split at gaps or duplicates in time: 1, the first in line 972",
             "1 stretches between gaps have fewer than 60 samples: left out"
         ]
     );

@@ -37,10 +37,11 @@ mod truth;
 mod tune;
 
 pub use pass::{
-    Assessment, Consistency, ErrorLaw, FilterPass, Instant, Judged, assess, strapdown_over_sigma,
+    AssessedInstant, Assessment, Consistency, ErrorLaw, FilterPass, Instant, assess,
+    strapdown_over_sigma,
 };
 pub(crate) use pass::{Moments, errors_in_outages};
-pub use reduce::{Alike, drive, reduced_belief};
+pub use reduce::{AxisGrouping, drive, reduced_belief};
 pub use track::Track;
 pub use truth::{DRIFT, NamedSource, STRAPDOWN, TrueErrors, TruthSide, weak_heading};
 pub(crate) use tune::Crossing;

@@ -107,7 +107,7 @@ pub struct Instant {
 
 /// A filter's errors at one instant, and what it states of them.
 #[derive(Debug, Clone, Copy)]
-pub struct Judged {
+pub struct AssessedInstant {
     /// The law of the true errors.
     pub errors: Instant,
     /// The covariance that the filter states.
@@ -118,9 +118,9 @@ pub struct Judged {
 #[derive(Debug, Clone, Default)]
 pub struct ErrorLaw {
     /// At every report (1 Hz), after the measurements.
-    pub reports: Vec<Judged>,
+    pub reports: Vec<AssessedInstant>,
     /// Just before the first fix after each outage (or at the end).
-    pub outage_ends: Vec<Judged>,
+    pub outage_ends: Vec<AssessedInstant>,
     /// Sum of the expected squares of the innovations of fixes over the variances that the filter states, and how
     /// many fixes.
     pub nis: (f64, u64),
@@ -243,7 +243,7 @@ impl<'a> FilterPass<'a> {
     }
 
     /// The same at the ends of outages alone: what comes after the last is not computed.
-    pub fn errors_at_ends(&self, truth: &TruthSide) -> Vec<Judged> {
+    pub fn errors_at_ends(&self, truth: &TruthSide) -> Vec<AssessedInstant> {
         let last = self
             .track
             .marks
@@ -286,7 +286,8 @@ impl<'a> FilterPass<'a> {
 
 impl ErrorLaw {
     pub(super) fn assessment(&self) -> Assessment {
-        let consistency = |all: &[Judged]| all.iter().map(Judged::consistency).collect();
+        let consistency =
+            |all: &[AssessedInstant]| all.iter().map(AssessedInstant::consistency).collect();
         Assessment {
             reports: consistency(&self.reports),
             outage_ends: consistency(&self.outage_ends),
@@ -322,7 +323,7 @@ impl Instant {
 /// A matrix of the filter's navigation states.
 type Square = SMatrix<f64, NAV, NAV>;
 
-impl Judged {
+impl AssessedInstant {
     /// Standard deviations that the filter states of the reported states.
     pub fn sigma(&self) -> [f64; REPORTED] {
         deviations(&self.errors.jacobian, &self.believed)
@@ -593,8 +594,8 @@ impl<'a> Errors<'a> {
         variance + value * value
     }
 
-    fn judged(&self, mark: &Mark, believed: &[Nav; NAV]) -> Judged {
-        Judged {
+    fn judged(&self, mark: &Mark, believed: &[Nav; NAV]) -> AssessedInstant {
+        AssessedInstant {
             errors: self.instant(mark),
             believed: *believed,
         }

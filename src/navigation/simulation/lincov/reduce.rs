@@ -6,7 +6,7 @@
 //! largest expected log density under the filter's own covariance, and that this covariance is closest to that of the true
 //! errors along the drive, in the sense of the Kullback-Leibler divergence.
 
-use super::pass::{Assessment, Consistency, ErrorLaw, FilterPass, Judged};
+use super::pass::{AssessedInstant, Assessment, Consistency, ErrorLaw, FilterPass};
 use super::track::{NAV, Track};
 use crate::earth::GravityModel;
 use crate::ekf::{Belief, FixUpdate, InitialSettings};
@@ -38,7 +38,12 @@ type Factors = [f64; FACTORS];
 /// The belief of 15 states whose covariance is closest to that of the errors it makes along a track, where the
 /// errors are those of `model`; `wavelet` is the belief by wavelet variance, from which the search starts; axes of a
 /// sensor are reduced as `alike` says. Axes that are white noise and one bias already stay as they are.
-pub fn reduced_belief(model: &Model, wavelet: Belief, track: &Track, alike: Alike) -> Belief {
+pub fn reduced_belief(
+    model: &Model,
+    wavelet: Belief,
+    track: &Track,
+    alike: AxisGrouping,
+) -> Belief {
     let exact = Channel::ALL.map(|c| reduction::is_exact(model.axis(c)));
     let is_free = |i: &usize| {
         Channel::ALL
@@ -63,14 +68,14 @@ pub fn reduced_belief(model: &Model, wavelet: Belief, track: &Track, alike: Alik
 
 /// Which axes of a sensor are reduced alike.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Alike {
+pub enum AxisGrouping {
     /// Front and right; down apart, whose gyroscope shows in the heading alone.
     Level,
     /// All: nobody knows how the IMU is mounted.
     All,
 }
 
-impl Alike {
+impl AxisGrouping {
     /// The first of the three factors that act on an axis.
     fn first_factor(self, channel: Channel) -> usize {
         let apart = self == Self::Level && channel.axis == Axis::Z;
@@ -85,7 +90,7 @@ struct Search<'a> {
     track: Track,
     /// Axes that are left as they are.
     exact: [bool; 6],
-    alike: Alike,
+    alike: AxisGrouping,
     /// Factors that act on an axis.
     free: Vec<usize>,
 }
@@ -124,8 +129,10 @@ impl Search<'_> {
         let steep = steep(&assessment);
         // Small errors that are stated as they are have the largest density.
         let cost = average(&assessment, |end| -2.0 * end.log_density)
-            + steep.iter().map(Steep::cost).sum::<f64>();
-        let parts = shape(&law).chain(steep.iter().map(Steep::part)).collect();
+            + steep.iter().map(QuarticCost::cost).sum::<f64>();
+        let parts = shape(&law)
+            .chain(steep.iter().map(QuarticCost::part))
+            .collect();
         Value { cost, parts }.with_ridge(RIDGE, ln)
     }
 
@@ -205,13 +212,13 @@ const NEES_WEIGHT: f64 = 0.1;
 
 /// A logarithm that costs its fourth power: `scale` off costs `weight`, half of that a sixteenth, twice as much sixteen times;
 /// both directions count alike.
-struct Steep {
+struct QuarticCost {
     x: f64,
     scale: f64,
     weight: f64,
 }
 
-impl Steep {
+impl QuarticCost {
     fn cost(&self) -> f64 {
         self.weight * (self.x / self.scale).powi(4)
     }
@@ -228,12 +235,12 @@ impl Steep {
 /// Costs beside the divergence: for a single state whose ratio is a tenth off, at an outage's end
 /// or over the whole way, since the divergence alone sacrifices one state for eight; and for the
 /// mean NEES, since the divergence prefers a filter that is rather underconfident.
-fn steep(assessment: &Assessment) -> Vec<Steep> {
+fn steep(assessment: &Assessment) -> Vec<QuarticCost> {
     let ends = &assessment.outage_ends;
     let of_end = ENDS * OFF_WEIGHT / ends.len() as f64;
     let at_ends = ends.iter().flat_map(|end| end.ratio());
-    let mut all: Vec<Steep> = at_ends
-        .map(|r| Steep {
+    let mut all: Vec<QuarticCost> = at_ends
+        .map(|r| QuarticCost {
             x: r.ln(),
             scale: OFF,
             weight: of_end,
@@ -246,13 +253,13 @@ fn steep(assessment: &Assessment) -> Vec<Steep> {
     let mean = |of: &dyn Fn(&Consistency) -> f64| mean(reports.iter().map(of));
     // Root mean square over the way, so that one bad minute is not hidden by an hour that is good.
     let over_way = |i: usize| 0.5 * mean(&|c| c.ratio()[i].powi(2)).ln();
-    all.extend((0..REPORTED).map(|i| Steep {
+    all.extend((0..REPORTED).map(|i| QuarticCost {
         x: over_way(i),
         scale: OFF,
         weight: WAY * OFF_WEIGHT,
     }));
     let nees = (mean(&|c| c.nees) / NEES_DOF as f64).ln();
-    all.push(Steep {
+    all.push(QuarticCost {
         x: nees,
         scale: NEES_OFF,
         weight: WAY * NEES_WEIGHT,
@@ -270,7 +277,7 @@ fn shape(law: &ErrorLaw) -> impl Iterator<Item = Part> {
     } else {
         ENDS
     };
-    let weighted = |all: &[Judged], weight: f64| {
+    let weighted = |all: &[AssessedInstant], weight: f64| {
         let weight = weight / all.len().max(1) as f64;
         all.iter()
             .map(|judged| (judged.whitened(), weight))

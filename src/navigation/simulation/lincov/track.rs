@@ -14,7 +14,7 @@ use crate::imu::{Channel, ImuSample, Sensor};
 use crate::lanes::{Kernel, LANES, Lanes, Level, Mat3, Quat, Vec3, Wide, dispatch};
 use crate::noise::{Kind, Ladder, Model, Process};
 use crate::sensors::aiding::{Aid, AidPart, Law};
-use crate::sensors::defects::{Felt, Surroundings};
+use crate::sensors::defects::{ErrorInput, Surroundings};
 use crate::sensors::outage::Outage;
 use crate::simulation::BIASES;
 use crate::simulation::plan::{
@@ -825,15 +825,15 @@ pub(super) const RECTIFIED: usize = 33;
 pub(super) const WARMED: usize = 36;
 
 /// Sensor and axis of a signal, and the quantity that multiplies it.
-const fn place(signal: usize) -> (usize, usize, Felt) {
+const fn place(signal: usize) -> (usize, usize, ErrorInput) {
     match signal {
-        0..SCALED => (signal / 3, signal % 3, Felt::Unit),
+        0..SCALED => (signal / 3, signal % 3, ErrorInput::Unit),
         SCALED..CROSSED => {
             let sensor = signal % SCALED / 3;
             (
                 sensor,
                 signal % 3,
-                Felt::Sample(Sensor::ALL[sensor], signal % 3),
+                ErrorInput::Sample(Sensor::ALL[sensor], signal % 3),
             )
         }
         CROSSED..PUSHED => {
@@ -841,7 +841,7 @@ const fn place(signal: usize) -> (usize, usize, Felt) {
             (
                 sensor,
                 pair / 2,
-                Felt::Sample(Sensor::ALL[sensor], (pair / 2 + 1 + pair % 2) % 3),
+                ErrorInput::Sample(Sensor::ALL[sensor], (pair / 2 + 1 + pair % 2) % 3),
             )
         }
         PUSHED..RECTIFIED => {
@@ -849,15 +849,19 @@ const fn place(signal: usize) -> (usize, usize, Felt) {
             (
                 Sensor::Gyro as usize,
                 pair / 3,
-                Felt::Sample(Sensor::Accel, pair % 3),
+                ErrorInput::Sample(Sensor::Accel, pair % 3),
             )
         }
         RECTIFIED..WARMED => (
             Sensor::Accel as usize,
             signal - RECTIFIED,
-            Felt::Square(signal - RECTIFIED),
+            ErrorInput::Square(signal - RECTIFIED),
         ),
-        _ => ((signal - WARMED) / 3, (signal - WARMED) % 3, Felt::Warming),
+        _ => (
+            (signal - WARMED) / 3,
+            (signal - WARMED) % 3,
+            ErrorInput::Warming,
+        ),
     }
 }
 
