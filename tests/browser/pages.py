@@ -5,7 +5,7 @@
     python3 tests/browser/pages.py --page page.html [results.json]   opens one page
 
 Checks: no console message, no network, no page wider than the window, no text under 11 pixels, table numbers equal to the
-JSON, tables that fit a desk, figures that answer to the mouse. Without a browser the test is skipped, as the last line says; with NAV_SIM_CI that is a failure.
+JSON, tables that fit a desk, figures that answer to the mouse. Without a browser it is skipped; with NAV_SIM_CI it fails.
 """
 
 import json
@@ -226,7 +226,7 @@ def make(nav_sim, place):
 def main(words):
     program = browser()
     if not program:
-        print("skipped: no browser here (one of " + ", ".join(BROWSERS) + ")")
+        print("skipped: no browser (" + ", ".join(BROWSERS) + ")")
         return int("NAV_SIM_CI" in os.environ)
     with tempfile.TemporaryDirectory() as place:
         if words[0] == "--page":
