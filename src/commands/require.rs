@@ -9,16 +9,17 @@ use crate::io::model_file::{self, ModelFile, PROGRAM, TurnOn, known};
 use crate::parse;
 use crate::report::csv::merged;
 use nav_sim_document::{Document, Importance, Table, Tone, counted, readable, seconds, window};
+use nav_sim_navigation::ekf::BeliefError;
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
     Drift, HardestLimit, ImuParameters, ImuSearch, IntensityBound as Bound, Limit, LimitQuantity,
-    Margins, OutagePlacements, RequireError, evenly,
+    Margins, OutagePlacements, RequireError, evenly, worst_without_imu_errors,
 };
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::aiding::AidingSettings;
 use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_navigation::simulation::ExperimentError;
+use nav_sim_navigation::simulation::lincov::Track;
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Model;
@@ -198,7 +199,9 @@ impl Requirements {
             OutageRequest::Longest => self.long_outages(),
             _ => self.outages(),
         };
-        let judgement = self.judge_model(&scenario, &model).map_err(unusable)?;
+        let (long, without) = self.prepared().map_err(unusable)?;
+        let judged = self.judge_model(&long, without, &scenario, &model);
+        let judgement = judged.map_err(unusable)?;
         let margins = judgement.margins.as_ref();
         let is_good = margins.map_or(judgement.outage.length_s() > 0.0, |margins| margins.met);
         let mut document = Document::new(
@@ -445,6 +448,7 @@ struct Requirements {
     scenario: Scenario,
     /// The reference.
     trajectory: Trajectory,
+    track: Track,
     /// Limits of the errors at the outage's end.
     limits: Vec<Limit>,
     ask: OutageRequest,
@@ -482,9 +486,18 @@ impl Requirements {
                 format!("a shorter --outage{earlier}"),
             );
         }
+        // The noise that is judged comes later, many times over the same track.
+        let silent = Model {
+            rate_hz: scenario.imu.rate_hz,
+            axes: Default::default(),
+        };
+        let track = scenario
+            .track(&trajectory, &silent, &[])
+            .map_err(Failure::input)?;
         Ok(Self {
             scenario,
             trajectory,
+            track,
             limits,
             ask,
             first_s,
@@ -497,7 +510,7 @@ impl Requirements {
     /// When no IMU keeps the limits, or trajectory and rates do not fit together.
     fn required_imu(&self) -> Result<PlainAnswer, RequireError> {
         let outages = self.outages();
-        let course = self.course(&outages)?;
+        let course = self.course(&outages);
         let scenario = &self.with_stated_turn_on();
         let need = ImuSearch {
             course: &course,
@@ -593,28 +606,61 @@ impl Requirements {
         (stated != TurnOn::default()).then_some(stated)
     }
 
+    /// What every IMU along this track is judged with: the places of an outage, each as long as the trajectory allows, and the
+    /// hardest limit of an IMU without errors, none where the longest outage is requested.
+    fn prepared(&self) -> Result<(OutagePlacements<'_>, Option<HardestLimit>), RequireError> {
+        let asked = (self.ask != OutageRequest::Longest).then(|| self.course(&self.outages()));
+        let without = |course| worst_without_imu_errors(&course, &self.scenario, &self.limits);
+        Ok((
+            self.course(&self.long_outages()),
+            asked.map(without).transpose()?,
+        ))
+    }
+
     /// Errors after outages of growing length, at the places that the outage requested has, each as far as the trajectory
     /// goes; the longest outage within the limits; the hardest limit after the outage requested, none where no place has one
     /// of that length.
-    fn bridged(&self, scenario: &Scenario, model: &Model) -> Result<Bridged, RequireError> {
-        let long = self.long_outages();
-        let curves =
-            OutagePlacements::new(scenario, &self.trajectory, &long)?.curves(scenario, model)?;
-        let longest = self.longest_of(&curves);
-        let length_s = match self.ask {
+    fn bridged(
+        &self,
+        long: &OutagePlacements<'_>,
+        scenario: &Scenario,
+        model: &Model,
+    ) -> Result<Bridged, RequireError> {
+        let curves = long.curves(scenario, model)?;
+        let longest = self.longest_of(long, scenario, model, &curves)?;
+        let length_s = self.length_of(&longest);
+        let mut ends = after(&curves, length_s);
+        if ends.is_empty() && length_s > 0.0 {
+            // The curves need not have the length that is asked for.
+            let has_room = |outage: &&Outage| outage.end_s - outage.start_s > length_s - SAME_S;
+            let places: Vec<Outage> = long.outages().iter().filter(has_room).copied().collect();
+            ends = long.drifts_in(&of_length(&places, length_s), scenario, model)?;
+        }
+        let worst = HardestLimit::of(&self.limits, &ends);
+        Ok((curves, longest, worst))
+    }
+
+    /// The length asked for, or the longest within the limits (s).
+    fn length_of(&self, longest: &LongestOutage) -> f64 {
+        match self.ask {
             OutageRequest::Longest => longest.length_s(),
             ask => ask.length_s(),
-        };
-        let worst = HardestLimit::of(&self.limits, &after(&curves, length_s));
-        Ok((curves, longest, worst))
+        }
     }
 
     /// Judges a model against the limits. `scenario` is that of the unit, with its turn-on biases.
     ///
     /// # Errors
     /// When the model has no filter.
-    fn judge_model(&self, scenario: &Scenario, model: &Model) -> Result<LimitResult, RequireError> {
-        let (curves, outage, worst) = self.bridged(scenario, model)?;
+    fn judge_model(
+        &self,
+        long: &OutagePlacements<'_>,
+        without_imu_errors: Option<HardestLimit>,
+        scenario: &Scenario,
+        model: &Model,
+    ) -> Result<LimitResult, RequireError> {
+        let (curves, outage, worst) = self.bridged(long, scenario, model)?;
+        let length_s = self.length_of(&outage);
         // of one set of starts: with fewer starts for longer outages the worst of them would fall
         let lasts = |length_s: &u32| !after(&curves, f64::from(*length_s)).is_empty();
         let longest_s = f64::from(CURVE_S.into_iter().rev().find(lasts).unwrap_or(0));
@@ -628,19 +674,10 @@ impl Requirements {
             };
             json!({ "quantity": quantity, "points": CURVE_S.map(point) })
         };
-        let (margins, shown) = if self.ask == OutageRequest::Longest {
-            let shown = worst.map(|worst| {
-                let Outage { start_s, .. } = self.long_outages()[worst.place];
-                let end_s = start_s + outage.length_s();
-                Outage { start_s, end_s }
-            });
-            (None, shown)
-        } else {
-            let outages = self.outages();
-            let margins = Margins::of(&self.course(&outages)?, scenario, model, &self.limits)?;
-            let shown = outages[margins.worst.place];
-            (Some(margins), Some(shown))
-        };
+        let shown = worst.map(|worst| of_length(&long.outages()[worst.place..], length_s)[0]);
+        let margins = worst
+            .zip(without_imu_errors)
+            .map(|(worst, without)| Margins::new(worst, without));
         let beyond_linear = shown.map(|outage| self.beyond_linear(scenario, model, outage));
         Ok(LimitResult {
             curves: self.limits.iter().map(of_limit).collect(),
@@ -665,7 +702,9 @@ impl Requirements {
                 aiding,
                 ..scenario.clone()
             };
-            let (_, outage, worst) = self.bridged(&scenario, model)?;
+            let places = self.long_outages();
+            let long = OutagePlacements::new(&scenario, &self.trajectory, &places)?;
+            let (_, outage, worst) = self.bridged(&long, &scenario, model)?;
             // the hardest limit: none where no place has an outage of that length
             Ok(merged([
                 json!({ "aiding": name, "outage": outage }),
@@ -684,7 +723,7 @@ impl Requirements {
         outage: Outage,
     ) -> Result<Option<Outage>, RequireError> {
         let (scenario, outages) = (scenario.with_full_noise(), [outage]);
-        let track = scenario.track(&self.trajectory, model, &outages)?;
+        let track = self.track.with_outages(&outages);
         let expected = Expected::along(
             &track,
             &scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0),
@@ -701,8 +740,9 @@ impl Requirements {
     /// # Errors
     /// When a model has no filter, with its name, or the longest outage is requested.
     fn ranked(&self, units: &[CatalogueUnit]) -> Result<PlainAnswer> {
+        let (long, without) = self.prepared().map_err(Failure::input)?;
         let ranked = |unit: &CatalogueUnit| {
-            let judged = self.judge_model(&unit.scenario, &unit.model);
+            let judged = self.judge_model(&long, without, &unit.scenario, &unit.model);
             let mut judgement = judged.refuse_within(&unit.name)?;
             let is_complete = unit.not_stated.is_empty();
             let mut kept = "not met";
@@ -780,19 +820,46 @@ impl Requirements {
     }
 
     /// The longest outage of which all places are within the limits, in whole seconds. The first place holds the longest.
-    fn longest_of(&self, curves: &[Vec<Drift>]) -> LongestOutage {
-        let first = curves.first().map_or(&[][..], Vec::as_slice);
-        let lengths: Vec<f64> = first.iter().map(|d| d.after_s).collect();
-        let is_missed = |length_s: &f64| {
-            after(curves, *length_s)
-                .iter()
-                .any(|drift| self.limits.iter().any(|l| drift.exceeds(l)))
+    fn longest_of(
+        &self,
+        long: &OutagePlacements<'_>,
+        scenario: &Scenario,
+        model: &Model,
+        curves: &[Vec<Drift>],
+    ) -> Result<LongestOutage, BeliefError> {
+        let is_missed = |drift: &Drift| self.limits.iter().any(|l| drift.exceeds(l));
+        let bracket = |(outage, curve): (&Outage, &Vec<Drift>)| {
+            let missed = curve.iter().position(is_missed)?;
+            let kept_s = missed
+                .checked_sub(1)
+                .map_or(0.0, |kept| curve[kept].after_s);
+            Some((*outage, kept_s, curve[missed].after_s))
         };
-        let longest_s = lengths
+        let mut brackets: Vec<_> = long
+            .outages()
             .iter()
-            .position(is_missed)
-            .map(|first| first.checked_sub(1).map_or(0.0, |last| lengths[last]));
-        let at_least_s = lengths.last().copied().unwrap_or(0.0);
+            .zip(curves)
+            .filter_map(bracket)
+            .collect();
+        let least = |of: fn(&(Outage, f64, f64)) -> f64| {
+            brackets.iter().map(of).fold(f64::INFINITY, f64::min)
+        };
+        let [mut kept_s, mut missed_s] = [least(|b| b.1), least(|b| b.2)];
+        brackets.retain(|(_, kept_s, _)| *kept_s < missed_s);
+        let places: Vec<Outage> = brackets.into_iter().map(|(outage, ..)| outage).collect();
+        // The curves of long outages take long steps.
+        while missed_s - kept_s > 1.0 + SAME_S {
+            let length_s = kept_s + (0.5 * (missed_s - kept_s)).floor().max(1.0);
+            let drifts = long.drifts_in(&of_length(&places, length_s), scenario, model)?;
+            let is_kept = !drifts.iter().any(is_missed);
+            *(if is_kept { &mut kept_s } else { &mut missed_s }) = length_s;
+        }
+        let longest_s = kept_s.is_finite().then_some(kept_s);
+        let lasts_s = curves
+            .first()
+            .and_then(|curve| curve.last())
+            .map(|d| d.after_s);
+        let at_least_s = lasts_s.unwrap_or(0.0);
         let at_least = || {
             let rest = if at_least_s < LONGEST_S {
                 "to the end of the trajectory"
@@ -807,11 +874,11 @@ impl Requirements {
             Some(s) => format!("{} s", seconds(s)),
             None => at_least(),
         };
-        LongestOutage {
+        Ok(LongestOutage {
             longest_s,
             at_least_s: longest_s.is_none().then_some(at_least_s),
             text,
-        }
+        })
     }
 
     /// A unit whose turn-on biases are there and expected; `model` is at the rate of the IMU.
@@ -868,8 +935,8 @@ impl Requirements {
         longest_s * (1.0 - 0.5 * longest_s / left_s)
     }
 
-    fn course(&self, outages: &[Outage]) -> Result<OutagePlacements<'_>, ExperimentError> {
-        OutagePlacements::new(&self.scenario, &self.trajectory, outages)
+    fn course(&self, outages: &[Outage]) -> OutagePlacements<'_> {
+        OutagePlacements::along(&self.track, &self.trajectory, outages)
     }
 
     fn question(&self, outages: &[Outage]) -> Value {
@@ -889,10 +956,20 @@ struct CatalogueUnit {
     not_stated: Vec<String>,
 }
 
+/// Times come from samples: within a millisecond they are the same (s).
+const SAME_S: f64 = 1e-3;
+
+/// Outages of this length (s) from the same starts, or shorter where these are.
+fn of_length(outages: &[Outage], length_s: f64) -> Vec<Outage> {
+    let cut = |outage: &Outage| Outage {
+        end_s: outage.end_s.min(outage.start_s + length_s),
+        ..*outage
+    };
+    outages.iter().map(cut).collect()
+}
+
 /// The errors after a time without fixes at every place where the outage lasts so long.
 fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
-    // Times come from samples: within a millisecond they are the same.
-    const SAME_S: f64 = 1e-3;
     let drift_of_curve = |curve: &Vec<Drift>| {
         curve
             .get(curve.partition_point(|d| d.after_s < length_s - SAME_S))

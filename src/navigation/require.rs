@@ -295,12 +295,22 @@ impl<'a> OutagePlacements<'a> {
             rate_hz: scenario.imu.rate_hz,
             axes: Default::default(),
         };
-        let track = scenario.track(trajectory, &silent, &[])?.merged();
-        Ok(Self {
+        let track = scenario.track(trajectory, &silent, &[])?;
+        Ok(Self::along(&track, trajectory, outages))
+    }
+
+    /// Along a track of the trajectory without outages.
+    pub fn along(track: &Track, trajectory: &'a Trajectory, outages: &[Outage]) -> Self {
+        Self {
             trajectory,
-            track,
+            track: track.merged_for(outages),
             outages: outages.to_vec(),
-        })
+        }
+    }
+
+    /// The places of the outage.
+    pub fn outages(&self) -> &[Outage] {
+        &self.outages
     }
 
     /// Errors at the outage's end, at each place, of the filter that knows the model.
@@ -311,7 +321,7 @@ impl<'a> OutagePlacements<'a> {
         self.drifts_in(&self.outages, scenario, model)
     }
 
-    /// Errors at every whole second of the outage, at each place.
+    /// Errors at every whole second of the outage, every fifth after the first minute where nothing is measured, at each place.
     ///
     /// # Errors
     /// When the model has no such filter.
@@ -340,7 +350,10 @@ impl<'a> OutagePlacements<'a> {
     }
 
     /// The hardest limit of a filter that knows the model.
-    fn worst(
+    ///
+    /// # Errors
+    /// When the model has no such filter.
+    pub fn worst(
         &self,
         scenario: &Scenario,
         model: &Model,
@@ -349,7 +362,11 @@ impl<'a> OutagePlacements<'a> {
         Ok(hardest(limits, &self.drifts(scenario, model)?))
     }
 
-    fn drifts_in(
+    /// The same for other outages.
+    ///
+    /// # Errors
+    /// When the model has no such filter.
+    pub fn drifts_in(
         &self,
         outages: &[Outage],
         scenario: &Scenario,
@@ -712,24 +729,27 @@ pub struct Margins {
 const SLOW_S: f64 = 300.0;
 
 impl Margins {
-    /// The margins of the filter that knows the model.
-    ///
-    /// # Errors
-    /// When the model has no such filter.
-    pub fn of(
-        course: &OutagePlacements<'_>,
-        scenario: &Scenario,
-        model: &Model,
-        limits: &[Limit],
-    ) -> Result<Self, BeliefError> {
-        let perfect = ImuParameters::perfect(SLOW_S).model(model.rate_hz);
-        let worst = course.worst(scenario, model, limits)?;
-        Ok(Self {
+    /// The margins of an IMU, beside that of one without errors.
+    pub fn new(worst: HardestLimit, without_imu_errors: HardestLimit) -> Self {
+        Self {
             met: worst.margin() >= 0.0,
             worst,
-            without_imu_errors: course.worst(&without_imu_errors(scenario), &perfect, limits)?,
-        })
+            without_imu_errors,
+        }
     }
+}
+
+/// The hardest limit of an IMU without errors.
+///
+/// # Errors
+/// When its noise at the rate of the scenario has no filter.
+pub fn worst_without_imu_errors(
+    course: &OutagePlacements<'_>,
+    scenario: &Scenario,
+    limits: &[Limit],
+) -> Result<HardestLimit, BeliefError> {
+    let perfect = ImuParameters::perfect(SLOW_S).model(scenario.imu.rate_hz);
+    course.worst(&without_imu_errors(scenario), &perfect, limits)
 }
 
 /// A scenario whose IMU has no constant errors, and whose filter knows it.

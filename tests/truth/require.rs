@@ -6,7 +6,7 @@ use nav_sim::io::datasheet::{Figure, catalogued};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::require::{
     Drift, IMU_PARAMETERS, ImuSearch, IntensityBound, Limit, LimitQuantity, Margins,
-    OutagePlacements, RequireError,
+    OutagePlacements, RequireError, worst_without_imu_errors,
 };
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
@@ -44,6 +44,18 @@ fn need<'a>(
     }
 }
 
+fn margins(
+    course: &OutagePlacements<'_>,
+    scenario: &Scenario,
+    model: &Model,
+    limits: &[Limit],
+) -> Margins {
+    Margins::new(
+        course.worst(scenario, model, limits).unwrap(),
+        worst_without_imu_errors(course, scenario, limits).unwrap(),
+    )
+}
+
 /// 400 runs of the filter with all states: the share within the 95 % quantile that was asked for is 0.95 within four
 /// standard errors of a binomial share, 4 √(0.95·0.05/400) = 0.044.
 #[test]
@@ -67,7 +79,7 @@ fn the_imu_that_is_named_meets_the_limit_in_sampled_runs() {
         (within as f64 / 400.0 - 0.95).abs() < 0.044,
         "{within} of 400, {imu:?}"
     );
-    let margins = Margins::of(&course, &scenario, &model, &limits).unwrap();
+    let margins = margins(&course, &scenario, &model, &limits);
     assert!(
         margins.met && margins.worst.value / 12.0 > 0.9975,
         "{margins:?}"
@@ -254,6 +266,39 @@ fn a_curve_holds_the_ends_of_all_shorter_outages() {
     assert!(curve.last().is_some_and(|drift| drift.after_s == 40.0) && curve.len() == 40);
 }
 
+/// After a minute a curve takes steps of five seconds, and an outage that ends between two of them ends with shorter ones: what
+/// they leave beside steps of a second is less than the reserve of the search, in turns and with a bias that changes within one.
+#[test]
+fn long_steps_through_an_outage_are_as_good_as_short_ones() {
+    let (scenario, trajectory) = setting();
+    let axis = Composite::new(vec![
+        Process::white(1e-5).unwrap(),
+        Process::ar1(0.999, 1e-9).unwrap(),
+        Process::ar1(0.9999, 1e-10).unwrap(),
+    ]);
+    let model = Model::pooled(scenario.imu.rate_hz, &axis, &axis);
+    let long = [outage(20.0, 170.0)];
+    let course = OutagePlacements::new(&scenario, &trajectory, &long).unwrap();
+    let curve = &course.curves(&scenario, &model).unwrap()[0];
+    assert_eq!(curve.len(), 60 + 18);
+    for length_s in [65.0, 67.0, 110.0, 150.0] {
+        let outages = [outage(20.0, 20.0 + length_s)];
+        let track = scenario
+            .track(&trajectory, &model, &outages)
+            .unwrap()
+            .merged();
+        let alone = end_of_outage(&scenario, &trajectory, &model, &outages, &track);
+        let expected = [alone[0].hypot(alone[1]), alone[6], alone[8]];
+        let at_end = course.drifts_in(&outages, &scenario, &model).unwrap();
+        let in_curve = curve.iter().filter(|drift| drift.after_s == length_s);
+        for drift in in_curve.chain(&at_end) {
+            let rmse = drift.value(LimitQuantity::Rmse);
+            let found = [rmse, drift.angles_deg[0], drift.angles_deg[2]];
+            assert_relative_eq!(found[..], expected[..], max_relative = 1.5e-3);
+        }
+    }
+}
+
 /// A Rayleigh variable without a mean, its length where the mean is all there is.
 #[test]
 fn quantiles_of_a_horizontal_error_have_their_closed_forms() {
@@ -296,7 +341,7 @@ fn an_imu_without_errors_leaves_what_gnss_and_start_leave() {
     let start = [outage(0.0, 20.0)];
     let margins = |scenario: &Scenario| {
         let course = OutagePlacements::new(scenario, &trajectory, &start).unwrap();
-        Margins::of(&course, scenario, &model, &limit(LimitQuantity::Rmse, 6.0)).unwrap()
+        margins(&course, scenario, &model, &limit(LimitQuantity::Rmse, 6.0))
     };
     scenario.initial.att_sigma_deg = [1e-3; 3];
     scenario.initial.vel_sigma_m_s = [1e-3; 3];

@@ -458,13 +458,18 @@ pub(crate) fn errors_in_outages(
                 .iter()
                 .flat_map(|mark| mark.rows.iter())
                 .any(|row| goes_on(&row));
-            for (index, (steps, mark)) in way.clone().zip(track.legs(way.clone())) {
+            let mut next = way.start;
+            while next < way.end {
+                let long = is_blind.then(|| track.through(&outages[place], next, way.end));
+                let (steps, index) = long.unwrap_or_else(|| (track.leg(next), next));
+                let mark = &track.marks[index];
+                next = index + 1;
                 if !is_blind {
                     steps.iter().for_each(|step| filter.step(step));
                 }
                 errors.follow(steps, mark);
                 // Before the measurements, as the end of an outage in the runs: each report could be one.
-                let is_end = index + 1 == way.end;
+                let is_end = next == way.end;
                 let is_looked_at = is_end || moments == Moments::Reports && mark.report;
                 instants.extend(is_looked_at.then(|| errors.instant(mark)));
                 let rows = mark.rows.iter().filter(|_| !is_end).filter(goes_on);

@@ -166,6 +166,8 @@ pub(super) struct Mark {
 pub struct Track {
     /// Outages change no step: tracks that differ in them alone share these.
     steps: Arc<Vec<Step>>,
+    /// Steps of [`LONG_STEP_S`] by the mark at which each begins, with the mark at which it ends.
+    long: Arc<Vec<Option<(usize, Step)>>>,
     pub(super) marks: Vec<Mark>,
     pub(super) outages: usize,
     /// Covariance of the navigation error at the start, as in the filter's model.
@@ -229,6 +231,7 @@ impl Track {
         drop_closed(&mut marks);
         let track = Self {
             steps: Arc::new(steps),
+            long: Arc::default(),
             marks,
             outages: 0,
             start: covariance_of_start(experiment, &start),
@@ -278,16 +281,14 @@ impl Track {
 
     /// Some marks, each with the steps that lead to it.
     pub(super) fn legs(&self, marks: Range<usize>) -> impl Iterator<Item = (&[Step], &Mark)> {
-        let begin = |mark: usize| {
-            mark.checked_sub(1)
-                .map_or(0, |before| self.marks[before].steps)
-        };
-        marks.map(move |mark| {
-            (
-                &self.steps[begin(mark)..self.marks[mark].steps],
-                &self.marks[mark],
-            )
-        })
+        marks.map(|mark| (self.leg(mark), &self.marks[mark]))
+    }
+
+    /// The steps that lead to a mark.
+    pub(super) fn leg(&self, mark: usize) -> &[Step] {
+        let before = mark.checked_sub(1);
+        let begin = before.map_or(0, |before| self.marks[before].steps);
+        &self.steps[begin..self.marks[mark].steps]
     }
 }
 
@@ -652,6 +653,51 @@ impl Track {
         })
     }
 
+    /// The same with a step of five seconds wherever one of these outages has lasted for a minute: a bias is its mean over the
+    /// step, which leaves up to 7e-4 of an attitude error where it changes within one, in turns.
+    pub(crate) fn merged_for(&self, outages: &[Outage]) -> Self {
+        let step_from = |begin: usize| {
+            let from = &self.marks[begin];
+            let end_s = from.after_s + LONG_STEP_S;
+            let is_end = |mark: &Mark| (mark.after_s - end_s).abs() < SLACK_S;
+            let is_long = |outage: &Outage| outage.takes_long_step(from.t_s);
+            let end = outages.iter().any(is_long).then_some(begin + 1)?;
+            let end = end + self.marks[end..].iter().position(is_end)?;
+            let leg = &self.steps[from.steps..self.marks[end].steps];
+            let white = Step::white_noise(leg);
+            Some((
+                end,
+                Step {
+                    white,
+                    ..Step::joined(leg)
+                },
+            ))
+        };
+        // What the strapdown errs at the marks between would be left out.
+        let begins = if self.is_closed() {
+            0..self.marks.len()
+        } else {
+            0..0
+        };
+        Self {
+            long: Arc::new(begins.map(step_from).collect()),
+            ..self.merged()
+        }
+    }
+
+    /// The steps that lead from the mark before `next` through an outage without measurements, and the mark at which they end,
+    /// before `end`.
+    pub(super) fn through(&self, outage: &Outage, next: usize, end: usize) -> (&[Step], usize) {
+        let before = next
+            .checked_sub(1)
+            .filter(|at| outage.takes_long_step(self.marks[*at].t_s));
+        let long = before.and_then(|at| self.long.get(at)?.as_ref());
+        match long.filter(|(last, _)| *last < end) {
+            Some((last, step)) => (std::slice::from_ref(step), *last),
+            None => (self.leg(next), next),
+        }
+    }
+
     /// One step from mark to mark.
     fn with_legs(&self, joined: impl Fn(&[Step]) -> Step) -> Self {
         let (mut steps, mut marks, mut done) = (Vec::new(), self.marks.clone(), 0);
@@ -667,6 +713,7 @@ impl Track {
         }
         Self {
             steps: Arc::new(steps),
+            long: Arc::default(),
             marks,
             ..*self
         }
@@ -726,6 +773,7 @@ impl Track {
         }
         Self {
             steps: Arc::new(steps),
+            long: Arc::default(),
             marks,
             ..*self
         }
@@ -748,6 +796,16 @@ impl Track {
 
 /// Times of marks are sums of samples: this much apart they are the same (s).
 const SLACK_S: f64 = 1e-6;
+/// Step through an outage that has lasted for [`LONG_AFTER_S`] (s).
+const LONG_STEP_S: f64 = 5.0;
+const LONG_AFTER_S: f64 = 60.0;
+
+impl Outage {
+    fn takes_long_step(&self, from_s: f64) -> bool {
+        (self.start_s + LONG_AFTER_S - SLACK_S..=self.end_s - LONG_STEP_S + SLACK_S)
+            .contains(&from_s)
+    }
+}
 
 impl Step {
     /// Steps one after the other as one, white noise through its mean over it.
@@ -1251,7 +1309,8 @@ impl Sides {
         let signals = sources.states.iter().map(|s| s.signal).chain(of_white);
         let signals = signals.map(|last| last + 1).max().unwrap_or(0);
         let mut inputs: Vec<(u32, Inputs)> = Vec::new();
-        for step in track.steps.iter() {
+        let long = track.long.iter().flatten().map(|(_, step)| step);
+        for step in track.steps.iter().chain(long) {
             if inputs.iter().all(|(samples, _)| *samples != step.samples) {
                 let own = Inputs::new(&sources, step.samples, signals);
                 inputs.push((step.samples, own));
