@@ -518,7 +518,7 @@ impl Requirements {
             limits: &self.limits,
             t_corr_s: CORRELATION_TIME_S,
         };
-        let imu = need.allocated()?;
+        let (imu, places) = need.allocated()?;
         let model = imu.model(self.scenario.imu.rate_hz);
         let worst =
             HardestLimit::of(&self.limits, &course.drifts(scenario, &model)?).expect("limits");
@@ -560,8 +560,8 @@ impl Requirements {
             figures.push(json!({
                 "figure": name,
                 "allocated": allocated,
-                "alone": bound(i, &need.limit_with_others_perfect(&imu, i)?),
-                "others_10_times_better": bound(i, &need.limit_of(&imu, i, 0.1)?),
+                "alone": bound(i, &need.limit_with_others_perfect(&imu, i, &places)?),
+                "others_10_times_better": bound(i, &need.limit_of(&imu, i, 0.1, &places)?),
             }));
         }
         file.provenance = Some(provenance);

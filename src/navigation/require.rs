@@ -556,11 +556,11 @@ pub struct ImuSearch<'a> {
 
 impl ImuSearch<'_> {
     /// The IMU that meets the limits with 1.5 thousandths in reserve, its four intensities with equal shares in the
-    /// variance that GNSS and start leave.
+    /// variance that GNSS and start leave; and the places, counted from 0, where the limits were the hardest.
     ///
     /// # Errors
     /// When not even a perfect IMU meets them, or the poorest that is sought does.
-    pub fn allocated(&self) -> Result<ImuParameters, RequireError> {
+    pub fn allocated(&self) -> Result<(ImuParameters, Vec<usize>), RequireError> {
         let start = ImuParameters {
             values: START,
             t_corr_s: self.t_corr_s,
@@ -579,9 +579,28 @@ impl ImuSearch<'_> {
                 value: worst.value,
             });
         }
-        let mut imu = self.at_limit(&start, [1.0; IMU_PARAMETERS])?.1;
+        let mut places = vec![worst.place];
+        let mut imu = self.at_limit(&start, [1.0; IMU_PARAMETERS], &mut places)?.1;
+        loop {
+            let known = places.len();
+            // The rounds end near the limit; one factor common to all then meets it exactly and leaves the shares
+            // as they are.
+            imu = self.evened(imu, &places)?;
+            imu = self.at_limit(&imu, [1.0; IMU_PARAMETERS], &mut places)?.1;
+            if places.len() == known {
+                return Ok((imu, places));
+            }
+        }
+    }
+
+    /// An IMU near the limit at the hardest of some places, its four intensities with equal shares.
+    fn evened(
+        &self,
+        mut imu: ImuParameters,
+        places: &[usize],
+    ) -> Result<ImuParameters, BeliefError> {
         for _ in 0..ROUNDS {
-            let (worst, squares) = self.squares(&imu)?;
+            let (worst, squares) = self.squares(&imu, places)?;
             let total: f64 = squares.iter().sum();
             // what the limit leaves when GNSS and start have taken their part
             // The margin is ln(limit/error): squared, exp(2 margin) is what the mean square may grow by.
@@ -598,12 +617,10 @@ impl ImuSearch<'_> {
             // filter's gains, and with them all four parts, change with every intensity.
             imu = imu.times(off.map(|x| (DAMPING * x).clamp(-1.0, 1.0).exp()));
         }
-        // The rounds end near the limit; one factor common to all then meets it exactly and leaves the shares
-        // as they are.
-        Ok(self.at_limit(&imu, [1.0; IMU_PARAMETERS])?.1)
+        Ok(imu)
     }
 
-    /// Largest value of an intensity when the others are multiplied by `others`.
+    /// Largest value of an intensity when the others are multiplied by `others`; the search begins at the hardest of some places.
     ///
     /// # Errors
     /// When the model has no filter.
@@ -612,13 +629,14 @@ impl ImuSearch<'_> {
         imu: &ImuParameters,
         which: usize,
         others: f64,
+        places: &[usize],
     ) -> Result<IntensityBound, BeliefError> {
         let base = imu.times(std::array::from_fn(
             |i| if i == which { 1.0 } else { others },
         ));
         let mut varied = [0.0; IMU_PARAMETERS];
         varied[which] = 1.0;
-        let (margin, found) = self.at_limit(&base, varied)?;
+        let (margin, found) = self.at_limit(&base, varied, &mut places.to_vec())?;
         Ok(match margin {
             // Regula falsi may end at a bracket without the last digit: ten times the tolerance is still a
             // crossing.
@@ -636,24 +654,34 @@ impl ImuSearch<'_> {
         &self,
         imu: &ImuParameters,
         which: usize,
+        places: &[usize],
     ) -> Result<IntensityBound, BeliefError> {
-        self.limit_of(imu, which, NONE)
+        self.limit_of(imu, which, NONE, places)
     }
 
     fn worst(&self, imu: &ImuParameters) -> Result<HardestLimit, BeliefError> {
-        self.course.worst(
-            self.scenario,
-            &imu.model(self.scenario.imu.rate_hz),
-            self.limits,
-        )
+        let all: Vec<usize> = (0..self.course.outages.len()).collect();
+        self.worst_of(imu, &all)
+    }
+
+    fn worst_of(&self, imu: &ImuParameters, places: &[usize]) -> Result<HardestLimit, BeliefError> {
+        let model = imu.model(self.scenario.imu.rate_hz);
+        let outages: Vec<Outage> = places.iter().map(|at| self.course.outages[*at]).collect();
+        let drifts = self.course.drifts_in(&outages, self.scenario, &model)?;
+        let worst = hardest(self.limits, &drifts);
+        Ok(HardestLimit {
+            place: places[worst.place],
+            ..worst
+        })
     }
 
     /// The IMU whose intensities with a weight are multiplied until the hardest limit is met with its reserve, and the
-    /// margin beyond that which is left: not zero where no factor within the range meets it.
+    /// margin beyond that which is left: not zero where no factor within the range meets it. Adds to the hardest places.
     fn at_limit(
         &self,
         imu: &ImuParameters,
         weights: [f64; IMU_PARAMETERS],
+        places: &mut Vec<usize>,
     ) -> Result<(f64, ImuParameters), BeliefError> {
         let crossing = Crossing {
             bounds: (-RANGE, RANGE),
@@ -661,17 +689,12 @@ impl ImuSearch<'_> {
             exact: EXACT,
         };
         let scaled = |ln: f64| imu.times(weights.map(|w| (w * ln).exp()));
-        let (course, scenario) = (self.course, self.scenario);
         // The search is at the places that were the worst so far; what it finds is held against all, and it goes on
         // where another is worse. The answer is that of all places, at the cost of a few.
-        let mut places = vec![self.worst(imu)?.place];
         let mut start = 0.0;
         loop {
-            let outages: Vec<Outage> = places.iter().map(|at| course.outages[*at]).collect();
             let margin_there = |ln: f64| {
-                let model = scaled(ln).model(scenario.imu.rate_hz);
-                let drifts = course.drifts_in(&outages, scenario, &model)?;
-                Ok::<_, BeliefError>(hardest(self.limits, &drifts).margin() - RESERVE)
+                Ok::<_, BeliefError>(self.worst_of(&scaled(ln), places)?.margin() - RESERVE)
             };
             let (ln, there) = crossing.from(start, margin_there)?;
             let worst = self.worst(&scaled(ln))?;
@@ -688,8 +711,9 @@ impl ImuSearch<'_> {
     fn squares(
         &self,
         imu: &ImuParameters,
+        places: &[usize],
     ) -> Result<(HardestLimit, [f64; IMU_PARAMETERS + 1]), BeliefError> {
-        let worst = self.worst(imu)?;
+        let worst = self.worst_of(imu, places)?;
         let (course, model) = (self.course, imu.model(self.scenario.imu.rate_hz));
         let belief = course.belief(self.scenario, &model)?;
         let sources = course.sources(self.scenario, &model);

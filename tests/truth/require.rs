@@ -63,7 +63,7 @@ fn the_imu_that_is_named_meets_the_limit_in_sampled_runs() {
     let (scenario, trajectory) = setting();
     let course = OutagePlacements::new(&scenario, &trajectory, &[OUTAGE]).unwrap();
     let limits = limit(LimitQuantity::P95, 12.0);
-    let imu = need(&course, &scenario, &limits).allocated().unwrap();
+    let imu = need(&course, &scenario, &limits).allocated().unwrap().0;
     let model = imu.model(scenario.imu.rate_hz);
     let full = scenario.with_full_noise();
     let track = scenario.track(&trajectory, &model, &[OUTAGE]).unwrap();
@@ -96,14 +96,14 @@ fn answers_are_monotone() {
         limit(LimitQuantity::P95, 10.0),
     ];
     let need = |k: usize| need(&course, &scenario, &limits[k]);
-    let [loose, tight] = [0, 1].map(|k| need(k).allocated().unwrap());
+    let [loose, tight] = [0, 1].map(|k| need(k).allocated().unwrap().0);
     assert!(
         loose.values.iter().zip(tight.values).all(|(l, t)| *l > t),
         "{loose:?} {tight:?}"
     );
     for i in 0..IMU_PARAMETERS {
-        let beside = need(0).limit_of(&loose, i, 0.1).unwrap();
-        let alone = need(0).limit_with_others_perfect(&loose, i).unwrap();
+        let beside = need(0).limit_of(&loose, i, 0.1, &[0]).unwrap();
+        let alone = need(0).limit_with_others_perfect(&loose, i, &[0]).unwrap();
         let (IntensityBound::AtMost(beside), IntensityBound::AtMost(alone)) = (beside, alone)
         else {
             panic!("{beside:?} {alone:?}")
@@ -138,7 +138,7 @@ fn the_imu_that_is_named_keeps_the_limit_at_every_beginning() {
     let course = OutagePlacements::new(&scenario, &trajectory, &outages).unwrap();
     for most in [3.0, 10.0] {
         let limits = limit(LimitQuantity::P95, most);
-        let imu = need(&course, &scenario, &limits).allocated().unwrap();
+        let imu = need(&course, &scenario, &limits).allocated().unwrap().0;
         let model = imu.model(scenario.imu.rate_hz);
         let drifts = course.drifts(&scenario, &model).unwrap();
         let (place, worst) = Drift::largest(&drifts, LimitQuantity::P95).unwrap();
@@ -165,7 +165,7 @@ fn the_imu_that_is_named_keeps_the_limit_in_the_steps_of_a_run() {
         let outages = [outage(start_s, start_s + length_s)];
         let course = OutagePlacements::new(&scenario, &trajectory, &outages).unwrap();
         let limits = limit(LimitQuantity::Rmse, 1.0 + 0.005 * length_s * length_s);
-        let imu = need(&course, &scenario, &limits).allocated().unwrap();
+        let imu = need(&course, &scenario, &limits).allocated().unwrap().0;
         let model = imu.model(scenario.imu.rate_hz);
         let track = scenario.track(&trajectory, &model, &outages).unwrap();
         let end = end_of_outage(&scenario, &trajectory, &model, &outages, &track);
@@ -257,7 +257,7 @@ fn a_curve_holds_the_ends_of_all_shorter_outages() {
         OutagePlacements::new(&scenario, &trajectory, &[Outage { end_s, ..OUTAGE }]).unwrap()
     };
     let at_end = course(170.0);
-    let imu = need(&at_end, &scenario, &limits).allocated().unwrap();
+    let imu = need(&at_end, &scenario, &limits).allocated().unwrap().0;
     let model = imu.model(scenario.imu.rate_hz);
     let end = at_end.drifts(&scenario, &model).unwrap()[0].value(LimitQuantity::P95);
     let curve = &course(190.0).curves(&scenario, &model).unwrap()[0];
