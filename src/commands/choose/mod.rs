@@ -9,7 +9,7 @@
 
 use crate::app::inputs::{self, SettingsArgs};
 use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
-use crate::app::{Command, Context, Inputs, Out, PlainAnswer, Result, refused};
+use crate::app::{Command, Context, Failure, Inputs, Out, PlainAnswer, Result, refused};
 use crate::commands::calibrate::{
     Calibration, CalibrationNote, ESTIMATORS, EstimatorChoice, MeasuredRecordings, measure,
 };
@@ -21,7 +21,7 @@ use candidates::{CalibrationSet, Candidate, Drive, Fold, Inflation, Unit};
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, model_of};
 use nav_sim_document::{Document, Importance, Table, Tone, readable, window};
 use nav_sim_navigation::ekf::FilterStates;
-use ranking::Ranking;
+use ranking::{RankedCandidate, Ranking};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -174,7 +174,16 @@ impl Command for Choose {
         }
         context.end();
         let ranking = Ranking::new(&candidates, &folds);
-        let winner = &candidates[ranking.candidates[0].index];
+        let (best, diverges) = (&ranking.candidates[0], |c: &&RankedCandidate| {
+            c.log_score.value == f64::NEG_INFINITY
+        });
+        if diverges(&best) {
+            return Err(Failure::could_not(
+                "every candidate has runs that diverge on a recording",
+            )
+            .hint("nav-sim calibrate names abnormal recordings; --inflate x10 adds wider candidates"));
+        }
+        let winner = &candidates[best.index];
         // an estimator of single recordings never wins: this is of all of them
         let (groups, mut outcomes, settings) = laboratory.calibrate(winner, None)?;
         // The model that was compared is the one that is written.
@@ -229,6 +238,9 @@ impl Command for Choose {
             "abnormal, ranks no candidate (nav-sim calibrate says how)",
             &abnormal,
         );
+        let diverged = ranking.candidates.iter().filter(diverges);
+        let diverged: Vec<&str> = diverged.map(|c| c.candidate.as_str()).collect();
+        warn("runs of it diverge on a recording", &diverged);
         let undescribed: Vec<&str> = ranking.undescribed.iter().map(String::as_str).collect();
         warn(
             "no candidate describes it (a warm-up? see nav-sim calibrate)",

@@ -298,7 +298,11 @@ mod ranking_tests {
 
     #[test]
     fn a_candidate_that_diverges_is_last() {
-        let diverged = f64::NEG_INFINITY;
+        let run = RunRecord {
+            diverged: true,
+            ..RunRecord::default()
+        };
+        let diverged = Score::of(&[run], 1).all.log_score;
         let found = ranked(
             Estimator::SrAwv,
             &[
@@ -368,13 +372,16 @@ impl Score {
         let limit = ChiSquared::new(NEES_DOF as f64).map_or(f64::NAN, |law| law.inverse_cdf(0.95));
         let inside = |o: &OutageRecord| f64::from(u8::from(o.nees_end <= limit));
         let diverged = runs.len() - kept.len();
-        let density = if diverged > 0 { f64::NEG_INFINITY } else { 0.0 };
         Self {
             all: EndScore {
                 rmse_m: over(&|o| o.rmse_m.powi(2)).sqrt(),
                 believed_m: over(&|o| o.believed_m.powi(2)).sqrt(),
                 nees: over(&|o| o.nees),
-                log_score: over(&|o| o.log_score) + density,
+                log_score: if diverged > 0 {
+                    f64::NEG_INFINITY
+                } else {
+                    over(&|o| o.log_score)
+                },
             },
             coverage: mean(kept.iter().flat_map(|run| run.iter()).map(inside)),
             diverged,

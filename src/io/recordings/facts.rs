@@ -209,8 +209,11 @@ impl Repair {
             let mut rows: Vec<usize> = missing.into_iter().flat_map(|(_, rows)| rows).collect();
             rows.sort_unstable();
             rows.dedup();
-            let firsts = rows.iter().enumerate().map(|(before, row)| row - before);
-            self.breaks.extend(firsts);
+            let stands_at = |row: usize| row - rows.partition_point(|left_out| *left_out < row);
+            self.breaks
+                .iter_mut()
+                .for_each(|row| *row = stands_at(*row));
+            self.breaks.extend(rows.iter().map(|row| stands_at(*row)));
             return leave_out(table, &rows);
         }
         for (channel, rows) in missing {
@@ -283,6 +286,10 @@ impl Repair {
                 )));
         }
         table.keep(firsts);
+        let kept_before = |row: usize| firsts.partition_point(|first| *first < row);
+        self.breaks
+            .iter_mut()
+            .for_each(|row| *row = kept_before(*row));
         self.rows_per_sample = *rows_per_sample;
         for clock in ["t_s", "counter"] {
             let clock = table.columns.iter_mut().find(|c| c.quantity.name == clock);

@@ -676,7 +676,8 @@ fn pieces(
     let dropped = all().filter(|p| p.len() < needed).count();
     if dropped > 0 {
         report.warn(format!(
-            "{dropped} stretches between gaps have fewer than {needed} samples: left out"
+            "{} of fewer than {needed} samples between gaps: left out",
+            nav_sim_document::counted(dropped, "piece")
         ));
     }
     Ok(all().filter(|p| p.len() >= needed).collect())

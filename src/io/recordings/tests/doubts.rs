@@ -38,9 +38,41 @@ fn doubts_are_told() {
         warnings(&format!("t_s,gyro_x_rad_s\n{text}"), &split),
         [
             "split at gaps or duplicates in time: 1, the first in line 972",
-            "1 stretches between gaps have fewer than 60 samples: left out"
+            "1 piece of fewer than 60 samples between gaps: left out"
         ]
     );
+}
+
+/// Rows are taken out twice: where all is zero, then where a channel holds its value, or where each sample is repeated.
+#[test]
+fn recordings_are_split_where_rows_were_taken_out() {
+    let noise = |k: usize| {
+        let x = (k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let x = (x ^ (x >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        9.8 + ((x >> 40) % 10_007) as f64 * 1e-6
+    };
+    let pieces = |row: &dyn Fn(usize) -> [f64; 2]| {
+        let row = |k: usize| row(k).map(|x| format!("{x}")).join(",") + "\n";
+        let rows: String = (0..2000).map(row).collect();
+        let options = ReadOptions {
+            gaps: Gaps::Split,
+            ..at(100.0)
+        };
+        outcome(format!("accel_y_m_s2,accel_z_m_s2\n{rows}"), &options)
+            .1
+            .samples
+    };
+    let frozen = pieces(&|k| match k {
+        1500..1503 => [0.0; 2],
+        500..700 => [9.804, noise(k + 2000)],
+        _ => [noise(k), noise(k + 2000)],
+    });
+    assert_eq!(frozen, [500, 800, 497]);
+    let repeated = pieces(&|k| match k {
+        1200..1204 => [0.0; 2],
+        _ => [noise(k / 2), noise(k / 2 + 2000)],
+    });
+    assert_eq!(repeated, [600, 398]);
 }
 
 #[test]
