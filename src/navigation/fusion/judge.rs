@@ -397,7 +397,7 @@ const QUARTER: f64 = 90.0 * DEG;
 
 /// A transformation of values comes first with standard deviations in the same unit, then in that of their names.
 #[rustfmt::skip]
-const TRANSFORMATIONS: [Transformation; 16] = {
+const TRANSFORMATIONS: [Transformation; 17] = {
     const fn new(block: usize, cause: &'static str, truth: fn(NavState) -> NavState, sigma: fn(f64) -> f64) -> Transformation {
         Transformation { block, cause, truth, sigma, is_uneven: false }
     }
@@ -407,6 +407,7 @@ const TRANSFORMATIONS: [Transformation; 16] = {
     const RADIANS: &str = "attitudes are radians named degrees";
     const DEGREES: &str = "attitudes are degrees named radians";
     const SPEEDS: &str = "velocities are km/h, not m/s";
+    const EXCHANGED: &str = "north and east velocity are exchanged, as in east, north, up";
     const OF_EAST: &str = "yaw is 90° − ψ, counted from east to north: write it from north to east";
     const REVERSED: &str = "yaw has the other sign: write it from north to east";
     [
@@ -415,8 +416,8 @@ const TRANSFORMATIONS: [Transformation; 16] = {
         variance(2, "standard deviations of attitude are variances"),
         new(1, SPEEDS, |x| with_velocity(x, |v| v / KM_H), |s| s),
         new(1, SPEEDS, |x| with_velocity(x, |v| v / KM_H), |s| s / KM_H),
-        new(1, "velocities are east, north, up, named north, east, down",
-            |x| with_velocity(x, |v| DVec3::new(v.y, v.x, -v.z)), |s| s),
+        new(1, EXCHANGED, |x| with_velocity(x, |v| DVec3::new(v.y, v.x, -v.z)), |s| s),
+        new(1, EXCHANGED, |x| with_velocity(x, |v| DVec3::new(v.y, v.x, v.z)), |s| s),
         new(2, "standard deviations of attitude are radians named degrees", as_it_is, |s| s / DEG),
         new(2, "standard deviations of attitude are degrees named radians", as_it_is, |s| s * DEG),
         new(2, RADIANS, |x| with_angles(x, |all| all.map(|a| a * DEG)), |s| s),

@@ -139,7 +139,7 @@ fn simple_transformations_are_named() {
             row.covariance[(i, i)] = map(row.covariance[(i, i)].sqrt()).powi(2);
         }
     };
-    let cases: [(&str, Change<'_>); 12] = [
+    let cases: [(&str, Change<'_>); 13] = [
         ("deviations of position are variances", &|row| {
             sigmas(row, 0, &|s| s * s);
         }),
@@ -154,9 +154,12 @@ fn simple_transformations_are_named() {
             row.state.v_n *= 3.6;
             sigmas(row, 1, &|s| 3.6 * s);
         }),
-        ("velocities are east, north, up", &|row| {
+        ("north and east velocity are exchanged", &|row| {
             let v = row.state.v_n;
             row.state.v_n = DVec3::new(v.y, v.x, -v.z);
+        }),
+        ("north and east velocity are exchanged", &|row| {
+            row.state.v_n = DVec3::new(row.state.v_n.y, row.state.v_n.x, row.state.v_n.z);
         }),
         ("attitude are radians named", &|row| {
             sigmas(row, 2, &|s| s * DEG);
