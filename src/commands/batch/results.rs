@@ -8,7 +8,7 @@ use crate::io::atomic::{AtomicDir, guard_others};
 use crate::report::csv::{csv, flat};
 use crate::report::verdict::{tone, verdict_counts};
 use crate::report::{first_names, json};
-use indexmap::IndexMap;
+use indexmap::{IndexMap, IndexSet};
 use nav_sim_document::{
     Chart, ChartAxis, Colour, Document, Importance, Panel, Series, Table, Tone, counted,
 };
@@ -72,10 +72,10 @@ pub(super) fn merge(
             .copied()
             .filter(|cell| !fixed.is_empty() && place.is_done(cell))
     };
-    let axes = cells.iter().take(1).flat_map(|cell| &cell.labels);
+    let axes: IndexSet<&String> = cells.iter().flat_map(|c| &c.labels).map(|l| &l.0).collect();
     let mut answer = StudyAnswer {
         schema_version: 1,
-        axes: axes.map(|(axis, _)| axis.clone()).collect(),
+        axes: axes.into_iter().cloned().collect(),
         ..StudyAnswer::default()
     };
     // of each reference its cells: one setting of the other axes
@@ -332,7 +332,11 @@ impl StudyAnswer {
         let chart = |axis: &String| {
             let mut lines: BTreeMap<Vec<&str>, Vec<(f64, f64)>> = BTreeMap::new();
             for cell in &self.cells {
-                let x: f64 = cell.labels[axis].parse().ok()?;
+                // A label of another axis may bring this one with it.
+                let Some(label) = cell.labels.get(axis) else {
+                    continue;
+                };
+                let x: f64 = label.parse().ok()?;
                 let name = cell
                     .labels
                     .iter()
