@@ -263,10 +263,8 @@ fn in_order(composite: &Composite) -> Composite {
 mod tests {
     use super::*;
     use crate::calibrate;
-    use crate::imu::Channel;
     use crate::noise::{Law, Variation};
-    use crate::tests::{imu, inferred, recorded, settings, white_and_walk};
-    use approx::assert_relative_eq;
+    use crate::tests::*;
 
     const RECORDINGS: usize = 4;
     const SAMPLES: usize = 2048;

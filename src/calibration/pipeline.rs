@@ -176,11 +176,8 @@ pub(crate) fn fit_given(curve: Curve, model: &str, rate_hz: f64) -> Outcome {
 mod tests {
     use super::*;
     use crate::curve::Scope;
-    use crate::imu::Sensor;
-    use crate::noise::{Composite, Process};
     use crate::outcome::FitRange;
-    use crate::tests::{exact, white_and_walk};
-    use approx::assert_relative_eq;
+    use crate::tests::*;
 
     /// White noise and random walk of which the middle scales are without a root, their classical variances a tenth of the model's
     /// at one of them: the fit counts that scale, and no other that bounds it from far above.

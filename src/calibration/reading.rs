@@ -90,11 +90,9 @@ fn slopes(outcome: &Outcome, rate_hz: f64) -> Option<Outcome> {
 
 #[cfg(test)]
 mod tests {
-    use crate::noise::Process;
     use crate::outcome::Outcome;
     use crate::pipeline::fit_given;
-    use crate::tests::{exact, white_and_walk};
-    use approx::assert_abs_diff_eq;
+    use crate::tests::*;
 
     /// White noise and random walk, exact but for a vibration at these levels.
     fn outcome(vibrating: &[u32]) -> Outcome {

@@ -1,11 +1,10 @@
 //! The model that is true is the one chosen.
 
 use super::*;
-use crate::imu::{Axis, Channel, Sensor};
-use crate::noise::{Composite, Process, Synthesizer};
+use crate::noise::Synthesizer;
 use crate::rng::StreamKey;
-use crate::tests::{inferred, measured, plain_settings, white_and_walk};
-use crate::{FitRange, ModelChoice, Outcome, Pool, Weighting, calibrate, grouped};
+use crate::tests::*;
+use crate::{FitRange, ModelChoice, Outcome, calibrate, grouped};
 
 fn settings() -> Settings {
     Settings {

@@ -1,13 +1,21 @@
 //! Noise, recordings and laboratories that the tests of several modules share.
 
-use crate::curve::{Estimator, Group, Pool, Replicate, Trim, grouped, replicates};
-use crate::imu::Channel;
-use crate::noise::{Composite, Model, Process, Spread, VirtualImu};
+pub(crate) use crate::Weighting;
+pub(crate) use crate::curve::Pool;
+use crate::curve::{Estimator, Group, Replicate, Trim, grouped, replicates};
+pub(crate) use crate::imu::{Axis, Channel, Sensor};
+pub(crate) use crate::noise::{Composite, Model, Process};
+use crate::noise::{Spread, VirtualImu};
 use crate::outcome::{Bootstrap, ModelChoice, Outcome, Settings};
-use crate::rng::{Generator, StreamKey};
-use crate::wavelet::{Curve, RobustVariance, Tuning, both};
-use crate::{Weighting, calibrate, infer};
-use rand_distr::{Distribution, StandardNormal};
+pub(crate) use crate::rng::Generator;
+use crate::rng::StreamKey;
+pub(crate) use crate::wavelet::Tuning;
+use crate::wavelet::{Curve, RobustVariance, both};
+use crate::{calibrate, infer};
+pub(crate) use approx::{assert_abs_diff_eq, assert_relative_eq};
+pub(crate) use rand::{RngExt, SeedableRng};
+use rand_distr::Distribution;
+pub(crate) use rand_distr::StandardNormal;
 
 pub(crate) fn generator(seed: u64, run: u64) -> Generator {
     let key = StreamKey {

@@ -3,10 +3,9 @@
 use super::*;
 use crate::curve::{Pool, grouped, replicates};
 use crate::imu::Recording;
-use crate::noise::{Composite, Model, Process};
 use crate::outcome::Settings;
 use crate::pipeline::calibrate;
-use crate::tests::{generator, imu, normal, settings};
+use crate::tests::*;
 use rayon::prelude::*;
 
 const RECORDINGS: usize = 6;

@@ -204,15 +204,9 @@ mod tests {
     }
 
     #[test]
-    fn draws_come_back_as_models_to_the_last_bit() {
+    fn draws_are_models_to_the_last_bit() {
         let (model, file) = file();
-        let place = tempfile::tempdir().unwrap();
-        let path = place.path().join("m.toml");
-        assert!(read(&path).unwrap().is_none());
-        std::fs::write(beside(&path), serde_json::to_string(&file).unwrap()).unwrap();
-        let found = read(&path).unwrap().unwrap();
-        assert_eq!(found, file);
-        let draws = found.draws(&model).unwrap();
+        let draws = file.draws(&model).unwrap();
         assert_eq!(
             draws.models[1],
             Model::pooled(100.0, &axis(1.2), &axis(2.4))

@@ -126,7 +126,7 @@ fn damp(ins: &mut Strapdown, truth: &NavState, dt: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{DQuat, DVec3};
+    use crate::tests::*;
 
     /// Ten hours of a car at 10 Hz: rounding alone would have left the ground by e^90.
     #[test]

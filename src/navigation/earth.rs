@@ -241,8 +241,7 @@ pub fn e_to_n(lat: f64, lon: f64, v_e: DVec3) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::DEG;
-    use approx::assert_abs_diff_eq;
+    use crate::tests::*;
 
     /// WGS-84 report, table 3.4 and 3.5: derived geometric and physical constants.
     #[test]

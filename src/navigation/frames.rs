@@ -99,8 +99,7 @@ pub fn wrap_angle(angle: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::DEG;
-    use approx::assert_abs_diff_eq;
+    use crate::tests::*;
 
     #[test]
     fn euler_angles_rotate_in_the_order_yaw_pitch_roll() {

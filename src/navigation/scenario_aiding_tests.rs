@@ -1,20 +1,12 @@
 //! Measurements of a vehicle by itself: closed forms, and runs beside the covariance analysis.
 
 use super::Scenario;
-use crate::ekf::FilterStates;
-use crate::frames::RollPitchYaw;
 use crate::monte_carlo::run;
-use crate::noise::Model;
-use crate::sensors::imu::Truth;
-use crate::sensors::outage::Outage;
 use crate::simulation::REPORTED;
 use crate::simulation::lincov::{
-    AssessedInstant, FilterPass, STRAPDOWN, Track, TruthSide, strapdown_over_sigma,
+    AssessedInstant, STRAPDOWN, Track, TruthSide, strapdown_over_sigma,
 };
-use crate::tests::{drive, gauss_markov, samples};
-use crate::trajectory::Trajectory;
-use crate::units::DEG;
-use approx::{assert_abs_diff_eq, assert_relative_eq};
+use crate::tests::*;
 
 const RATE_HZ: f64 = 50.0;
 pub(crate) const OUTAGE: Outage = Outage {

@@ -1,9 +1,7 @@
 //! Scenarios as files have them.
 
 use super::*;
-use crate::noise::{Composite, Process};
-use crate::simulation::lincov::FilterPass;
-use crate::tests::drive;
+use crate::tests::*;
 
 /// Ten seconds at rest.
 fn standing() -> Trajectory {

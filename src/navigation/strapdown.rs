@@ -260,10 +260,8 @@ struct MidStep<L> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::earth::{self, gravity_down, radii};
-    use crate::frames::RollPitchYaw;
-    use crate::units::DEG;
-    use glam::{DQuat, DVec3};
+    use crate::earth::gravity_down;
+    use crate::tests::*;
 
     /// Angle between two attitudes (rad), exact for small ones (an arc cosine is not).
     fn angle(a: DQuat, b: DQuat) -> f64 {

@@ -1,11 +1,24 @@
 //! Random streams, drives, states and models that the tests of several modules share.
 
-use crate::frames::NavState;
-use crate::noise::{Composite, Model, Process};
+pub(crate) use crate::earth;
+pub(crate) use crate::earth::{GravityModel, radii};
+pub(crate) use crate::ekf::{Belief, FilterStates, InitialSettings};
+pub(crate) use crate::frames::{NavState, RollPitchYaw};
+pub(crate) use crate::lanes::Vec3;
+pub(crate) use crate::noise::{Composite, Model, Process};
 use crate::rng::StreamKey;
+pub(crate) use crate::sensors::imu::Truth;
+pub(crate) use crate::sensors::outage::Outage;
+pub(crate) use crate::simulation::lincov::FilterPass;
+pub(crate) use crate::strapdown::Strapdown;
+pub(crate) use crate::trajectory::Trajectory;
+use crate::trajectory::TrajectorySample;
 use crate::trajectory::profile::{Bank, Profile, ProfileStart, Segment};
-use crate::trajectory::{Trajectory, TrajectorySample};
-use glam::{DQuat, DVec3};
+pub(crate) use crate::units::DEG;
+pub(crate) use approx::{assert_abs_diff_eq, assert_relative_eq};
+pub(crate) use glam::{DQuat, DVec3};
+pub(crate) use nalgebra::DMatrix;
+pub(crate) use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 

@@ -1,20 +1,11 @@
 //! The automatic start on drives that are slow, stop and go, or go backwards, with a phone's IMU: as good as it
 //! says, and never the wrong way round.
 
-use crate::shared::{data, outage, shipped_model};
-use glam::DQuat;
-use nav_sim::navigation::ekf::{Belief, FilterStates};
-use nav_sim::navigation::frames::RollPitchYaw;
+use crate::shared::*;
+use nav_sim::navigation::fusion::Finding;
 use nav_sim::navigation::fusion::alignment::{Alignment, coarse};
-use nav_sim::navigation::fusion::{Finding, Settings};
-use nav_sim::navigation::metrics::VerdictKind;
-use nav_sim::navigation::scenario::Scenario;
-use nav_sim::navigation::sensors::imu::Truth;
 
-use nav_sim::navigation::simulation::{Plan, SimulatedRecording, record};
-use nav_sim::navigation::trajectory::{Trajectory, TrajectorySample};
-use nav_sim::signal::imu::Sensor;
-use nav_sim::signal::noise::Model;
+use nav_sim::navigation::simulation::record;
 use nav_sim_navigation::earth::radii;
 use nav_sim_navigation::frames::wrap_angle;
 

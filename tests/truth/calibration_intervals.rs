@@ -2,18 +2,17 @@
 //! it anew, calibrates, and states intervals; those hold what the filter of the true model states, and the errors that
 //! the laboratory's own filter truly has.
 
+use crate::shared::*;
 use nav_sim::app::Context;
 use nav_sim::calibration::{
-    Bootstrap, Estimator, ModelChoice, Pool, Settings, calibrate, grouped, infer, replicates,
+    Bootstrap, ModelChoice, Pool, Settings, calibrate, grouped, infer, replicates,
 };
 use nav_sim::commands::run::{NavigateInputs, TrueImu, navigate};
 use nav_sim::io::draws_file::{Draws, DrawsFile};
 use nav_sim::navigation::metrics::Summary;
-use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::simulation::REPORTED_NAMES;
-use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::signal::imu::Channel;
-use nav_sim::signal::noise::{Composite, Model, Process, VirtualImu};
+use nav_sim::signal::noise::VirtualImu;
 
 /// What every laboratory has.
 struct World {

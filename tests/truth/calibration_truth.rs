@@ -1,9 +1,8 @@
 //! Theory and estimators against numbers from independent implementations (`tests/data/README.md`).
 
-use nav_sim::calibration::{Termination, Weighting, fit};
-use nav_sim::signal::noise::{Composite, Process};
+use crate::shared::*;
+use nav_sim::calibration::{Termination, fit};
 use nav_sim::signal::wavelet;
-use nav_sim::signal::wavelet::{Curve, Tuning};
 use nav_sim_signal::wavelet::{coefficient_count, interval};
 use serde_json::Value;
 

@@ -1,18 +1,11 @@
 //! Filters whose models are right are as sure as they should be, on three shipped trajectories, with 15 states
 //! and with all states of the model; a model that is wrong by 4 in any parameter shows.
 
-use crate::shared::{gauss_markov, outage, shipped, shipped_model, two_sided};
-use approx::assert_abs_diff_eq;
-use nav_sim::navigation::ekf::{Belief, FilterStates};
-use nav_sim::navigation::metrics::{EpochMetrics, Expected};
+use crate::shared::*;
+use nav_sim::navigation::metrics::EpochMetrics;
 use nav_sim::navigation::monte_carlo;
-use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::gnss::BaroSettings;
-use nav_sim::navigation::sensors::imu::Truth;
-use nav_sim::navigation::sensors::outage::Outage;
-use nav_sim::navigation::simulation::{NEES_DOF, RunRecord, RunResult};
-use nav_sim::navigation::trajectory::Trajectory;
-use nav_sim::signal::noise::{Model, Process};
+use nav_sim::navigation::simulation::{NEES_DOF, RunRecord};
 use statrs::distribution::{Binomial, DiscreteCDF};
 
 const RUNS: u64 = 48;

@@ -1,15 +1,12 @@
 //! Fixes whose errors last: named from the innovations alone, and answered so that the solution is to be believed.
 
 use crate::fusion::{belief, recorded, settings};
-use crate::shared::{data, shipped, shipped_model};
-use glam::DVec3;
-use nav_sim::navigation::fusion::{Correlation, Recorded, fuse_correlated, outcome};
+use crate::shared::*;
+use nav_sim::navigation::fusion::{Correlation, fuse_correlated, outcome};
 use nav_sim::navigation::gnss::GnssVelocity;
-use nav_sim::navigation::sensors::gnss::GnssSettings;
-use nav_sim::navigation::trajectory::reference::Reference;
 use nav_sim::signal::rng::Generator;
 use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
+use rand_distr::Distribution;
 
 /// What became of drives with fixes of 3 m, white or lasting so many seconds, of which the receiver states 3 m.
 #[derive(Debug, Default)]

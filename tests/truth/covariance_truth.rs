@@ -1,11 +1,8 @@
 //! The filter's standard deviations against an independent implementation (provenance in tests/data).
 
-use glam::DVec3;
-use nav_sim::navigation::earth::GravityModel;
-use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
-use nav_sim::navigation::frames::{NavState, RollPitchYaw};
+use crate::shared::*;
+use nav_sim::navigation::frames::NavState;
 use nav_sim::signal::imu::ImuSample;
-use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::ekf::{Ekf, Fix, advance, settle, update};
 use nav_sim_navigation::strapdown::Strapdown;

@@ -1,12 +1,8 @@
 //! Causes of a solution that is not to be believed, found in its recording: an antenna elsewhere, fixes that are late.
 
 use crate::fusion::{belief, model, plainly_recorded, recorded, run, settings};
-use crate::shared::{data, shipped};
-use glam::{DQuat, DVec3};
-use nav_sim::navigation::fusion::{Displaced, Recorded, Settings, displaced, outcome};
-use nav_sim::navigation::sensors::gnss::GnssSettings;
-use nav_sim::navigation::trajectory::reference::Reference;
-use nav_sim::navigation::trajectory::{Trajectory, TrajectorySample};
+use crate::shared::*;
+use nav_sim::navigation::fusion::{Displaced, displaced, outcome};
 
 /// Front, right, down (m).
 const ARM: DVec3 = DVec3::new(-1.5, 0.4, -0.9);

@@ -1,12 +1,10 @@
 //! What estimates are off by in the mean. Quantization noise in robust fits: its wavelet coefficients are not Gaussian, and
 //! the estimators know by how much their variance is read high. Last scales: what is low by chance does not rule the fit.
 
-use nav_sim::calibration::{
-    Estimator, ModelSpec, Replicate, Trim, Weighting, average, fit, implied,
-};
-use nav_sim::signal::noise::{Composite, Process, Synthesizer};
-use nav_sim::signal::rng::StreamKey;
-use nav_sim::signal::wavelet::{Curve, Tuning, both};
+use crate::shared::*;
+use nav_sim::calibration::{Replicate, Trim, average, fit, implied};
+use nav_sim::signal::noise::Synthesizer;
+use nav_sim::signal::wavelet::both;
 use nav_sim_calibration::trend;
 use rayon::prelude::*;
 

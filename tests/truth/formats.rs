@@ -1,10 +1,9 @@
 //! The examples of `calib_data/`: one recording in every format, and the virtual IMUs.
 
-use crate::shared::root;
+use crate::shared::*;
 use nav_sim::io::model_file;
 use nav_sim::io::recordings::{ReadOptions, read};
 use nav_sim::signal::imu::Recording;
-use nav_sim::signal::noise::Composite;
 
 fn recording(name: &str, rate_hz: Option<f64>) -> Recording {
     let options = ReadOptions {

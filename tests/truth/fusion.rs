@@ -2,23 +2,14 @@
 //! any way.
 
 use crate::common::drive::{DRIVE, MODEL, place_with};
-use crate::shared::{data, inside, outage, shipped};
-use approx::{assert_abs_diff_eq, assert_relative_eq};
-use glam::{DQuat, DVec3};
+use crate::shared::*;
 use nav_sim::io::model_file;
-use nav_sim::navigation::earth::GravityModel;
-use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
 
-use nav_sim::navigation::fusion::{Recorded, Row, Settings, Solution, Start, fuse, outcome};
+use nav_sim::navigation::fusion::{Row, Solution, outcome};
 use nav_sim::navigation::gnss::{GnssFix, GnssVelocity};
-use nav_sim::navigation::scenario::Scenario;
-use nav_sim::navigation::sensors::gnss::GnssSettings;
-use nav_sim::navigation::sensors::imu::Truth;
 
-use nav_sim::navigation::simulation::{Plan, SimulatedRecording, record};
-use nav_sim::navigation::trajectory::Trajectory;
-use nav_sim::signal::imu::{ImuIncrement, Sensor};
-use nav_sim::signal::noise::Model;
+use nav_sim::navigation::simulation::record;
+use nav_sim::signal::imu::ImuIncrement;
 use nav_sim_navigation::fusion::bridged;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 

@@ -2,14 +2,14 @@
 //! non-negative amplitudes by trying every subset, shapes by random starts and a simplex search. Of robust curves the
 //! factor by which they read quantization noise is iterated with the amplitudes.
 
+use crate::shared::*;
 use nalgebra::{DMatrix, DVector};
-use nav_sim::calibration::{ModelSpec, Weighting, fit};
-use nav_sim::signal::noise::{Composite, Kind, Process};
-use nav_sim::signal::rng::{Generator, StreamKey};
-use nav_sim::signal::wavelet::{Curve, Tuning, both};
+use nav_sim::calibration::fit;
+use nav_sim::signal::noise::Kind;
+use nav_sim::signal::rng::Generator;
+use nav_sim::signal::wavelet::both;
 use nav_sim_signal::wavelet::interval;
 use rand::RngExt;
-use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
 /// The non-negative amplitudes with the least Σ residual²: the best of the least-squares solutions of all subsets

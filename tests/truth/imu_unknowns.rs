@@ -2,14 +2,9 @@
 //! be, one that does not is far too sure.
 
 use crate::common::drive::{DRIVE, MODEL, done, nav_sim, place_with};
-use crate::shared::{gauss_markov, shipped, two_sided};
-use nav_sim::navigation::ekf::Belief;
+use crate::shared::*;
 use nav_sim::navigation::monte_carlo;
-use nav_sim::navigation::scenario::Scenario;
-use nav_sim::navigation::sensors::imu::Truth;
-use nav_sim::navigation::sensors::outage::Outage;
-use nav_sim::navigation::simulation::{NEES_DOF, RunResult};
-use nav_sim::signal::noise::{Model, Process};
+use nav_sim::navigation::simulation::NEES_DOF;
 use std::fs;
 
 const RUNS: u64 = 24;

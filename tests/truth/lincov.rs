@@ -1,12 +1,7 @@
 //! The covariance of true errors without sampling, against closed forms. (Against runs: `lincov_sampled`.)
 
-use crate::shared::{drive, outage, stands, white};
-use approx::assert_relative_eq;
-use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
-use nav_sim::navigation::scenario::Scenario;
-use nav_sim::navigation::sensors::imu::Truth;
-use nav_sim::signal::noise::{Composite, Model, Process};
-use nav_sim_navigation::simulation::lincov::{DRIFT, FilterPass, TruthSide, assess};
+use crate::shared::*;
+use nav_sim_navigation::simulation::lincov::{DRIFT, assess};
 
 const RATE_HZ: f64 = 100.0;
 

@@ -1,22 +1,14 @@
 //! What covariance analysis expects, against runs that are drawn: a drive of two minutes with an outage, for what
 //! the true IMU and the receiver can have and filters do or do not expect.
 
-use crate::shared::{outage, stands, white};
-use approx::assert_relative_eq;
-use nav_sim::navigation::earth::GravityModel;
-use nav_sim::navigation::metrics::{Estimate, Expected, epochs};
+use crate::shared::*;
+use nav_sim::navigation::metrics::{Estimate, epochs};
 use nav_sim::navigation::monte_carlo;
-use nav_sim::navigation::scenario::Scenario;
-use nav_sim::navigation::sensors::imu::Truth;
-use nav_sim::navigation::sensors::outage::Outage;
-use nav_sim::navigation::simulation::{OutageRecord, RunResult};
-use nav_sim::navigation::trajectory::Trajectory;
+use nav_sim::navigation::simulation::OutageRecord;
 
-use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::earth::gravity_down;
 use nav_sim_navigation::metrics::Budget;
 use nav_sim_navigation::simulation::Gains;
-use nav_sim_navigation::simulation::lincov::{FilterPass, TruthSide};
 
 const RATE_HZ: f64 = 100.0;
 const RUNS: u64 = 400;

@@ -2,15 +2,9 @@
 
 use crate::alignment::{Step, belief, phone, recorded, settings, trajectory};
 use crate::fusion::turned;
-use crate::shared::{data, shipped};
-use glam::{DQuat, DVec3};
-use nav_sim::navigation::ekf::{Belief, FilterStates};
-use nav_sim::navigation::frames::RollPitchYaw;
+use crate::shared::*;
 use nav_sim::navigation::fusion::alignment::coarse;
 use nav_sim::navigation::fusion::mounting::{Mounting, find};
-use nav_sim::navigation::fusion::{Recorded, Settings, fuse};
-use nav_sim::navigation::simulation::SimulatedRecording;
-use nav_sim::navigation::trajectory::reference::Reference;
 use nav_sim::signal::units::Refused;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 

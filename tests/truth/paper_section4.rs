@@ -4,15 +4,12 @@
 #[allow(dead_code, unreachable_pub, reason = "a part of the example")]
 mod study;
 
-use approx::{assert_abs_diff_eq, assert_relative_eq};
-use nav_sim::calibration::{Estimator, ModelSpec, Trim, Weighting};
-use nav_sim::signal::imu::{Axis, Channel, Sensor};
+use crate::shared::*;
+use nav_sim::calibration::Trim;
+use nav_sim::signal::imu::{Axis, Channel};
 use nav_sim::signal::noise::contamination::{Contamination, Extent, Operation, Rule};
-use nav_sim::signal::noise::{Composite, Kind, Law, Model, Parameter, Process, Spread, Variation};
-use nav_sim::signal::rng::StreamKey;
-use nav_sim::signal::wavelet::Tuning;
+use nav_sim::signal::noise::{Kind, Law, Parameter, Spread, Variation};
 use rand::RngExt;
-use rand_distr::StandardNormal;
 use study::*;
 
 const RATE: f64 = 100.0;

@@ -1,10 +1,8 @@
 //! The default filter of 15 states is as sure as it should be: true RMSE over its own sigma at the ends of outages,
 //! by covariance analysis, on the shipped IMUs and trajectories.
 
-use crate::shared::{outage, shipped, shipped_model, white_and_walk};
-use approx::assert_abs_diff_eq;
-use nav_sim::navigation::scenario::{Reduction, Scenario};
-use nav_sim::navigation::sensors::outage::Outage;
+use crate::shared::*;
+use nav_sim::navigation::scenario::Reduction;
 use nav_sim_navigation::simulation::lincov::{Assessment, assess};
 use nav_sim_signal::noise::Model;
 

@@ -1,21 +1,14 @@
 //! The IMU that a limit needs meets it in sampled runs, and answers are monotone.
 
-use crate::shared::{outage, town, white};
-use approx::{assert_abs_diff_eq, assert_relative_eq};
+use crate::shared::*;
 use nav_sim::io::datasheet::{Figure, catalogued};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::require::{
     Drift, IMU_PARAMETERS, ImuSearch, IntensityBound, Limit, LimitQuantity, Margins,
     OutagePlacements, RequireError, worst_without_imu_errors,
 };
-use nav_sim::navigation::scenario::Scenario;
-use nav_sim::navigation::sensors::imu::Truth;
-use nav_sim::navigation::sensors::outage::Outage;
-use nav_sim::navigation::trajectory::Trajectory;
-use nav_sim::signal::imu::Sensor;
-use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::simulation::REPORTED;
-use nav_sim_navigation::simulation::lincov::{FilterPass, Track, TruthSide};
+use nav_sim_navigation::simulation::lincov::Track;
 
 const OUTAGE: Outage = Outage {
     start_s: 150.0,

@@ -1,12 +1,28 @@
 //! Drives, models and laws that several of these tests need.
 
 use crate::common::drive::{MODEL, place_with};
+pub(crate) use approx::{assert_abs_diff_eq, assert_relative_eq};
+pub(crate) use glam::{DQuat, DVec3};
+pub(crate) use nav_sim::calibration::{Estimator, ModelSpec, Weighting};
 use nav_sim::io::{model_file, trajectory_file};
-use nav_sim::navigation::fusion::Recorded;
-use nav_sim::navigation::sensors::outage::Outage;
-use nav_sim::navigation::simulation::SimulatedRecording;
-use nav_sim::navigation::trajectory::Trajectory;
-use nav_sim::signal::noise::{Composite, Model, Process};
+pub(crate) use nav_sim::navigation::earth::GravityModel;
+pub(crate) use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
+pub(crate) use nav_sim::navigation::frames::RollPitchYaw;
+pub(crate) use nav_sim::navigation::fusion::{Recorded, Settings, Start, fuse};
+pub(crate) use nav_sim::navigation::metrics::{Expected, VerdictKind};
+pub(crate) use nav_sim::navigation::scenario::Scenario;
+pub(crate) use nav_sim::navigation::sensors::gnss::GnssSettings;
+pub(crate) use nav_sim::navigation::sensors::imu::Truth;
+pub(crate) use nav_sim::navigation::sensors::outage::Outage;
+pub(crate) use nav_sim::navigation::simulation::{Plan, RunResult, SimulatedRecording};
+pub(crate) use nav_sim::navigation::trajectory::reference::Reference;
+pub(crate) use nav_sim::navigation::trajectory::{Trajectory, TrajectorySample};
+pub(crate) use nav_sim::signal::imu::Sensor;
+pub(crate) use nav_sim::signal::noise::{Composite, Model, Process};
+pub(crate) use nav_sim::signal::rng::StreamKey;
+pub(crate) use nav_sim::signal::wavelet::{Curve, Tuning};
+pub(crate) use nav_sim_navigation::simulation::lincov::{FilterPass, TruthSide};
+pub(crate) use rand_distr::StandardNormal;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::path::{Path, PathBuf};
 

@@ -1,21 +1,12 @@
 //! The smoother of `fuse`: a closed form at rest, consistency over simulated recordings, and identities.
 
 use crate::fusion::{belief, model, plainly_recorded, recorded, run, settings};
-use crate::shared::{data, gauss_markov, outage, shipped, stands, two_sided, white};
-use approx::assert_relative_eq;
-use glam::DVec3;
+use crate::shared::*;
 use nalgebra::{DMatrix, DVector};
-use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
-use nav_sim::navigation::fusion::{FixCounts, FusionError, Row, Settings, Start, fuse, outcome};
-use nav_sim::navigation::fusion::{Recorded, Solution};
+use nav_sim::navigation::fusion::Solution;
+use nav_sim::navigation::fusion::{FixCounts, FusionError, Row, outcome};
 use nav_sim::navigation::gnss::GnssFix;
-use nav_sim::navigation::scenario::Scenario;
-use nav_sim::navigation::sensors::gnss::GnssSettings;
-use nav_sim::navigation::sensors::imu::Truth;
-use nav_sim::navigation::sensors::outage::Outage;
-use nav_sim::navigation::simulation::{Plan, record};
-use nav_sim::navigation::trajectory::Trajectory;
-use nav_sim::signal::noise::{Composite, Model};
+use nav_sim::navigation::simulation::record;
 use nav_sim_navigation::earth::radii;
 
 const OUTAGE: Outage = Outage {

@@ -1,14 +1,9 @@
 //! Integration error of the strapdown: covariance analysis has it as the runs do.
 
-use crate::shared::{outage, white_and_walk};
+use crate::shared::*;
 use nav_sim::app::Context;
 use nav_sim::commands::run::{NavigateInputs, TrueImu, navigate};
-use nav_sim::navigation::frames::RollPitchYaw;
-use nav_sim::navigation::metrics::VerdictKind;
-use nav_sim::navigation::scenario::{Method, Scenario};
-
-use nav_sim::navigation::trajectory::{Trajectory, TrajectorySample};
-use nav_sim::signal::noise::Model;
+use nav_sim::navigation::scenario::Method;
 
 /// 300 s northwards at 15 m/s, roll and pitch of 3° at 1.5 Hz, a quarter of a period apart: coning, of which ten samples a
 /// second see a part.

@@ -1,12 +1,9 @@
 //! The shipped trajectories are plausible and close: their noise-free IMU samples, mechanised, return to
 //! them. And ideal samples and strapdown agree with independent truth.
 
-use crate::shared::{root, shipped};
-use glam::DVec3;
+use crate::shared::*;
 use nav_sim::io::trajectory_file::load;
-use nav_sim::navigation::earth::GravityModel;
 use nav_sim::navigation::frames::NavState;
-use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::navigation::trajectory::ideal_imu::ideal_imu;
 use nav_sim_navigation::closure::{Bounds, Closure};
 use nav_sim_navigation::earth::ned_difference;

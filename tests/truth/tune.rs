@@ -1,17 +1,9 @@
 //! Tuned models are consistent: the factor of a process that is larger in truth is found, and sampled runs agree.
 
-use crate::shared::{town, white_and_walk};
-use approx::{assert_abs_diff_eq, assert_relative_eq};
-use nav_sim::navigation::ekf::Belief;
-use nav_sim::navigation::metrics::{Estimate, Expected, VerdictKind};
+use crate::shared::*;
+use nav_sim::navigation::metrics::Estimate;
 use nav_sim::navigation::monte_carlo;
-use nav_sim::navigation::scenario::Scenario;
-use nav_sim::navigation::sensors::imu::Truth;
-use nav_sim::navigation::sensors::outage::Outage;
-use nav_sim::navigation::trajectory::Trajectory;
 
-use nav_sim::signal::imu::Sensor;
-use nav_sim::signal::noise::Model;
 use nav_sim_navigation::simulation::lincov::{
     Aim, Factor, Filter, Task, Track, TrueErrors, scaled,
 };

@@ -1,9 +1,8 @@
 //! The mounting that the constraint of a road vehicle finds, with the sign that is written.
 
 use crate::fusion::{belief, model, plainly_recorded, settings, turned};
-use crate::shared::{data, shipped};
-use glam::{DQuat, DVec3};
-use nav_sim::navigation::fusion::{Recorded, Settings, Start, fuse, vehicle_velocities};
+use crate::shared::*;
+use nav_sim::navigation::fusion::vehicle_velocities;
 use nav_sim::navigation::sensors::aiding::AidingSettings;
 use nav_sim::signal::units::DEG;
 

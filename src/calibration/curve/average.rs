@@ -633,7 +633,7 @@ mod average_tests;
 #[cfg(test)]
 mod differing_tests {
     use super::*;
-    use crate::tests::{generator, normal, replicate};
+    use crate::tests::*;
     use crate::wavelet::interval::edof_eta3;
     use crate::wavelet::{RobustVariance, Status};
 

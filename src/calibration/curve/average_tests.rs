@@ -1,8 +1,7 @@
 //! Averages of replicates, by hand and on coarse steps.
 
 use super::*;
-use crate::tests::{generator, measured, normal};
-use approx::assert_relative_eq;
+use crate::tests::*;
 
 fn tuning() -> Tuning {
     Tuning::new(0.6).unwrap()

@@ -600,9 +600,7 @@ mod shape_tests {
 #[cfg(test)]
 mod implied_tests {
     use super::*;
-    use crate::noise::Process;
-    use crate::wavelet::Tuning;
-    use approx::assert_abs_diff_eq;
+    use crate::tests::*;
 
     fn model(values: [f64; 5]) -> Composite {
         Composite::new(vec![

@@ -1,10 +1,8 @@
 //! The law against signals that are made, and against closed forms.
 
 use super::*;
-use crate::noise::Process;
+use crate::tests::*;
 use crate::wavelet::classical;
-use approx::{assert_abs_diff_eq, assert_relative_eq};
-use rand::SeedableRng;
 
 /// White noise, levels 1 and 2, by hand: W at level 1 is (x' − x)/2, with autocovariances ½, −¼ (σ² = 1),
 /// so Σ s² = ¼ + 2/16 = 3/8; per coefficient nu²/Σ s² = (½)²/(3/8) = 2/3. Level 2 has ¼, 1/16·(…): the

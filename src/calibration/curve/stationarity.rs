@@ -137,10 +137,7 @@ fn out_of_place(first: f64, others: &[f64]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rng::Generator;
-    use approx::assert_abs_diff_eq;
-    use rand::{RngExt, SeedableRng};
-    use rand_distr::StandardNormal;
+    use crate::tests::*;
 
     const SAMPLES: usize = 1 << 13;
 

@@ -563,9 +563,7 @@ fn limit(mut values: Vec<f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::curve::sampling::{SamplingLaw, variance_of_log};
-    use crate::noise::{Composite, Process};
-    use approx::assert_abs_diff_eq;
-    use rand::SeedableRng;
+    use crate::tests::*;
 
     fn noise(files: usize, levels: usize, edof: f64) -> Noise {
         let white = Composite::new(vec![Process::white(1.0).unwrap()]);
@@ -637,10 +635,7 @@ mod tests {
 mod alarm_tests {
     use super::*;
     use crate::curve::sampling::SamplingLaw;
-    use crate::noise::{Composite, Process};
-    use crate::rng::Generator;
-    use rand::{RngExt, SeedableRng};
-    use rand_distr::StandardNormal;
+    use crate::tests::*;
 
     /// Four recordings of 2^16 samples whose three axes are louder or quieter together, at all scales, by 35 %: nothing is
     /// unusual in any. 100 sets know a rate of 2.5 % to 1.6 %, of which four are allowed.

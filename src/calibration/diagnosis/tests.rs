@@ -2,11 +2,9 @@
 
 use super::*;
 use crate::curve::{Estimator, Replicate};
-use crate::imu::{Axis, Channel, Sensor};
 use crate::outcome::Settings;
-use crate::tests::{generator, measured, normal, plain_settings};
-use crate::{Pool, Trim, calibrate, grouped, trend};
-use rand::RngExt;
+use crate::tests::*;
+use crate::{Trim, calibrate, grouped, trend};
 
 mod causes;
 

@@ -139,8 +139,7 @@ fn stretch(points: &[(f64, f64)], slope: f64) -> std::ops::Range<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::Process;
-    use approx::assert_relative_eq;
+    use crate::tests::*;
 
     fn curve(model: &Composite) -> Curve {
         crate::tests::exact(model, 16, |level| 1e6 / f64::from(level).exp2())

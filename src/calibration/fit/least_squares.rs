@@ -598,12 +598,8 @@ pub struct Fit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::{Composite, Parameter, Process};
-    use crate::rng::Generator;
-    use crate::tests::{exact, white_and_walk};
-    use approx::assert_relative_eq;
-    use rand::{RngExt, SeedableRng};
-    use rand_distr::StandardNormal;
+    use crate::noise::Parameter;
+    use crate::tests::*;
 
     #[test]
     fn what_is_no_wavelet_variance_is_refused() {

@@ -885,11 +885,10 @@ fn curvature(objective: &Objective, u: &[f64], at: &LinearSolution) -> Option<Ma
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Weighting;
     use crate::curve::implied;
-    use crate::noise::{Composite, Kind, Process};
-    use crate::tests::exact;
-    use crate::wavelet::{Curve, Tuning};
+    use crate::noise::Kind;
+    use crate::tests::*;
+    use crate::wavelet::Curve;
 
     /// White noise, a random walk and two AR1 to be fitted to a curve that is 10 % off at every scale.
     fn objective() -> Objective {

@@ -348,11 +348,9 @@ mod goodness_tests;
 #[cfg(test)]
 mod inference_tests {
     use super::*;
-    use crate::imu::{Axis, Channel, Sensor};
-    use crate::noise::{Composite, Kind, Model, Process};
-    use crate::tests::{generator, imu, inferred, measured, normal, plain_settings, recorded};
-    use crate::{ParameterInterval, Pool, grouped};
-    use approx::assert_abs_diff_eq;
+    use crate::noise::Kind;
+    use crate::tests::*;
+    use crate::{ParameterInterval, grouped};
 
     const CHANNEL: Channel = Channel {
         sensor: Sensor::Gyro,

@@ -1,10 +1,7 @@
 //! The level of the test.
 
 use super::*;
-use crate::imu::Channel;
-use crate::noise::Model;
-use crate::tests::{imu, inferred, recorded, settings, white_and_walk};
-use approx::assert_abs_diff_eq;
+use crate::tests::*;
 
 /// Each of 20 exchangeable statistics in its turn as the observed one: all twentieths, once each.
 #[test]

@@ -384,12 +384,8 @@ pub fn figures_with_intervals(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imu::Sensor;
-    use crate::noise::{Composite, Process};
-    use crate::tests::{exact, generator};
-    use crate::{Estimator, Scope, Weighting, fit};
-    use approx::assert_relative_eq;
-    use rand::RngExt;
+    use crate::tests::*;
+    use crate::{Estimator, Scope, fit};
     use rand_distr::ChiSquared;
 
     /// Of two AR1 with correlation times of 10 and 1000 samples a draw keeps one of 700, its other (by label the

@@ -2,8 +2,7 @@
 
 use super::*;
 use crate::curve::sampling::variance_of_log;
-use crate::tests::replicate;
-use approx::{assert_abs_diff_eq, assert_relative_eq};
+use crate::tests::*;
 
 /// Of replicates whose noise is nothing.
 fn noiseless(logs: &[f64], estimator: Estimator) -> Scatter {
@@ -45,7 +44,6 @@ fn unequal_noise_is_allowed_for() {
 /// is off by 0.09).
 #[test]
 fn a_clipped_variance_scatters_as_said() {
-    use rand::SeedableRng;
     let mut generator = Generator::seed_from_u64(2);
     for count in [5, 6, 8, 12, 24] {
         let variance = |generator: &mut Generator| {
@@ -67,9 +65,6 @@ fn a_clipped_variance_scatters_as_said() {
 /// recordings differ by `between` (of which the axes share all or nothing) and each signal scatters as 2^14 samples of
 /// white noise do at level 1, by 1.2 %.
 fn coverage(between: f64, is_shared: bool) -> f64 {
-    use crate::imu::Axis;
-    use crate::noise::{Composite, Process};
-    use rand::SeedableRng;
     const SETS: u32 = 1000;
     const SAMPLES: usize = 1 << 14;
     let tuning = Tuning::default();
@@ -123,8 +118,6 @@ fn intervals_hold_the_truth_whatever_axes_share() {
 /// which four are allowed, and 2 % for the chi-square in place of the normal law.
 #[test]
 fn a_level_that_a_short_recording_lacks_scatters_as_the_others_show() {
-    use crate::noise::{Composite, Process};
-    use rand::SeedableRng;
     let law = SamplingLaw::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 2);
     let replicate = |(name, logs): (usize, &[f64])| Replicate {
         name: name.to_string(),

@@ -431,9 +431,8 @@ mod varying_tests;
 
 #[cfg(test)]
 mod indistinct_tests {
-    use crate::imu::{Axis, Channel, Sensor};
     use crate::noise::{Parameter, ParameterRef};
-    use crate::tests::{generator, inferred, measured, normal, plain_settings};
+    use crate::tests::*;
     use crate::*;
 
     const SAMPLES: usize = 32_768;

@@ -2,9 +2,8 @@
 
 use super::*;
 use crate::Estimator;
-use crate::imu::Channel;
-use crate::noise::{Law, Model, Spread, Variation};
-use crate::tests::{imu, inferred, recorded, settings, white_and_walk};
+use crate::noise::{Law, Spread, Variation};
+use crate::tests::*;
 
 const SAMPLES: usize = 4096;
 const LABORATORIES: u64 = 30;

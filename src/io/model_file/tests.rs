@@ -191,29 +191,6 @@ fn mistakes_are_refused_with_line_key_value_and_hint() {
     ));
 }
 
-mod garbage {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        /// No text makes the reader panic; sound files survive a change of any one byte.
-        #[test]
-        fn never_panics(at in 0usize..2000, byte in any::<char>(), cut in 0usize..2000) {
-            let file = ModelFile::new(Model::pooled(100.0, &n2(), &n2()));
-            let mut text: Vec<char> = to_toml(&file).chars().collect();
-            let n = text.len();
-            text[at % n] = byte;
-            let text: String = text.into_iter().skip(cut % 50).collect();
-            let _ = read_text(&text);
-        }
-
-        #[test]
-        fn never_panics_on_noise(text in ".{0,200}") {
-            let _ = read_text(&text);
-        }
-    }
-}
-
 #[test]
 fn turn_on_biases_are_one_or_three_standard_deviations() {
     let read = |text: &str| read_text(&turn_on_text(text)).unwrap().turn_on.unwrap();

@@ -1,7 +1,6 @@
 mod clocks;
 mod doubts;
 mod facts;
-mod garbage;
 mod gravity;
 mod texts;
 

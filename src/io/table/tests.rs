@@ -3,7 +3,6 @@
 use super::*;
 use crate::io::recordings::DICTIONARY;
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
-use proptest::prelude::*;
 
 fn found(name: &str) -> Option<(&'static str, Option<f64>)> {
     quantity::find(DICTIONARY.quantities, name).map(|(quantity, factor)| (quantity.name, factor))
@@ -160,14 +159,6 @@ fn columns_beyond_the_memory_are_refused_with_both_figures() {
             && text.ends_with(" MiB are free"),
         "{text}"
     );
-}
-
-proptest! {
-    #[test]
-    fn never_panics_on_bytes(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
-        let reader = Box::new(Cursor::new(bytes));
-        let _ = read_text("a.csv", reader, &DICTIONARY);
-    }
 }
 
 /// Time stamps have the unit of their type, decimals their scale, and a text is no number.

@@ -725,14 +725,10 @@ mod covariance_tests;
 #[cfg(test)]
 mod transition_tests {
     use super::*;
-    use crate::earth::GravityModel;
     use crate::ekf::tests::{gauss_markov_model, manoeuvre, predict};
-    use crate::ekf::{Belief, FilterStates, InitialSettings, UnknownKind, settle};
+    use crate::ekf::{UnknownKind, settle};
     use crate::imu::Sensor;
-    use crate::strapdown::Strapdown;
-    use crate::tests::state;
-    use approx::assert_abs_diff_eq;
-    use glam::DVec3;
+    use crate::tests::*;
 
     /// A covariance as large as this one, with correlations all over.
     fn correlated(p: &DMatrix<f64>) -> DMatrix<f64> {

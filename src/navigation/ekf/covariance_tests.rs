@@ -1,8 +1,8 @@
 //! The blocks of the covariance against dense products.
 
 use super::*;
-use approx::{assert_abs_diff_eq, assert_relative_eq};
-use nalgebra::{DMatrix, DVector};
+use crate::tests::*;
+use nalgebra::DVector;
 
 /// A covariance with the same positive definite matrix in all lanes, and that matrix.
 fn example(blocks: usize) -> (Covariance, DMatrix<f64>) {

@@ -1,16 +1,10 @@
 //! The iterated update against central differences, and against the update that linearises once.
 
 use super::*;
-use crate::earth::GravityModel;
 use crate::ekf::tests::{error_of, fix_at_nominal, generator, random_case};
-use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings, advance, update};
-use crate::frames::NavState;
+use crate::ekf::{FixUpdate, advance, update};
 use crate::imu::ImuSample;
-use crate::lanes::Vec3;
-use crate::noise::Model;
-use approx::assert_abs_diff_eq;
-use glam::DQuat;
-use rand::RngExt;
+use crate::tests::*;
 
 /// exp and its logarithm, which the Jacobians are of.
 fn exp(psi: &Vector3<f64>) -> DQuat {

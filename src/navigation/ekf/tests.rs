@@ -6,18 +6,11 @@ mod measurements;
 use super::covariance::{EarthStep, EarthTerms, ErrorMap, PSI, R, Sample, V};
 use super::update::dense;
 use super::{Belief, Ekf, FilterStates, Fix, InitialSettings, advance, settle, update};
-use crate::earth::{self, GravityModel};
-use crate::frames::NavState;
 use crate::imu::ImuSample;
-use crate::lanes::{Lanes, Level, Vec3};
-use crate::noise::Model;
+use crate::lanes::{Lanes, Level};
 use crate::rng::Generator;
-use crate::strapdown::Strapdown;
-use crate::tests::{gauss_markov, key, state};
-use approx::assert_abs_diff_eq;
-use glam::{DQuat, DVec3};
-use nalgebra::{DMatrix, Matrix3, SMatrix};
-use rand::RngExt;
+use crate::tests::*;
+use nalgebra::{Matrix3, SMatrix};
 
 pub(super) type Matrix15 = SMatrix<f64, 15, 15>;
 

@@ -8,15 +8,9 @@ use super::tests::{
     gauss_markov_model, generator, manoeuvre, measurement_rows, predict, random_case, start,
 };
 use super::{Belief, Ekf, FilterStates, InitialSettings, UnknownKind, settle, update};
-use crate::earth::{self, GravityModel};
-use crate::frames::NavState;
 use crate::imu::Sensor;
-use crate::lanes::{Lanes, Level, Vec3};
-use crate::noise::{Composite, Model, Process};
-use crate::strapdown::Strapdown;
-use approx::{assert_abs_diff_eq, assert_relative_eq};
-use glam::{DQuat, DVec3};
-use nalgebra::DMatrix;
+use crate::lanes::{Lanes, Level};
+use crate::tests::*;
 
 /// First states of the unknowns of accelerometer and gyroscope: 9 + 6 biases, then drift and scale factor of each.
 const UNKNOWNS: usize = 15;

@@ -285,9 +285,7 @@ pub fn earlier(gnss: &[GnssFix], seconds: f64) -> Vec<GnssFix> {
 mod tests {
     use super::*;
     use crate::earth::moved;
-    use crate::tests::key;
-    use approx::assert_abs_diff_eq;
-    use rand::RngExt;
+    use crate::tests::*;
 
     /// A drive of ten minutes at 10 m/s whose course turns by `rate(t)`, an IMU at 50 Hz in any attitude, and so many fixes a
     /// second whose clock is `late_s` ahead of the IMU's; the velocities of more than one are 0.05 m/s off to either side.

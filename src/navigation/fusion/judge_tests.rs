@@ -1,8 +1,6 @@
 use super::*;
 use crate::earth::moved;
-use crate::tests::{normals, profile, samples};
-use crate::trajectory::Trajectory;
-use approx::assert_relative_eq;
+use crate::tests::*;
 
 /// Figures of eight for 800 s at 12 m/s.
 fn drive() -> Trajectory {

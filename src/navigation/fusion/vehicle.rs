@@ -374,8 +374,7 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
 #[cfg(test)]
 mod standstill_tests {
     use super::*;
-    use crate::tests::normals;
-    use approx::assert_abs_diff_eq;
+    use crate::tests::*;
 
     const RATE_HZ: f64 = 100.0;
     const N: usize = 50;

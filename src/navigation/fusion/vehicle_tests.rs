@@ -6,19 +6,13 @@ use super::{
     Recorded, Settings, Solution, Start, VehicleVelocity, WheelSpeed, aid_innovations, fuse,
     vehicle_velocities,
 };
-use crate::ekf::Belief;
 use crate::imu::ImuIncrement;
+use crate::tests::*;
 
 use crate::scenario::aiding_tests::{OUTAGE, consumer, scenario, town};
 
-use crate::sensors::imu::Truth;
-use crate::sensors::outage::Outage;
-use crate::simulation::lincov::{FilterPass, TruthSide};
+use crate::simulation::lincov::TruthSide;
 use crate::simulation::{Plan, SimulatedRecording, record};
-use crate::tests::{assert_chi_square, normals};
-use crate::trajectory::Trajectory;
-use approx::{assert_abs_diff_eq, assert_relative_eq};
-use glam::{DQuat, DVec3};
 
 pub(super) fn settings() -> Settings {
     Settings {

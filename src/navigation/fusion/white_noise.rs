@@ -127,9 +127,8 @@ mod tests {
     use super::super::vehicle_tests::{settings, start_of, without_aids};
     use super::*;
     use crate::scenario::aiding_tests::{consumer, scenario, town};
-    use approx::assert_relative_eq;
+    use crate::tests::*;
 
-    use crate::sensors::imu::Truth;
     use crate::simulation::{Plan, record};
 
     /// White noise `times` that of the model, in a drive of 90 s at 50 Hz with turns and a stop. Fourth differences of 13 500

@@ -648,8 +648,7 @@ mod consistency_tests {
 #[cfg(test)]
 mod quadratic_form_tests {
     use super::*;
-    use crate::tests::normals;
-    use approx::{assert_abs_diff_eq, assert_relative_eq};
+    use crate::tests::*;
     use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
     fn form_of(terms: impl IntoIterator<Item = (f64, f64)>) -> QuadraticForm {

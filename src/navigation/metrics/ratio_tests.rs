@@ -1,6 +1,5 @@
 use super::*;
-use crate::tests::normals;
-use approx::{assert_abs_diff_eq, assert_relative_eq};
+use crate::tests::*;
 
 fn run(run: u64, see: f64, error: f64) -> RunRecord {
     let outage = OutageRecord {

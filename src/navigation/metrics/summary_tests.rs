@@ -2,8 +2,7 @@ use super::*;
 use crate::metrics::{Requirement, VerdictKind};
 
 use crate::simulation::{EpochSums, OutageRecord, RunRecord};
-use crate::tests::normals;
-use approx::assert_abs_diff_eq;
+use crate::tests::*;
 
 /// Runs of a filter that is right by construction: errors drawn from its own covariance (identity).
 fn matched(runs: u64, epochs: usize) -> RunResult {

@@ -1,8 +1,7 @@
 use super::VerdictKind::{Consistent, Diverged, Overconfident, Undecided, Underconfident};
 use super::*;
 use crate::simulation::OutageRecord;
-use crate::tests::normals;
-use approx::{assert_abs_diff_eq, assert_relative_eq};
+use crate::tests::*;
 
 /// Runs of one outage whose errors are `scale` times what the filter believes in each state; `epochs`
 /// independent ones a run.

@@ -1,22 +1,15 @@
 //! The whole chain, trajectory to sums, against statistics and against itself on other threads.
 
 use super::*;
-use crate::earth::{self, GravityModel};
-use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings};
-use crate::frames::RollPitchYaw;
+use crate::ekf::FixUpdate;
 use crate::imu::Channel;
-use crate::noise::{Composite, Model, Process, VirtualImu};
+use crate::noise::VirtualImu;
 use crate::rng::StreamKey;
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::defects::{Defects, ImuSettings};
 use crate::sensors::gnss::{BaroSettings, GnssSettings};
-use crate::sensors::imu::Truth;
-use crate::sensors::outage::Outage;
 use crate::simulation::{Gains, NEES_DOF};
-use crate::tests::{assert_chi_square, gauss_markov, key, samples};
-use crate::trajectory::Trajectory;
-use crate::units::DEG;
-use approx::assert_relative_eq;
+use crate::tests::*;
 
 /// A winding drive of the given length, knots at 2 Hz.
 fn trajectory(duration_s: f64) -> Trajectory {

@@ -715,8 +715,7 @@ impl Default for HeadingErrors {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::key;
-    use approx::assert_abs_diff_eq;
+    use crate::tests::*;
 
     /// A Gauss-Markov error after t has the autocorrelation e^(−t/τ); that of n steps has a deviation of √((1 − ρ²)/n).
     #[test]

@@ -363,7 +363,7 @@ mod tests {
 #[cfg(test)]
 mod drawn_tests {
     use super::{Temperature, Vibration, *};
-    use crate::tests::key;
+    use crate::tests::*;
 
     /// Mean and variance of each element over runs: n draws of a normal deviation s have mean 0 ± s/√n and
     /// mean square s² (1 ± √(2/n)); 48 elements, 5 deviations.

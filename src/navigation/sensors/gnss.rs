@@ -188,7 +188,7 @@ pub struct BaroSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::key;
+    use crate::tests::*;
 
     #[test]
     fn velocity_may_be_none_and_survives_a_round_trip() {

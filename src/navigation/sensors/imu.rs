@@ -316,7 +316,7 @@ fn level_at(signal: &[f64], start: usize, span: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::imu::Signal;
-    use crate::tests::{key, normals};
+    use crate::tests::*;
 
     fn recording(samples: &[f64], rate_hz: f64) -> Recording {
         let signal = |channel: Channel| Signal {

@@ -135,12 +135,8 @@ impl ExactSizeIterator for IdealSamples<'_> {}
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::earth::{omega_en_n, omega_ie_n, radii};
-    use crate::frames::RollPitchYaw;
-    use crate::tests::samples;
-    use crate::units::DEG;
-    use approx::assert_abs_diff_eq;
-    use glam::DQuat;
+    use crate::earth::{omega_en_n, omega_ie_n};
+    use crate::tests::*;
 
     const WGS84: GravityModel = GravityModel::Wgs84;
 

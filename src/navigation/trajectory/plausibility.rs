@@ -166,8 +166,7 @@ impl VelocityMisfit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::samples;
-    use glam::DQuat;
+    use crate::tests::*;
 
     /// Due north at 10 m/s (on a sphere of 6380 km, near enough), 20 Hz, with the given shift of height.
     fn north(shift: impl Fn(f64) -> f64) -> Trajectory {

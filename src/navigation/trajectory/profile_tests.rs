@@ -1,9 +1,8 @@
 use super::*;
-use crate::earth::{GravityModel, e_to_n, gravity_down, ned_difference, radii};
+use crate::earth::{e_to_n, gravity_down, ned_difference};
 use crate::frames::wrap_angle;
-use crate::units::{DEG, STANDARD_GRAVITY};
-use approx::assert_abs_diff_eq;
-use glam::DVec3;
+use crate::tests::*;
+use crate::units::STANDARD_GRAVITY;
 
 /// From 10 s on, with ramps of a second.
 fn profile(speed: f64, segments: &str) -> Profile {

@@ -315,8 +315,7 @@ impl<'a> Steps<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::samples;
-    use glam::DQuat;
+    use crate::tests::*;
 
     /// 60 s north at 15 m/s, 20 samples a second, changed by `fault`.
     fn drive(fault: impl Fn(f64, &mut TrajectorySample)) -> Vec<TrajectorySample> {

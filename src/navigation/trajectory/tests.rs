@@ -1,7 +1,6 @@
 use super::*;
-use crate::earth::{E2, radii};
-use crate::frames::RollPitchYaw;
-use crate::tests::samples;
+use crate::earth::E2;
+use crate::tests::*;
 
 fn resting() -> Vec<TrajectorySample> {
     through(5, 1.0, |_| (46.0, 7.0, 400.0, [1.0, -2.0, 200.0]))

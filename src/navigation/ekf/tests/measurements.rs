@@ -3,9 +3,8 @@
 use super::super::update::update_height;
 use super::*;
 use crate::ekf::update::{body_velocity_rows, yaw_row as row_of_yaw};
-use crate::frames::{RollPitchYaw, wrap_angle};
-use crate::noise::{Composite, Process};
-use approx::{assert_abs_diff_eq, assert_relative_eq};
+use crate::frames::wrap_angle;
+use crate::tests::*;
 
 #[test]
 fn lever_arm_rows_agree_with_central_differences() {

@@ -1394,9 +1394,8 @@ impl Inputs {
 
 #[cfg(test)]
 mod outline_tests {
-    use crate::noise::Model;
     use crate::scenario::Scenario;
-    use crate::sensors::outage::Outage;
+    use crate::tests::*;
     use crate::trajectory::profile::{Bank, Length, Profile, ProfileStart, Segment, SegmentKind};
 
     /// A step covers two seconds or five, and every outage begins and ends where it did.
