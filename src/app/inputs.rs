@@ -224,14 +224,14 @@ impl ScenarioArgs {
         let file = self.scenario.as_deref();
         let read = file.map(scenario_file::read).transpose()?;
         let mut scenario = read.unwrap_or_default();
+        if let Some(path) = &self.gnss {
+            scenario.gnss = scenario_file::read(path)?.gnss;
+        }
         if !self.set.is_empty() {
             let over: toml::Table = self.set.join("\n").parse().refuse_within("--set")?;
             let mut table = toml::Table::try_from(&scenario).refuse()?;
             merge(&mut table, over);
             scenario = TomlSource::new("", &toml::to_string(&table).refuse()?).get()?;
-        }
-        if let Some(path) = &self.gnss {
-            scenario.gnss = scenario_file::read(path)?.gnss;
         }
         Ok(scenario)
     }

@@ -94,6 +94,9 @@ impl Command for Compare {
         let all: Vec<&PathBuf> = self.reference.iter().chain(&self.runs).collect();
         let models: Vec<_> = all.iter().filter(|path| path.is_file()).collect();
         match (all.len(), models.len(), &self.reference) {
+            (2, 2, _) if self.table.is_some() => {
+                refused("--table is for runs, not for models", "leave it out")
+            }
             (2, 2, _) => models::compare([all[0], all[1]], context),
             (_, 0, Some(reference)) => {
                 let found = Comparison {

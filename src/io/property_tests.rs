@@ -2,9 +2,12 @@
 //! or read whole.
 
 use super::draws_file::{self, DrawsFile, SignalDraws};
+use super::model_file::{self, ModelFile, TurnOn};
 use super::recordings::{ReadOptions, csv, read};
 use super::tests::Files;
+use super::trajectory_file;
 use nav_sim_signal::imu::Channel;
+use nav_sim_signal::noise::{Composite, Model, Process};
 use proptest::prelude::*;
 
 /// An array of `f64` as NumPy writes it: rows, columns, and its numbers row by row.
@@ -16,6 +19,21 @@ pub(super) fn npy([rows, columns]: [usize; 2], values: impl Iterator<Item = f64>
     bytes.extend(head.as_bytes());
     values.for_each(|x| bytes.extend(x.to_le_bytes()));
     bytes
+}
+
+/// A positive number of any size that a variance has.
+fn variance() -> impl Strategy<Value = f64> {
+    (-25.0..2.0_f64).prop_map(|power| 10_f64.powf(power))
+}
+
+fn composite() -> impl Strategy<Value = Composite> {
+    let white = variance().prop_map(|v| Process::white(v).unwrap());
+    let ar1 =
+        (0.01..0.999_999_9_f64, variance()).prop_map(|(phi, v)| Process::ar1(phi, v).unwrap());
+    let walk = variance().prop_map(|v| Process::random_walk(v).unwrap());
+    let steps = variance().prop_map(|v| Process::quantization(v).unwrap());
+    (white, ar1, walk, steps)
+        .prop_map(|(white, ar1, walk, steps)| Composite::new(vec![white, ar1, walk, steps]))
 }
 
 fn draws() -> impl Strategy<Value = DrawsFile> {
@@ -58,8 +76,35 @@ fn signals() -> impl Strategy<Value = Vec<(Channel, Vec<f64>)>> {
     })
 }
 
+/// Twelve rows one second apart, each within 20 m of a straight drive.
+fn drive() -> impl Strategy<Value = String> {
+    prop::collection::vec((-1e-4..1e-4_f64, -1e-4..1e-4_f64, -5.0..5.0_f64), 12).prop_map(|rows| {
+        let row = |(k, (lat, lon, h)): (usize, &(f64, f64, f64))| {
+            format!(
+                "{k},{},{},{},0.5,-0.25,{}\n",
+                46.5 + 1e-3 * k as f64 + lat,
+                6.5 + lon,
+                400.0 + h,
+                3 * k
+            )
+        };
+        let rows: String = rows.iter().enumerate().map(row).collect();
+        format!("t_s,lat_deg,lon_deg,h_m,roll_deg,pitch_deg,yaw_deg\n{rows}")
+    })
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_model_comes_back_bit_by_bit(accel in composite(), gyro in composite(), turn_on in 0.0..1.0_f64, rate_hz in 1.0..2000.0_f64) {
+        let mut model = Model::pooled(rate_hz, &accel, &gyro);
+        model.axes[4] = accel;
+        let turn_on = TurnOn { accel_m_s2: Some([turn_on; 3]), gyro_rad_s: Some([turn_on, 0.0, 0.1]) };
+        let file = ModelFile { turn_on: Some(turn_on), ..ModelFile::new(model) };
+        let read = model_file::from_text("a.toml".as_ref(), &model_file::to_toml(&file)).unwrap();
+        prop_assert_eq!((read.model, read.turn_on), (file.model, file.turn_on));
+    }
 
     #[test]
     fn draws_come_back_bit_by_bit_and_a_part_of_them_is_refused(file in draws(), cut in 0.0..1.0_f64) {
@@ -104,5 +149,26 @@ proptest! {
         }
         let part = case.add("b.csv.gz", &bytes[..(cut * bytes.len() as f64) as usize]);
         prop_assert!(read(&[part], &options).is_err());
+    }
+
+    /// A table of the program, read and written again, is the same to the digits that positions from the centre of the Earth have:
+    /// 2^-30 m each, a few of them; 1e-13 degrees are 11 nm.
+    #[test]
+    fn a_trajectory_comes_back(drive in drive()) {
+        let case = Files::new();
+        let again = |name: &str, text: &str| {
+            let (trajectory, _) = trajectory_file::load(&case.add(name, text), None).unwrap();
+            trajectory_file::csv(&trajectory, None)
+        };
+        let numbers = |text: &str| -> Vec<f64> {
+            text.lines().skip(1).flat_map(|line| line.split(',').map(|cell| cell.parse().unwrap())).collect()
+        };
+        let written = again("a.csv", &drive);
+        let [first, second] = [written.clone(), again("b.csv", &written)].map(|text| numbers(&text));
+        prop_assert_eq!(first.len(), second.len());
+        let digits = [0.0, 1e-13, 1e-13, 2e-8, 1e-7, 1e-7, 1e-7, 1e-11, 1e-11, 1e-11];
+        for ((a, b), digit) in first.iter().zip(&second).zip(digits.iter().cycle()) {
+            prop_assert!((a - b).abs() <= *digit, "{} {}", a, b);
+        }
     }
 }

@@ -118,12 +118,12 @@ pub(crate) fn table_text(path: &Path) -> Result<String, Failure> {
     lossy(path, u64::MAX).map_err(|e| Failure::io(path, e))
 }
 
-/// A text of at most 64 MiB.
+/// A text of at most 64 MiB, unpacked when its name ends in `.gz`.
 ///
 /// # Errors
 /// When the system refuses, it is longer, or it is not UTF-8: with the line.
 pub(crate) fn text(path: &Path) -> io::Result<String> {
-    String::from_utf8(bounded(open(path)?, LARGEST_TEXT)?)
+    String::from_utf8(bounded(table(path)?, LARGEST_TEXT)?)
         .map(without_mark)
         .map_err(|e| {
             let line = 1 + e.as_bytes()[..e.utf8_error().valid_up_to()]

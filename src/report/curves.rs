@@ -7,8 +7,7 @@ use nav_sim_document::{Mark, short_names};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::wavelet::interval;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::collections::{BTreeMap, HashSet};
 
 /// Confidence of all intervals.
 pub(crate) const CONFIDENCE: f64 = 0.95;
@@ -295,13 +294,22 @@ fn fitted(outcome: &Outcome, replicates: &[Replicate], settings: &Settings) -> F
 
 /// Names of recordings, short and without the endings of their files: `run4` of `static/run4.csv.gz`.
 pub(crate) fn recording_names<'a>(files: impl IntoIterator<Item = &'a str>) -> Vec<String> {
-    let stem = |name: String| {
-        let path = Path::new(&name);
-        let stem = path.file_prefix().map(|prefix| path.with_file_name(prefix));
-        stem.map_or_else(String::new, |stem| stem.display().to_string())
+    let stem = |name: &String| {
+        let unpacked = name.strip_suffix(".gz").unwrap_or(name);
+        // Of `imu.1.csv` the number stays.
+        let is_ending = |(_, ending): &(&str, &str)| ending.starts_with(char::is_alphabetic);
+        let parts = unpacked.rsplit_once('.').filter(is_ending);
+        parts.map_or(unpacked, |(stem, _)| stem).to_owned()
     };
     let files: Vec<&str> = files.into_iter().collect();
-    short_names(&files).into_iter().map(stem).collect()
+    let names = short_names(&files);
+    let stems: Vec<String> = names.iter().map(stem).collect();
+    let distinct: HashSet<&String> = stems.iter().collect();
+    if distinct.len() < names.iter().collect::<HashSet<_>>().len() {
+        names
+    } else {
+        stems
+    }
 }
 
 /// A sensor in words.

@@ -98,7 +98,7 @@ impl FromStr for Trim {
 
     fn from_str(text: &str) -> Result<Self, Refused> {
         let found = match text.strip_suffix('%') {
-            None => text.parse().ok().map(Self::Count),
+            None => text.parse::<u32>().ok().map(|n| Self::Count(n as usize)),
             Some(percent) => {
                 let percent = percent.trim().parse().ok();
                 let percent = percent.filter(|p| (0.0..50.0).contains(p));

@@ -120,9 +120,6 @@ impl BatchRequest {
         let directory = self.directory();
         let place = StudyDirectory(&directory);
         let cells = study.cells(self.study.parent().unwrap_or(Path::new("")))?;
-        if !study.run.contains_key("seed") {
-            context.remark("no seed in the study: 1");
-        }
         let share = find_shard(self.shard, self.shards, variable)?;
         let merged = || {
             let answer = results::merge(study, &cells, &place, context)?;
@@ -133,15 +130,15 @@ impl BatchRequest {
             Ok(BatchOutcome::Merged(Box::new(answer)))
         };
         guard(&place)?;
-        if self.merge {
-            return merged();
-        }
-        let changed = adopt(&place, &cells, self.dry_run, context);
+        let changed = adopt(&place, &cells, self.dry_run || self.merge, context);
         if let (Some((name, what)), false) = (changed.first(), self.force || self.dry_run) {
             return refused(
                 format!("cell {name} {what}"),
                 "choose another --out, or recompute with --force",
             );
+        }
+        if self.merge {
+            return merged();
         }
         let units = units(&cells, context)?;
         if self.dry_run {
@@ -162,15 +159,21 @@ impl BatchRequest {
         let todo = left();
         let failures = work(&place, &own, context)?;
         for cell in &cells {
-            let firsts: Vec<u64> = units
+            let spans: Vec<(u64, u64)> = units
                 .iter()
                 .filter(|unit| unit.cells.iter().any(|own| own.name == cell.name))
-                .map(|unit| unit.first)
+                .map(RunBlock::span)
                 .collect();
-            if firsts.len() > 1 {
-                assemble(&place, cell, &firsts, context)?;
+            if spans.len() > 1 {
+                assemble(&place, cell, &spans, context)?;
             }
         }
+        // Cells of the same content have their parts in common.
+        for cell in cells.iter().filter(|cell| place.is_done(cell)) {
+            drop(fs::remove_dir_all(place.parts(cell)));
+        }
+        // empty after the last
+        drop(fs::remove_dir(directory.join("parts")));
         if let Some((name, failure)) = failures.first() {
             let more = match failures.len() - 1 {
                 0 => String::new(),
@@ -342,6 +345,8 @@ impl BatchOutcome {
 
 // From a study to its cells: each a request of `run` without lists.
 
+/// Longest name of a cell (bytes): file systems take 255, of which parts that are being written need some.
+const LONGEST_NAME: usize = 200;
 /// More cells than this are a mistake.
 const MOST: usize = 100_000;
 
@@ -455,6 +460,12 @@ impl Study {
         let mut names = HashSet::new();
         let cells = all.into_iter().map(|(labels, run)| {
             let name = name_of(&labels);
+            if name.len() > LONGEST_NAME {
+                return refused(
+                    format!("the name {name} is too long for a directory"),
+                    "name the values under [vary]",
+                );
+            }
             if !names.insert(name.to_lowercase()) {
                 return refused(
                     format!("two cells have the name {name}"),
@@ -640,15 +651,13 @@ impl RunValidator {
                 );
             }
         }
-        let seed = match run.remove("seed") {
-            None => crate::app::DEFAULT_SEED,
-            Some(seed) => seed
-                .as_integer()
+        let stated = run.remove("seed").map(|seed| {
+            seed.as_integer()
                 .and_then(|seed| u64::try_from(seed).ok())
                 .ok_or_else(|| {
                     Failure::input(format!("\"run.seed\" = {seed} is not a whole number ≥ 0"))
-                })?,
-        };
+                })
+        });
         let keys: Vec<String> = run.keys().cloned().collect();
         for key in keys.iter().filter(|key| self.is_path(key)) {
             let resolve = |value: &mut Value| {
@@ -664,6 +673,8 @@ impl RunValidator {
         }
         let asked = Invocation::<Run>::named(&named_request(&run)?)?;
         let scenario = asked.request.scenario()?;
+        let stated = stated.transpose()?.or(scenario.run.seed);
+        let seed = stated.unwrap_or(crate::app::DEFAULT_SEED);
         let mut inputs = Vec::new();
         for (role, path) in asked.inputs()? {
             if !self.inputs.contains_key(&path) {
@@ -864,6 +875,11 @@ impl RunBlock<'_> {
     fn cost(&self) -> u64 {
         self.runs * self.cells.len() as u64
     }
+
+    /// Its first run and their number.
+    const fn span(&self) -> (u64, u64) {
+        (self.first, self.runs)
+    }
 }
 
 /// The directory of a study.
@@ -884,15 +900,16 @@ impl StudyDirectory<'_> {
             .is_some_and(|there| there.key == cell.manifest.key)
     }
 
-    fn part(&self, cell: &StudyCell, first: u64) -> PathBuf {
-        self.0
-            .join("parts")
-            .join(&cell.manifest.key[..32])
-            .join(format!("{first}.part"))
+    fn parts(&self, cell: &StudyCell) -> PathBuf {
+        self.0.join("parts").join(&cell.manifest.key[..32])
+    }
+
+    fn part(&self, cell: &StudyCell, (first, runs): (u64, u64)) -> PathBuf {
+        self.parts(cell).join(format!("{first}+{runs}.part"))
     }
 
     fn has(&self, unit: &RunBlock<'_>, cell: &StudyCell) -> bool {
-        self.is_done(cell) || (!unit.whole && read_part(&self.part(cell, unit.first)).is_some())
+        self.is_done(cell) || (!unit.whole && read_part(&self.part(cell, unit.span())).is_some())
     }
 
     /// Returns true if every cell of a unit is computed.
@@ -921,15 +938,11 @@ fn units<'a>(cells: &'a [StudyCell], context: &Context<'_>) -> Result<Vec<RunBlo
     for cell in cells {
         passes.entry(&cell.noise).or_default().push(cell);
     }
-    let mut blocks: HashMap<&Path, u64> = HashMap::new();
+    let shared = Shared::default();
     let mut units = Vec::new();
     for pass in passes.into_values() {
         let (request, runs) = (&pass[0].asked.request, pass[0].runs);
-        let block = match blocks.get(&*request.trajectory) {
-            Some(block) => *block,
-            None => block_of(request, context)?,
-        };
-        blocks.insert(&request.trajectory, block);
+        let block = block_of(request, &shared, context)?;
         let unit = |first| RunBlock {
             cells: pass.clone(),
             first,
@@ -1035,7 +1048,7 @@ fn compute(
                     failed(cell, failure);
                 }
             } else if let Some(result) = result {
-                write_part(&place.part(cell, unit.first), &result)?;
+                write_part(&place.part(cell, unit.span()), &result)?;
             }
         }
     }
@@ -1087,15 +1100,15 @@ fn write_cell(
 fn assemble(
     place: &StudyDirectory<'_>,
     cell: &StudyCell,
-    firsts: &[u64],
+    spans: &[(u64, u64)],
     context: &Context<'_>,
 ) -> Result<()> {
     if place.is_done(cell) {
         return Ok(());
     }
     let mut whole: Option<RunResult> = None;
-    for first in firsts {
-        let Some(part) = read_part(&place.part(cell, *first)) else {
+    for span in spans {
+        let Some(part) = read_part(&place.part(cell, *span)) else {
             return Ok(());
         };
         match &mut whole {
@@ -1107,11 +1120,6 @@ fn assemble(
     let context = context_of(cell, &front);
     let run = cell.asked.request.prepare(&Shared::default(), &context)?;
     write_cell(place, cell, run, whole, &context)?;
-    if let Some(parts) = place.part(cell, 0).parent() {
-        drop(fs::remove_dir_all(parts));
-        // empty after the last
-        drop(fs::remove_dir(place.0.join("parts")));
-    }
     Ok(())
 }
 

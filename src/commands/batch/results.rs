@@ -104,10 +104,15 @@ pub(super) fn merge(
             }
             answer.missing.push(name.clone());
         }
-        answer.add(
-            &read,
-            read.iter().position(|(cell, _)| cell.name == reference),
-        )?;
+        let place = read.iter().position(|(cell, _)| cell.name == reference);
+        match answer.add(&read, place) {
+            // What cannot be compared stands alone: it has been computed.
+            Err(e) if e.code() == 2 && place.is_some() => {
+                context.warn(format!("{e}: no ratios to {reference}"));
+                answer.add(&read, None)?;
+            }
+            added => added?,
+        }
     }
     answer.complete = answer.missing.is_empty();
     Ok(answer)

@@ -11,7 +11,7 @@ use crate::io::model_file::ModelFile;
 use crate::io::trajectory_file::load_reference;
 use crate::parse::{numbers, pair, positive};
 use crate::report::json;
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use nalgebra::SMatrix;
 use nav_sim_document::{Document, shortest, window};
 use nav_sim_navigation::earth::{GravityModel, radii};
@@ -457,8 +457,16 @@ impl<'a> RecordedDrive<'a> {
             context.note(note.importance, note.text);
         }
         let is_unused = |given: &FixSigma| {
-            let mut stated = gnss.iter().map(|fix| fix.pos_sigma_n / position);
-            stated.all(|sigma| (sigma - DVec3::from(given.pos_m)).length() > 1e-6 * sigma.length())
+            let is_given =
+                |sigma: DVec3, own: DVec3| (sigma - own).length() <= 1e-6 * sigma.length();
+            let of_velocity = |fix: &GnssFix| fix.velocity.zip(given.vel_m_s);
+            gnss.iter().all(|fix| {
+                let is_velocity = of_velocity(fix).is_some_and(|(v, own)| {
+                    let own = DVec2::new(own[0], own[1]);
+                    is_given((v.horizontal_sigma / velocity).extend(0.0), own.extend(0.0))
+                });
+                !is_velocity && !is_given(fix.pos_sigma_n / position, given.pos_m.into())
+            })
         };
         if unsaid.as_ref().is_some_and(is_unused) {
             context.warn(

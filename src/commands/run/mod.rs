@@ -359,9 +359,9 @@ impl Run {
 }
 
 /// Runs of this request that are summed together: the bytes of results depend on it alone, not on who computed them.
-pub(crate) fn block_of(request: &Run, context: &Context<'_>) -> Result<u64> {
+pub(crate) fn block_of(request: &Run, shared: &Shared, context: &Context<'_>) -> Result<u64> {
     Ok(block(
-        &inputs::trajectory(&request.trajectory, context)?,
+        &shared.trajectory(&request.trajectory, context)?,
         &request.scenario()?,
     ))
 }

@@ -46,7 +46,7 @@ const KNOWN: &str =
 /// # Errors
 /// Whatever is wrong with the file, with its line.
 pub fn load(path: &Path, origin: Option<[f64; 3]>) -> Result<(Trajectory, Vec<String>), Failure> {
-    let found = match read(path, origin, false) {
+    let found = match read(path, origin, Purpose::Drive) {
         Ok(None) => profile::load(path).map(|profile| (profile, Vec::new())),
         Ok(Some(rows)) => rows.trajectory(),
         Err(e) => Err(e),
@@ -64,7 +64,7 @@ pub(crate) fn load_reference(
     path: &Path,
     origin: Option<[f64; 3]>,
 ) -> Result<(Reference, Vec<String>), Failure> {
-    let found = match read(path, origin, true) {
+    let found = match read(path, origin, Purpose::Reference) {
         Ok(None) => profile::load(path).map(|profile| (profile.into(), Vec::new())),
         Ok(Some(rows)) => rows.reference(),
         Err(e) => Err(e),
@@ -78,7 +78,7 @@ fn unless_other(path: &Path) -> impl Fn(Failure) -> Failure {
 }
 
 /// The rows of a file; none of a motion profile.
-fn read(path: &Path, origin: Option<[f64; 3]>, is_partial: bool) -> Result<Option<Rows>, Failure> {
+fn read(path: &Path, origin: Option<[f64; 3]>, purpose: Purpose) -> Result<Option<Rows>, Failure> {
     let name = path.display().to_string();
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
@@ -87,7 +87,7 @@ fn read(path: &Path, origin: Option<[f64; 3]>, is_partial: bool) -> Result<Optio
         "gpx" => gpx(&name, &source::table_text(path)?).map(Some),
         ending @ ("nav" | "tum" | "csv" | "tsv" | "txt") => {
             let text = source::table_text(path)?;
-            rows(&name, &text, ending, origin, is_partial).map(Some)
+            rows(&name, &text, ending, origin, purpose).map(Some)
         }
         _ => {
             let message = format!("a trajectory file ends in {KNOWN}");
@@ -113,7 +113,7 @@ pub(crate) fn load_solution(
         let rows = fixes.iter().map(of_fix).collect();
         return Ok((rows, notes.into_iter().map(|note| note.text).collect()));
     }
-    let Some(mut rows) = read(path, origin, false).map_err(unless_other(path))? else {
+    let Some(mut rows) = read(path, origin, Purpose::Solution).map_err(unless_other(path))? else {
         let message = "a .toml file is no solution";
         let refused = Error::contents(path.display().to_string(), Place::Within, message);
         return Err(unless_other(path)(refused));
@@ -493,16 +493,30 @@ impl Rows {
 /// East-north-up to north-east-down and back: a half turn.
 const ENU_NED: DQuat = DQuat::from_xyzw(FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0, 0.0);
 
+/// What a table is read for.
+#[derive(Clone, Copy, PartialEq)]
+enum Purpose {
+    /// To drive along it: every row is needed.
+    Drive,
+    /// To compare with it: rows that cannot be used are left out.
+    Reference,
+    /// To judge it, with its standard deviations.
+    Solution,
+}
+
 /// The rows of a table. Cells out of range are refused, or their rows left out where not every row is needed.
 fn rows(
     path: &str,
     text: &str,
     ending: &str,
     origin: Option<[f64; 3]>,
-    is_partial: bool,
+    purpose: Purpose,
 ) -> Result<Rows, Error> {
+    // Standard deviations say nothing of where a vehicle was, and those of a reference may be 0 or unknown.
+    let is_sigma = |q: &Quantity| purpose != Purpose::Solution && SIGMAS.contains(&q.name);
     let dictionary = Dictionary {
-        is_partial,
+        is_partial: purpose == Purpose::Reference,
+        unwanted: Some(&is_sigma),
         bare: match ending {
             "nav" => &[KF_GINS],
             "tum" => &[TUM],
@@ -589,6 +603,8 @@ fn rows(
     if let Some(own) = velocity {
         rows.velocities = all.map(|row| triad(own, row).into()).collect();
     }
+    let is_known = |name: &String| table::find(DICTIONARY.quantities, name).is_some();
+    table.ignored.retain(|name| !is_known(name));
     let unused = (!table.ignored.is_empty())
         .then(|| format!("columns not used: {}", table.ignored.join(", ")));
     let axes = "axes of ROS: position east, north, up; body forward, left, up";
@@ -941,11 +957,11 @@ mod import_tests {
     type Loaded = Result<(Trajectory, Vec<String>), Error>;
 
     fn nav(text: &str) -> Loaded {
-        rows("truth.nav", text, "nav", None, false)?.trajectory()
+        rows("truth.nav", text, "nav", None, Purpose::Drive)?.trajectory()
     }
 
     fn tum(path: &str, text: &str, origin: Option<[f64; 3]>) -> Loaded {
-        rows(path, text, "tum", origin, false)?.trajectory()
+        rows(path, text, "tum", origin, Purpose::Drive)?.trajectory()
     }
 
     #[test]

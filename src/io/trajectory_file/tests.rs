@@ -15,7 +15,7 @@ fn read(text: &str) -> Result<(Trajectory, Vec<String>), Failure> {
 }
 
 fn read_with(text: &str, origin: Option<[f64; 3]>) -> Result<(Trajectory, Vec<String>), Failure> {
-    rows("a.csv", text, "csv", origin, false)?.trajectory()
+    rows("a.csv", text, "csv", origin, Purpose::Drive)?.trajectory()
 }
 
 /// North-east along 46.5° N at 2 rows a second, 20 rows, heading 45°, with one row replaced.
@@ -131,7 +131,8 @@ fn bad_tables_are_refused_with_their_line() {
         };
         let rows = (0..9).map(|k| format!("{} {} 0 0 0 0 0 1\n", row(k).0, row(k).1));
         let text = format!("# origin: 45, 7, 0\n{}", rows.collect::<String>());
-        let read = super::rows("a.tum", &text, "tum", None, false).and_then(Rows::trajectory);
+        let read =
+            super::rows("a.tum", &text, "tum", None, Purpose::Drive).and_then(Rows::trajectory);
         (format!("row {at} at {t} s and {x} m"), read)
     });
     let all = of_csv.chain(of_tum);
@@ -363,7 +364,7 @@ fn references_are_used_but_for_what_jumps() {
     };
     let text = HEADER.to_owned() + &(0..600).map(row).collect::<String>();
     assert!(read(&text.replace("nan", "0.5")).is_err());
-    let parsed = rows("a.csv", &text, "csv", None, true).unwrap();
+    let parsed = rows("a.csv", &text, "csv", None, Purpose::Reference).unwrap();
     let (reference, warnings) = parsed.reference().unwrap();
     let known = |t: f64| reference.state(t).is_some();
     assert_eq!(
@@ -383,6 +384,13 @@ fn references_are_used_but_for_what_jumps() {
     let mad: String = (0..600)
         .map(|k| format!("{},{},6.6,400,0,0,0\n", 0.1 * f64::from(k), 46 + k % 2))
         .collect();
-    let parsed = rows("a.csv", &(HEADER.to_owned() + &mad), "csv", None, true).unwrap();
+    let parsed = rows(
+        "a.csv",
+        &(HEADER.to_owned() + &mad),
+        "csv",
+        None,
+        Purpose::Reference,
+    )
+    .unwrap();
     assert!(parsed.reference().is_err());
 }

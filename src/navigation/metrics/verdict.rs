@@ -520,10 +520,13 @@ impl ConsistencyTest {
 
     /// True if so many times the samples find errors that matter.
     fn is_decisive(&self, outage: Option<usize>, times: f64) -> bool {
-        self.deciding(outage).all(|s| {
-            let freedom = (s.freedom.0, s.freedom.1 * times);
-            ratio_limits(freedom, self.tail).1 <= DECISIVE[usize::from(s.state.is_some())]
-        })
+        // Without a statistic, as in an outage between two rows of a solution, nothing is decided.
+        let mut own = self.deciding(outage).peekable();
+        own.peek().is_some()
+            && own.all(|s| {
+                let freedom = (s.freedom.0, s.freedom.1 * times);
+                ratio_limits(freedom, self.tail).1 <= DECISIVE[usize::from(s.state.is_some())]
+            })
     }
 
     /// The fewest times the samples that decide, by bisection: the limits close on 1 as samples are added.
