@@ -520,7 +520,7 @@ fn is_empty(directory: &Path) -> bool {
 
 /// Texts without blanks that tell files of nav-sim, by the ending of their kind: models, exports, pages, pictures, studies,
 /// comparisons, curves.
-const MARKS: [(&str, &str); 10] = [
+const SIGNATURES: [(&str, &str); 10] = [
     ("trajectory.csv", "(nav-simtrajectoryconvert)"),
     (".toml", "program=\"nav-sim"),
     (".txt", "(nav-simexport)"),
@@ -544,7 +544,7 @@ fn is_own(text: &str, kind: &str) -> bool {
         .strip_prefix(HEADER)
         .filter(|_| kind.ends_with("trajectory.csv"));
     let first = rows.and_then(|rows| rows.lines().next());
-    let mark = MARKS.iter().find(|(ending, _)| kind.ends_with(ending));
+    let mark = SIGNATURES.iter().find(|(ending, _)| kind.ends_with(ending));
     let is_marked = |mark: &str| text.split_whitespace().collect::<String>().contains(mark);
     text.is_empty()
         || mark.is_some_and(|(_, mark)| is_marked(mark))

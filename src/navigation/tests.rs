@@ -2,7 +2,7 @@
 
 pub(crate) use crate::earth;
 pub(crate) use crate::earth::{GravityModel, radii};
-pub(crate) use crate::ekf::{Belief, FilterStates, InitialSettings};
+pub(crate) use crate::ekf::{FilterModel, FilterStates, InitialSettings};
 pub(crate) use crate::frames::{NavState, RollPitchYaw};
 pub(crate) use crate::lanes::Vec3;
 pub(crate) use crate::noise::{Composite, Model, Process};

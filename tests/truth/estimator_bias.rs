@@ -4,7 +4,7 @@
 use crate::shared::*;
 use nav_sim::calibration::{Replicate, Trim, average, fit, implied};
 use nav_sim::signal::noise::Synthesizer;
-use nav_sim::signal::wavelet::both;
+use nav_sim::signal::wavelet::classical_and_robust;
 use nav_sim_calibration::trend;
 use rayon::prelude::*;
 
@@ -23,7 +23,7 @@ fn model(share: f64) -> Composite {
 
 /// The wavelet variances of a signal.
 fn measured(signal: &[f64]) -> Replicate {
-    let (classical, robust) = both(signal, 13, &tuning()).unwrap();
+    let (classical, robust) = classical_and_robust(signal, 13, &tuning()).unwrap();
     let (samples, trend) = (signal.len(), trend(signal));
     Replicate {
         name: String::new(),

@@ -39,12 +39,18 @@ fn run(
     runs: u64,
 ) -> Vec<RunResult> {
     let trajectory = shipped("land_vehicle");
-    let belief = |(model, own): &(&Model, Scenario)| {
+    let filter_model = |(model, own): &(&Model, Scenario)| {
         let track = own.track(&trajectory, model, &OUTAGES).unwrap();
-        own.belief(model, &OUTAGES, &track).unwrap()
+        own.filter_model(model, &OUTAGES, &track).unwrap()
     };
-    let beliefs: Vec<Belief> = filters.iter().map(belief).collect();
-    let experiment = imu.experiment(&trajectory, Truth::Model(truth), &beliefs, &OUTAGES, seed);
+    let filter_models: Vec<FilterModel> = filters.iter().map(filter_model).collect();
+    let experiment = imu.experiment(
+        &trajectory,
+        Truth::Model(truth),
+        &filter_models,
+        &OUTAGES,
+        seed,
+    );
     monte_carlo::run(&experiment, runs, &|_| {}).unwrap()
 }
 

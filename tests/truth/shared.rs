@@ -6,10 +6,10 @@ pub(crate) use glam::{DQuat, DVec3};
 pub(crate) use nav_sim::calibration::{Estimator, ModelSpec, Weighting};
 use nav_sim::io::{model_file, trajectory_file};
 pub(crate) use nav_sim::navigation::earth::GravityModel;
-pub(crate) use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
+pub(crate) use nav_sim::navigation::ekf::{FilterModel, FilterStates, InitialSettings};
 pub(crate) use nav_sim::navigation::frames::RollPitchYaw;
-pub(crate) use nav_sim::navigation::fusion::{Recorded, Settings, Start, fuse};
-pub(crate) use nav_sim::navigation::metrics::{Expected, VerdictKind};
+pub(crate) use nav_sim::navigation::fusion::{DriveData, FusionSettings, Start, fuse};
+pub(crate) use nav_sim::navigation::metrics::{ExpectedRun, VerdictKind};
 pub(crate) use nav_sim::navigation::scenario::Scenario;
 pub(crate) use nav_sim::navigation::sensors::gnss::GnssSettings;
 pub(crate) use nav_sim::navigation::sensors::imu::Truth;
@@ -21,7 +21,7 @@ pub(crate) use nav_sim::signal::imu::Sensor;
 pub(crate) use nav_sim::signal::noise::{Composite, Model, Process};
 pub(crate) use nav_sim::signal::rng::StreamKey;
 pub(crate) use nav_sim::signal::wavelet::{Curve, Tuning};
-pub(crate) use nav_sim_navigation::simulation::lincov::{FilterPass, TruthSide};
+pub(crate) use nav_sim_navigation::simulation::lincov::{FilterPass, TruthModel};
 pub(crate) use rand_distr::StandardNormal;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::path::{Path, PathBuf};
@@ -97,8 +97,8 @@ pub(crate) fn white(sigma2: f64) -> Composite {
 }
 
 /// A recording without what the vehicle knows.
-pub(crate) fn data(recording: &SimulatedRecording) -> Recorded<'_> {
-    Recorded {
+pub(crate) fn data(recording: &SimulatedRecording) -> DriveData<'_> {
+    DriveData {
         imu: &recording.imu,
         gnss: &recording.gnss,
         aids: &[],

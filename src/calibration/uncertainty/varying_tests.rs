@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::Estimator;
-use crate::noise::{Law, Spread, Variation};
+use crate::noise::{ParameterDistribution, Spread, Variation};
 use crate::tests::*;
 
 const SAMPLES: usize = 4096;
@@ -17,7 +17,7 @@ fn laboratory(
     estimator: Estimator,
 ) -> Outcome {
     let noise = white_and_walk(1.0, 1e-3);
-    let law = Law::Lognormal {
+    let law = ParameterDistribution::Lognormal {
         median: 1.0,
         sd,
         median_ci95: None,
@@ -29,7 +29,7 @@ fn laboratory(
     };
     let model = Model::pooled(1.0, &noise, &noise);
     let imu = imu(&model, Some(&spread), seed);
-    let settings = Settings {
+    let settings = CalibrationSettings {
         estimators: vec![estimator],
         ..settings("WN+RW")
     };
