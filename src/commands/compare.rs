@@ -396,7 +396,7 @@ impl Comparison {
         (!costs.is_empty()).then(|| {
             let (reference, costs, state) =
                 (self.name_of_reference(), first_names(&costs), SPOKEN[state]);
-            format!("uncertainty of {state} against {reference}: {costs}")
+            format!("ASEE of {state}, mean over the outage, relative to {reference}: {costs}")
         })
     }
 

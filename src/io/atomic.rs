@@ -512,7 +512,7 @@ pub(crate) fn claim_directory<'a>(
     }
 }
 
-/// True of a directory that is not there, or holds nothing: files of the same names would be lost.
+/// True if the directory does not exist or holds only hidden files.
 fn is_empty(directory: &Path) -> bool {
     let mut entries = fs::read_dir(directory).into_iter().flatten().flatten();
     entries.all(|entry| entry.file_name().to_string_lossy().starts_with('.'))

@@ -89,12 +89,10 @@ fn sentence(
             )
         }
         VerdictKind::Undecided => {
-            let percent = 100.0 * (verdict.detectable_state_ratio - 1.0);
-            let is_one = verdict.basis == Basis::Drive || verdict.independent_samples == 1.0;
-            let miss = if is_one { "misses" } else { "miss" };
+            let ratio = verdict.detectable_state_ratio;
             let (samples, decides) = (samples(verdict), deciding(verdict));
             format!(
-                "undecided: {samples} {miss} errors below {percent:.0} % in one state; {decides}"
+                "undecided: {samples} may miss an error/σ of {ratio:.2} in one state; {decides}"
             )
         }
         VerdictKind::Doubtful => {

@@ -98,7 +98,7 @@ impl Calibration {
             ("local minima", "starts"),
             ("of them the best", "agreeing"),
             ("J-test p", "j_p_value"),
-            ("signals alike: p", "spread_p_value"),
+            ("homogeneity p", "spread_p_value"),
         ];
         document.table(Table::of(json, "/fits/*", &columns));
         if self.diagnoses.iter().any(is_abnormal) {
@@ -163,8 +163,8 @@ impl Calibration {
             };
             note(importance, found.sensor.name(), turn_on_remark(found));
         }
-        if let Some(text) = beginnings(&self.beginnings) {
-            note(Importance::Remark, "not stationary at the beginning", text);
+        if let Some(text) = warm_ups_line(&self.warm_ups) {
+            note(Importance::Remark, "warm-up", text);
         }
         for outcome in fits {
             let reasons = outcome.ranking.iter().flat_map(reasons);
@@ -402,7 +402,7 @@ pub(crate) fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> 
 }
 
 /// The recordings whose beginnings change a wavelet variance notably, and what to leave out.
-fn beginnings(found: &[RecordingWarmUp]) -> Option<String> {
+fn warm_ups_line(found: &[RecordingWarmUp]) -> Option<String> {
     const NOTABLE: f64 = 0.05;
     let matters = |b: &&RecordingWarmUp| {
         let mut changes = b.signals.iter().map(|w| w.change);

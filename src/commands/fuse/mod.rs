@@ -988,7 +988,7 @@ const STATE: [&str; 9] = [
 pub struct FuseSummary {
     schema_version: u32,
     method: &'static str,
-    /// VerdictKind, evidence and cause.
+    /// Verdict, the findings it rests on and their cause.
     pub verdict: FuseVerdict,
     /// IMU samples used.
     pub imu_samples: usize,

@@ -391,7 +391,7 @@ pub enum Finding {
     Withheld(Withheld),
 }
 
-/// VerdictKind and evidence.
+/// Verdict and the findings it rests on.
 #[derive(Debug, Clone)]
 pub struct FusionAssessment {
     /// The gravest of the findings.

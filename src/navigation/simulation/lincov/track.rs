@@ -240,8 +240,9 @@ impl Track {
         Ok(track.with_outages(experiment.outages))
     }
 
-    /// A track without outages, with some.
+    /// Copy of a track without outages, with these.
     pub fn with_outages(&self, outages: &[Outage]) -> Self {
+        debug_assert_eq!(self.outages, 0, "the track has outages already");
         let mut track = self.clone();
         track.outages = outages.len();
         for mark in &mut track.marks {
