@@ -100,15 +100,15 @@ pub fn fit_curve(
     Ok(outcome)
 }
 
-/// Gives no weight to the scales outside the range of a fit.
+/// Ignores the scales outside the range of a fit.
 fn leave_out(curve: &mut Curve, settings: &Settings) {
     let outside = |level: &&u32| !settings.counts(**level) && !curve.ignored.contains(*level);
     let outside: Vec<u32> = curve.levels.iter().filter(outside).copied().collect();
     curve.ignored.extend(outside);
 }
 
-/// Counts the scales without a root at which a fit exceeds the classical variance, which bounds the noise from above; whether
-/// there are any.
+/// Includes scales without a robust root where the fit exceeds the classical variance, an upper bound. Returns true if
+/// any was added.
 fn count_exceeded(curve: &mut Curve, without_root: &[u32], fit: &Fit, settings: &Settings) -> bool {
     let implied = implied(&fit.composite, curve);
     let scales = curve.levels.iter().zip(&curve.wv).zip(implied);
@@ -122,7 +122,7 @@ fn count_exceeded(curve: &mut Curve, without_root: &[u32], fit: &Fit, settings: 
     curve.ignored.len() < before
 }
 
-/// Fills in the inference of every outcome from its group. The same seed gives the same numbers on any number of
+/// Bootstraps every outcome from its group: intervals and tests. The same seed gives the same numbers on any number of
 /// threads.
 pub fn infer(
     groups: &[Group],

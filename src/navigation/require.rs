@@ -749,7 +749,7 @@ pub struct Margins {
     pub without_imu_errors: HardestLimit,
 }
 
-/// Correlation time of the biases of an IMU that has next to none (s): any would do.
+/// Correlation time of the negligible biases of the error-free IMU (s); its value has no effect.
 const SLOW_S: f64 = 300.0;
 
 impl Margins {
@@ -776,7 +776,7 @@ pub fn worst_without_imu_errors(
     course.worst(&without_imu_errors(scenario), &perfect, limits)
 }
 
-/// A scenario whose IMU has no constant errors, and whose filter knows it.
+/// The scenario without constant IMU errors, in truth and filter.
 fn without_imu_errors(scenario: &Scenario) -> Scenario {
     let mut scenario = scenario.clone();
     let (imu, initial) = (&mut scenario.imu, &mut scenario.initial);

@@ -199,7 +199,7 @@ pub(crate) fn is_abnormal(diagnosis: &Diagnosis) -> bool {
     diagnosis.verdict != RecordingVerdict::Normal
 }
 
-/// A row a parameter.
+/// One row per parameter.
 fn parameters(outcome: &Outcome) -> Table {
     let model = &outcome.fit.composite;
     let mut table = Table::new(["parameter (SI, of a sample)", "value", "95 % interval"]);

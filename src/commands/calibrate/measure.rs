@@ -253,7 +253,7 @@ fn warm_ups(looks: &[MeasuredRecording], skipped_s: f64, rate_hz: f64) -> Vec<Re
     found.map(warm_up).collect()
 }
 
-/// Samples to leave out of a recording for all its signals; none where that does not help one of them.
+/// Samples to leave out of a recording for all its signals; `None` if that does not help one of them.
 fn warm_up_samples(signals: &[WarmUp]) -> Option<usize> {
     let helps = signals.iter().all(|w| w.change.is_some());
     signals.iter().map(|w| w.samples).max().filter(|_| helps)
@@ -286,8 +286,8 @@ fn warn_of_short_recording(report: &Report, scales: Option<u32>, context: &Conte
 /// Curves of a file, each with what it is for.
 pub(crate) type Curves = Vec<(Scope, Estimator, Curve)>;
 
-/// Reads curves, and the settings with their estimators and rate; whether one does not say its sensor. A rate (Hz)
-/// and a sensor are for those that do not say theirs.
+/// Reads curves, and returns the settings with their estimators and rate, and true if a sensor was assumed. `rate_hz`
+/// and `sensor` apply to curves that state none.
 ///
 /// # Errors
 /// When the file cannot be read, says nothing of rate or sensor where nothing is given, or has two curves for one model.
@@ -353,7 +353,7 @@ pub(crate) fn read_curves(
     ))
 }
 
-/// The models of curves.
+/// Fits a model to each curve.
 ///
 /// # Errors
 /// When a curve is too short for the model.

@@ -310,8 +310,8 @@ fn attitude_covariance(state: &NavState, sigma_deg: [f64; 3]) -> Matrix3<f64> {
     psi * Matrix3::from_diagonal(&variances.into()) * psi.transpose()
 }
 
-/// Brings the covariance up to the time of the last sample (the Earth terms lag by up to
-/// `EARTH_STEP_S`): to be called before it is examined.
+/// Applies the Earth-rate terms not yet propagated (they lag by up to `EARTH_STEP_S`). Call before reading the
+/// covariance.
 pub fn settle(ekf: &mut Ekf) {
     dispatch(ekf.level, Settle(ekf));
 }

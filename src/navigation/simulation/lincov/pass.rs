@@ -15,7 +15,7 @@ use nalgebra::SMatrix;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Yaw error over that of attitude at a pitch of 80°: 1/cos(pitch).
+/// Yaw error over attitude error, 1/cos(80°), above which roll and yaw are not separable.
 const STEEP: f64 = 5.76;
 
 /// Ratio of a filter's covariance to that of its true errors, at one instant.
@@ -204,7 +204,7 @@ impl<'a> FilterPass<'a> {
         sigmas
     }
 
-    /// Their means over the reports within each of some outages.
+    /// Mean sigmas over the reports within each outage.
     pub fn sigma_means(&self, outages: &[Outage]) -> Vec<[f64; REPORTED]> {
         let of_outage = |outage: &Outage| {
             let within = self.stated().filter(|(mark, _)| outage.withholds(mark.t_s));

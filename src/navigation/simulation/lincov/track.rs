@@ -89,7 +89,7 @@ pub(super) struct Row {
     felt: Surroundings,
     /// Variance of its white noise, as in the filter's model.
     pub r: f64,
-    /// The same in truth.
+    /// Variance of its true white noise.
     pub noise: f64,
     pub what: Measured,
     /// Velocity of the point of the vehicle (m/s) and acceleration (m/s²), in b.
@@ -259,7 +259,8 @@ impl Track {
         track
     }
 
-    /// The same where a filter assumes the vehicle's own measurements to be so much worse; in truth they are as they were.
+    /// Copy in which the filter inflates the sigmas of the aiding measurements by `factor`; their true noise is
+    /// unchanged.
     pub fn with_aiding_sigmas(&self, factor: f64) -> Self {
         let mut track = self.clone();
         let believed = |row: &Row| match row.what {
@@ -293,7 +294,7 @@ impl Track {
     }
 }
 
-/// The reference as the strapdown passes through it.
+/// State of the linearisation along the reference.
 struct Linearisation<'a> {
     experiment: &'a Experiment<'a>,
     /// The ideal IMU, and its first sample.
