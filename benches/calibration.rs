@@ -5,13 +5,14 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 
 use nav_sim::calibration::{
-    Bootstrap, Group, ModelSpec, Replicate, Scope, Settings, Weighting, calibrate, fit, infer,
+    Bootstrap, CalibrationSettings, Group, ModelSpec, Replicate, Scope, Weighting, add_intervals,
+    calibrate, fit,
 };
 use nav_sim::signal::imu::Sensor;
 use nav_sim::signal::noise::Process;
 use nav_sim::signal::rng::StreamKey;
 use nav_sim::signal::wavelet;
-use nav_sim::signal::wavelet::{Curve, RobustVariance, Status, Tuning};
+use nav_sim::signal::wavelet::{Curve, RobustVariance, RootStatus, Tuning};
 use nav_sim_signal::wavelet::interval;
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -71,7 +72,7 @@ fn wavelet_variance(c: &mut Criterion) {
         b.iter(|| naive_classical(black_box(&signal), LEVELS))
     });
     group.bench_function("classical and robust", |b| {
-        b.iter(|| wavelet::both(black_box(&signal), LEVELS, &tuning));
+        b.iter(|| wavelet::classical_and_robust(black_box(&signal), LEVELS, &tuning));
     });
     group.finish();
 }
@@ -83,7 +84,7 @@ fn a_day(c: &mut Criterion) {
     let mut group = c.benchmark_group("wavelet variance, 17280000 samples, 23 scales");
     group.sample_size(10);
     group.bench_function("classical and robust", |b| {
-        b.iter(|| wavelet::both(black_box(&signal), 23, &tuning));
+        b.iter(|| wavelet::classical_and_robust(black_box(&signal), 23, &tuning));
     });
     group.finish();
 }
@@ -140,7 +141,7 @@ fn bootstrap(c: &mut Criterion) {
         let classical: Vec<f64> = noisy.collect();
         let robust = |nu: &f64| RobustVariance {
             value: *nu,
-            status: Status::Ok,
+            status: RootStatus::Ok,
             zeros: 0.0,
         };
         Replicate {
@@ -160,7 +161,7 @@ fn bootstrap(c: &mut Criterion) {
     };
     let replicates = (0..3).map(replicate).collect();
     let groups = [Group { scope, replicates }];
-    let settings = Settings::default();
+    let settings = CalibrationSettings::default();
     let outcomes = calibrate(&groups, &settings).unwrap();
     let bootstrap = Bootstrap { draws: 99, seed: 1 };
     let mut group = c.benchmark_group("bootstrap");
@@ -168,7 +169,7 @@ fn bootstrap(c: &mut Criterion) {
         .sample_size(10)
         .measurement_time(Duration::from_secs(5));
     group.bench_function("N2, 99 draws", |b| {
-        b.iter(|| infer(&groups, &mut outcomes.clone(), &settings, bootstrap));
+        b.iter(|| add_intervals(&groups, &mut outcomes.clone(), &settings, bootstrap));
     });
     group.finish();
 }

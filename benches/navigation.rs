@@ -15,13 +15,13 @@ use kinavis_kernel::{
 };
 use nalgebra::SMatrix;
 use nav_sim::io::trajectory_file;
-use nav_sim::navigation::ekf::{Belief, FilterStates};
+use nav_sim::navigation::ekf::{FilterModel, FilterStates};
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::trajectory::ideal_imu::ideal_imu;
 use nav_sim_navigation::metrics::Budget;
-use nav_sim_navigation::simulation::lincov::{FilterPass, TruthSide};
+use nav_sim_navigation::simulation::lincov::{FilterPass, TruthModel};
 use nav_sim_signal::lanes::Level;
 mod throughput;
 use std::hint::black_box;
@@ -76,12 +76,13 @@ fn covariance_analysis(c: &mut Criterion) {
     let (path, _) = trajectory_file::load(&file, None).expect(VALID);
     let (scenario, outages) = (Scenario::default(), Outage::PAPER);
     let track = scenario.track(&path, &model, &outages).expect(VALID);
-    let beliefs = [Belief::new(&model, FilterStates::Reduced15, 1.0, 800.0).expect(VALID)];
-    let experiment = scenario.experiment(&path, Truth::Model(&model), &beliefs, &outages, 1);
-    let sources = TruthSide::sources(&experiment, &model);
+    let filter_models =
+        [FilterModel::new(&model, FilterStates::Reduced15, 1.0, 800.0).expect(VALID)];
+    let experiment = scenario.experiment(&path, Truth::Model(&model), &filter_models, &outages, 1);
+    let sources = TruthModel::sources(&experiment, &model);
     let (filter, truth) = (
-        FilterPass::new(&track, &beliefs[0]),
-        TruthSide::together(&sources),
+        FilterPass::new(&track, &filter_models[0]),
+        TruthModel::together(&sources),
     );
     let mut group = c.benchmark_group("lincov-900-s");
     group.sample_size(10);
@@ -92,10 +93,10 @@ fn covariance_analysis(c: &mut Criterion) {
         b.iter(|| scenario.track(black_box(&path), &model, &outages))
     });
     group.bench_function("reduction", |b| {
-        b.iter(|| scenario.belief(black_box(&model), &outages, &track))
+        b.iter(|| scenario.filter_model(black_box(&model), &outages, &track))
     });
     group.bench_function("gains-15", |b| {
-        b.iter(|| FilterPass::new(black_box(&track), &beliefs[0]))
+        b.iter(|| FilterPass::new(black_box(&track), &filter_models[0]))
     });
     group.bench_function("true-errors", |b| {
         b.iter(|| black_box(&filter).errors(&truth))

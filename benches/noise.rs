@@ -2,7 +2,7 @@
 //! size the simulation uses. Throughput is samples, so that its inverse is the cost of one.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use nav_sim::signal::noise::{Composite, Kind, Process, Synthesizer};
+use nav_sim::signal::noise::{Composite, Process, ProcessKind, Synthesizer};
 use nav_sim::signal::rng::StreamKey;
 use std::hint::black_box;
 
@@ -20,13 +20,13 @@ fn synthesizer(processes: Vec<Process>, source: &str) -> Synthesizer {
 }
 
 fn process(code: &str, values: &[f64]) -> Process {
-    Process::of_values(Kind::named(code).expect("known"), values, 100.0).expect("sound")
+    Process::of_values(ProcessKind::named(code).expect("known"), values, 100.0).expect("sound")
 }
 
 fn single_processes(c: &mut Criterion) {
     let mut group = c.benchmark_group("one process, per sample");
     group.throughput(Throughput::Elements(BLOCK as u64));
-    for kind in Kind::ALL {
+    for kind in ProcessKind::ALL {
         let mut source = synthesizer(
             vec![process(kind.code(), &[0.5, 0.5][..kind.parameters().len()])],
             "accel.x",

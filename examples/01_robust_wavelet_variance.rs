@@ -3,7 +3,7 @@
 
 use nav_sim::signal::noise::{Composite, Process, Synthesizer};
 use nav_sim::signal::rng::StreamKey;
-use nav_sim::signal::wavelet::{Tuning, both};
+use nav_sim::signal::wavelet::{Tuning, classical_and_robust};
 
 pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     // N1 of Minaretzis et al. 2024 for an accelerometer, per sample at 100 Hz
@@ -24,7 +24,7 @@ pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     signal[60_000..60_020].fill(1.0); // someone knocks at the table: 1 m/s² for 0.2 s
 
     let tuning = Tuning::new(0.6)?;
-    let (classical, robust) = both(&signal, 14, &tuning)?;
+    let (classical, robust) = classical_and_robust(&signal, 14, &tuning)?;
     println!(
         "{:>8} {:>12} {:>12} {:>12}",
         "tau (s)", "theory", "classical", "robust"

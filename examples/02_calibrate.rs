@@ -2,9 +2,9 @@
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 use nav_sim::calibration::{Estimator, ModelSpec, Replicate, Trim, Weighting, average, fit};
-use nav_sim::signal::noise::{Composite, Kind, Process, Synthesizer};
+use nav_sim::signal::noise::{Composite, Process, ProcessKind, Synthesizer};
 use nav_sim::signal::rng::StreamKey;
-use nav_sim::signal::wavelet::{Tuning, both};
+use nav_sim::signal::wavelet::{Tuning, classical_and_robust};
 
 const SAMPLES: usize = 1 << 16;
 const LEVELS: u32 = 15;
@@ -29,7 +29,7 @@ fn replicate(k: u64, tuning: &Tuning) -> Result<Replicate, Box<dyn std::error::E
     };
     let mut signal = vec![0.0; SAMPLES];
     Synthesizer::new(&noise, key).fill(&mut signal);
-    let (classical, robust) = both(&signal, LEVELS, tuning)?;
+    let (classical, robust) = classical_and_robust(&signal, LEVELS, tuning)?;
     Ok(Replicate {
         name: format!("replicate {}", k + 1),
         axis: None,
@@ -52,7 +52,7 @@ pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     for estimator in [Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv] {
         let curve = average(&replicates, estimator, Trim::Count(2), &tuning)?;
         let fitted = fit(&curve, &ModelSpec::n1(), 100.0, Weighting::Edof)?;
-        let walk = fitted.composite.amplitude_of(Kind::RandomWalk);
+        let walk = fitted.composite.amplitude_of(ProcessKind::RandomWalk);
         println!("{:8} finds {:.1e}", estimator.name(), walk);
         gamma2.push(walk);
     }

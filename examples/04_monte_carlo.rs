@@ -3,7 +3,7 @@
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 use nav_sim::io::trajectory_file::load;
-use nav_sim::navigation::ekf::{Belief, FilterStates};
+use nav_sim::navigation::ekf::{FilterModel, FilterStates};
 use nav_sim::navigation::metrics::{Summary, epochs};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;
@@ -24,13 +24,13 @@ pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories/land_vehicle.toml");
     let (trajectory, _) = load(&path, None)?;
     let truth = model(1e-4)?;
-    let belief = |m: &Model| Belief::new(m, FilterStates::Full, 1.0, 800.0);
-    let beliefs = [belief(&truth)?, belief(&model(1e-5)?)?];
+    let filter_model = |m: &Model| FilterModel::new(m, FilterStates::Full, 1.0, 800.0);
+    let filter_models = [filter_model(&truth)?, filter_model(&model(1e-5)?)?];
     let scenario = Scenario::default();
     let experiment = scenario.experiment(
         &trajectory,
         Truth::Model(&truth),
-        &beliefs,
+        &filter_models,
         &Outage::PAPER,
         1,
     );

@@ -115,7 +115,7 @@ impl Failure {
     }
 
     /// Could not: I/O, numerics (exit code 1).
-    pub fn could_not(message: impl ToString) -> Self {
+    pub fn failed(message: impl ToString) -> Self {
         Self::new(1, &message)
     }
 
@@ -365,7 +365,7 @@ fn without_places(message: &str) -> String {
 }
 
 /// Failures made of any error where it is known what it means.
-pub(crate) trait Refuse<T> {
+pub(crate) trait IntoFailure<T> {
     /// Exit code 2: the input is at fault.
     fn refuse(self) -> Result<T>;
 
@@ -373,7 +373,7 @@ pub(crate) trait Refuse<T> {
     fn refuse_within(self, part: impl fmt::Display) -> Result<T>;
 }
 
-impl<T, E: fmt::Display> Refuse<T> for std::result::Result<T, E> {
+impl<T, E: fmt::Display> IntoFailure<T> for std::result::Result<T, E> {
     fn refuse(self) -> Result<T> {
         self.map_err(|e| Failure::input(e))
     }
@@ -477,5 +477,5 @@ macro_rules! failures {
 
 failures! {
     input: ReplicateError, Refused;
-    could_not: WaveletError;
+    failed: WaveletError;
 }

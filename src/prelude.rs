@@ -25,5 +25,5 @@ pub use nav_sim_navigation::scenario::{Method, Scenario};
 pub use nav_sim_navigation::sensors::outage::Outage;
 pub use nav_sim_navigation::trajectory::Trajectory;
 pub use nav_sim_signal::imu::{Axis, Channel, Sensor};
-pub use nav_sim_signal::noise::practical::{AxisParameters, Horizon, Pair, Policy};
+pub use nav_sim_signal::noise::practical::{AxisParameters, Horizon, NoiseDensities, Policy};
 pub use nav_sim_signal::noise::{Composite, Model, Process};

@@ -4,7 +4,7 @@
 #![allow(unsafe_code, reason = "an allocator that counts")]
 
 use nav_sim::io::trajectory_file::load;
-use nav_sim::navigation::ekf::{Belief, FilterStates};
+use nav_sim::navigation::ekf::{FilterModel, FilterStates};
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::navigation::sensors::outage::Outage;
@@ -49,8 +49,8 @@ fn allocations(duration_s: u32, gains: Gains) -> u64 {
     std::fs::write(&file, profile).unwrap();
     let (trajectory, _) = load(&file, None).unwrap();
     let model = throughput::model().unwrap();
-    let beliefs = [FilterStates::Reduced15, FilterStates::Full]
-        .map(|states| Belief::new(&model, states, 1.0, 800.0).unwrap());
+    let filter_models = [FilterStates::Reduced15, FilterStates::Full]
+        .map(|states| FilterModel::new(&model, states, 1.0, 800.0).unwrap());
     let (scenario, outages) = (
         Scenario::default(),
         [Outage {
@@ -58,8 +58,13 @@ fn allocations(duration_s: u32, gains: Gains) -> u64 {
             end_s: 30.0,
         }],
     );
-    let mut experiment =
-        scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &outages, 1);
+    let mut experiment = scenario.experiment(
+        &trajectory,
+        Truth::Model(&model),
+        &filter_models,
+        &outages,
+        1,
+    );
     experiment.gains = gains;
     let plan = Plan::new(&experiment).unwrap();
     let runs_from = |first| assert_eq!(run_batch(&plan, first, 8)[0].runs.len(), 8);

@@ -6,7 +6,7 @@
 use glam::{DQuat, DVec3};
 use nav_sim_navigation::earth::{GravityModel, gravity_down};
 use nav_sim_navigation::ekf::{
-    Belief, BeliefError, Ekf, FilterStates, Fix, InitialSettings, advance, update,
+    Ekf, FilterModel, FilterModelError, FilterStates, Fix, InitialSettings, advance, update,
 };
 use nav_sim_navigation::frames::NavState;
 use nav_sim_navigation::sensors::imu::{LaneErrors, Truth};
@@ -56,9 +56,9 @@ impl<'a> Load<'a> {
         model: &'a Model,
         states: FilterStates,
         level: Level,
-    ) -> Result<Self, BeliefError> {
+    ) -> Result<Self, FilterModelError> {
         // Fixes at 1 Hz and the shortest window of the reduction, as in a default run.
-        let belief = Belief::new(model, states, 1.0, 800.0)?;
+        let filter_model = FilterModel::new(model, states, 1.0, 800.0)?;
         let start = NavState {
             lat: 0.8,
             lon: 0.1,
@@ -79,8 +79,13 @@ impl<'a> Load<'a> {
         let keys: Vec<_> = (0..LANES as u64).map(key).collect();
         let settings = InitialSettings::default();
         Ok(Self {
-            ekf: Ekf::new(Strapdown::new(&start, gravity), &belief, &start, &settings)
-                .at_level(level),
+            ekf: Ekf::new(
+                Strapdown::new(&start, gravity),
+                &filter_model,
+                &start,
+                &settings,
+            )
+            .at_level(level),
             samples: [ImuSample {
                 omega_ib_b: DVec3::ZERO,
                 f_ib_b,

@@ -3,14 +3,14 @@
 use crate::Failure;
 use crate::paper_section4::study::Design;
 use nav_sim::calibration::Estimator;
-use nav_sim::signal::noise::{Composite, Kind, Model, Process, Spread};
+use nav_sim::signal::noise::{Composite, Model, Process, ProcessKind, Spread};
 
 /// A case by its name.
 pub(crate) fn case(name: &str, paper: Design) -> Result<Design, Failure> {
     let of_parts = |parts: &[(&str, &[f64])], replicates: u64| -> Result<Design, Failure> {
         let mut processes = Vec::new();
         for (code, values) in parts {
-            let kind = Kind::named(code).ok_or("no such process")?;
+            let kind = ProcessKind::named(code).ok_or("no such process")?;
             processes.push(Process::of_values(kind, values, paper.model.rate_hz)?);
         }
         let noise = Composite::new(processes);

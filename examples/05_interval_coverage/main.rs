@@ -13,7 +13,8 @@ mod paper_section4;
 
 use cases::case;
 use nav_sim::calibration::{
-    Bootstrap, ModelChoice, Outcome, Pool, Settings, calibrate, grouped, infer, replicates,
+    Bootstrap, CalibrationSettings, ModelChoice, Outcome, Pool, add_intervals, calibrate, grouped,
+    replicates,
 };
 use nav_sim::signal::imu::{Recording, Signal};
 use nav_sim::signal::noise::Synthesizer;
@@ -78,7 +79,7 @@ fn set(design: &Design, set: u64, draws: usize, holes: Holes) -> Result<Vec<Outc
         };
         measured.extend(replicates(&recording, Some(design.levels), &design.tuning)?);
     }
-    let settings = Settings {
+    let settings = CalibrationSettings {
         estimators: design.estimators.clone(),
         model: ModelChoice::Given(design.spec.clone()),
         trim: design.trim,
@@ -89,7 +90,7 @@ fn set(design: &Design, set: u64, draws: usize, holes: Holes) -> Result<Vec<Outc
     };
     let groups = grouped(measured, Pool::Axes);
     let mut outcomes = calibrate(&groups, &settings)?;
-    infer(
+    add_intervals(
         &groups,
         &mut outcomes,
         &settings,

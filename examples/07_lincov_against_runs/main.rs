@@ -10,7 +10,7 @@
 
 use nav_sim::io::{model_file, trajectory_file};
 use nav_sim::navigation::ekf::FilterStates;
-use nav_sim::navigation::metrics::{Expected, OutageSummary, epochs};
+use nav_sim::navigation::metrics::{ExpectedRun, OutageSummary, epochs};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
@@ -18,19 +18,19 @@ use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::RunResult;
 use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::signal::imu::Channel;
-use nav_sim::signal::noise::{Kind, Model};
+use nav_sim::signal::noise::{Model, ProcessKind};
 use std::error::Error;
 use std::path::Path;
 
 type Failure = Box<dyn Error>;
 
 /// A process whose variance is four times what is believed: kind, and which of its kind.
-const STRONGER: [(&str, Kind, usize); 5] = [
-    ("WN × 4", Kind::White, 0),
-    ("QN × 4", Kind::Quantization, 0),
-    ("AR1_1 × 4", Kind::Ar1, 0),
-    ("AR1_2 × 4", Kind::Ar1, 1),
-    ("RW × 4", Kind::RandomWalk, 0),
+const STRONGER: [(&str, ProcessKind, usize); 5] = [
+    ("WN × 4", ProcessKind::White, 0),
+    ("QN × 4", ProcessKind::Quantization, 0),
+    ("AR1_1 × 4", ProcessKind::Ar1, 0),
+    ("AR1_2 × 4", ProcessKind::Ar1, 1),
+    ("RW × 4", ProcessKind::RandomWalk, 0),
 ];
 
 /// What is there beside noise; the filter of 21 states expects scale factors.
@@ -58,7 +58,7 @@ const AIM: f64 = 2.0;
 const EVERY_S: usize = 10;
 
 /// All axes with the variance of one process times four.
-fn stronger(model: &Model, kind: Kind, which: usize) -> Result<Model, Failure> {
+fn stronger(model: &Model, kind: ProcessKind, which: usize) -> Result<Model, Failure> {
     let mut stronger = model.clone();
     for channel in Channel::ALL {
         let mut own = stronger.axes[channel.index()]
@@ -81,17 +81,25 @@ fn compare(
     let scenario: Scenario = toml::from_str(settings)?;
     let outages = Outage::PAPER;
     let track = scenario.track(trajectory, model, &outages)?;
-    let mut beliefs = Vec::new();
+    let mut filter_models = Vec::new();
     for states in FilterStates::ALL {
         let mut own = scenario.clone();
         own.filter.states = states;
-        beliefs.push(own.belief(model, &outages, &track)?);
+        filter_models.push(own.filter_model(model, &outages, &track)?);
     }
-    let experiment = scenario.experiment(trajectory, Truth::Model(truth), &beliefs, &outages, seed);
+    let experiment = scenario.experiment(
+        trajectory,
+        Truth::Model(truth),
+        &filter_models,
+        &outages,
+        seed,
+    );
     let sampled = monte_carlo::run(&experiment, runs, &|_| {})?;
-    for ((states, belief), sampled) in FilterStates::ALL.iter().zip(&beliefs).zip(&sampled) {
-        let expected =
-            Expected::along(&track, &experiment, belief, truth).ok_or("the covariance ran away")?;
+    for ((states, filter_model), sampled) in
+        FilterStates::ALL.iter().zip(&filter_models).zip(&sampled)
+    {
+        let expected = ExpectedRun::along(&track, &experiment, filter_model, truth)
+            .ok_or("the covariance ran away")?;
         println!(
             "| {name} | {case} | {states} | {} |",
             departures(sampled, &expected)
@@ -101,7 +109,7 @@ fn compare(
 }
 
 /// How far runs are from what is expected of them.
-fn departures(sampled: &RunResult, expected: &Expected) -> String {
+fn departures(sampled: &RunResult, expected: &ExpectedRun) -> String {
     let (mut asee, mut rmse, mut nees, mut coverage) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
     let mut within_from_s = 0.0;
     let (mut beyond, mut all, mut worst) = (0, 0, 0.0_f64);
@@ -137,7 +145,7 @@ fn departures(sampled: &RunResult, expected: &Expected) -> String {
 
 /// Runs whose horizontal error at an outage's end is below the expected p50 and p95: their number less its binomial mean, in
 /// standard deviations.
-fn quantiles_at_ends(sampled: &RunResult, expected: &Expected) -> impl Iterator<Item = f64> {
+fn quantiles_at_ends(sampled: &RunResult, expected: &ExpectedRun) -> impl Iterator<Item = f64> {
     let both = |(i, outage): (usize, &OutageSummary)| {
         [
             (0.5, outage.horizontal_error_end_m.p50),

@@ -13,7 +13,7 @@ use nav_sim::calibration::{Estimator, Trim, Weighting};
 use nav_sim::document::{Chart, ChartAxis, Colour, Mark, Panel, PointInterval, Series, svg};
 use nav_sim::io::contamination_file;
 use nav_sim::prelude::*;
-use nav_sim::signal::noise::Kind;
+use nav_sim::signal::noise::ProcessKind;
 use nav_sim::signal::noise::contamination::{Contamination, Operation};
 use nav_sim::signal::wavelet::{Tuning, default_levels};
 use rayon::prelude::*;
@@ -229,7 +229,10 @@ fn figure2(design: &Design, rows: &[Row]) -> String {
 pub(crate) fn sensitivity(design: &Design) -> Result<String, Failure> {
     let names = Design::parameters(&target(design)?.fit.composite);
     let noise = design.model.axis(design.channel);
-    let mut white = noise.processes.iter().filter(|p| p.kind() == Kind::White);
+    let mut white = noise
+        .processes
+        .iter()
+        .filter(|p| p.kind() == ProcessKind::White);
     let white = white.next().map(Process::amplitude);
     // An outlier's unit: the standard deviation of the white noise, or of what the first scale sees.
     let unit = white.unwrap_or_else(|| 2.0 * noise.haar_wv(1)).sqrt();

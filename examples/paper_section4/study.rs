@@ -8,11 +8,11 @@ use nav_sim::calibration::{
 use nav_sim::signal::imu::Channel;
 use nav_sim::signal::noise::contamination::{Contamination, Operation};
 use nav_sim::signal::noise::{
-    Composite, Kind, Law, Model, Parameter, ParameterError, ParameterRef, Process, Spread,
-    Synthesizer, Variation,
+    Composite, Model, Parameter, ParameterDistribution, ParameterError, ParameterRef, Process,
+    ProcessKind, Spread, Synthesizer, Variation,
 };
 use nav_sim::signal::rng::StreamKey;
-use nav_sim::signal::wavelet::{Curve, Status, Tuning, both, interval};
+use nav_sim::signal::wavelet::{Curve, RootStatus, Tuning, classical_and_robust, interval};
 use rand::{Rng, RngExt};
 use std::error::Error;
 
@@ -206,7 +206,7 @@ impl Design {
 
     /// The wavelet variances of one signal.
     pub fn measure(&self, samples: &[f64]) -> Result<Replicate, Failure> {
-        let (classical, robust) = both(samples, self.levels, &self.tuning)?;
+        let (classical, robust) = classical_and_robust(samples, self.levels, &self.tuning)?;
         let (name, axis) = (String::new(), Some(self.channel.axis));
         Ok(Replicate {
             name,
@@ -248,7 +248,7 @@ impl Design {
             self.weighting,
         )?;
         let robust = replicates.iter().flat_map(|r| &r.robust);
-        let without_root = robust.filter(|v| v.status == Status::NoRoot).count();
+        let without_root = robust.filter(|v| v.status == RootStatus::NoRoot).count();
         Ok(Estimate {
             theta: Self::values(&fit.composite),
             objective: fit.objective,
@@ -356,12 +356,14 @@ const NODES: usize = 48;
 const CUT: f64 = 9.0;
 
 /// Values and weights (of sum 1) that stand for the law of a parameter about `centre` (the model's value).
-pub fn nodes(law: Law, centre: f64, parameter: Parameter) -> Vec<(f64, f64)> {
+pub fn nodes(law: ParameterDistribution, centre: f64, parameter: Parameter) -> Vec<(f64, f64)> {
     match law {
-        Law::Beta { a, b, low, width } => beta(a, b).map(|(x, w)| (low + width * x, w)).collect(),
-        Law::Normal { sd } if sd > 0.0 => normal(centre, sd, parameter.domain()),
-        Law::Normal { .. } => vec![(centre, 1.0)],
-        Law::Lognormal { median, sd, .. } if sd > 0.0 => {
+        ParameterDistribution::Beta { a, b, low, width } => {
+            beta(a, b).map(|(x, w)| (low + width * x, w)).collect()
+        }
+        ParameterDistribution::Normal { sd } if sd > 0.0 => normal(centre, sd, parameter.domain()),
+        ParameterDistribution::Normal { .. } => vec![(centre, 1.0)],
+        ParameterDistribution::Lognormal { median, sd, .. } if sd > 0.0 => {
             let scaled = normal(
                 parameter.scaled(median),
                 sd,
@@ -372,7 +374,7 @@ pub fn nodes(law: Law, centre: f64, parameter: Parameter) -> Vec<(f64, f64)> {
                 .map(|(x, w)| (parameter.unscaled(x), w))
                 .collect()
         }
-        Law::Lognormal { median, .. } => vec![(median, 1.0)],
+        ParameterDistribution::Lognormal { median, .. } => vec![(median, 1.0)],
     }
 }
 
@@ -584,7 +586,7 @@ pub fn abnormal_curve(
         let processes = &mut model.axes[design.channel.index()].processes;
         let mut walks = processes
             .iter_mut()
-            .filter(|p| p.kind() == Kind::RandomWalk);
+            .filter(|p| p.kind() == ProcessKind::RandomWalk);
         let walk = walks.next();
         let walk = walk.ok_or("no random walk whose variance could be made abnormal")?;
         *walk = walk.times(factor)?;

@@ -4,7 +4,8 @@ use crate::error;
 use crate::work::work;
 use nav_sim::io::recordings::facts::doubts;
 use nav_sim::signal::wavelet::{
-    RobustVariance, Tuning, WaveletError, both, default_levels, gappy, haar, interval,
+    RobustVariance, Tuning, WaveletError, classical_and_robust, default_levels, gappy, haar,
+    interval,
 };
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -79,7 +80,7 @@ fn variances(
         }
     } else {
         match &tuning {
-            Some(tuning) => values(both(signal, levels, tuning)?.1),
+            Some(tuning) => values(classical_and_robust(signal, levels, tuning)?.1),
             None => haar::classical(signal, levels)?,
         }
     };

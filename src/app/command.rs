@@ -1,7 +1,7 @@
 //! A command is a struct of options with inputs and an answer. Words of a command line and requests by name (Python,
 //! studies) become it by the same parser, so that both are refused in the same words.
 
-use super::{Context, Failure, Input, Refuse, Reporter, Result, refused};
+use super::{Context, Failure, Input, IntoFailure, Reporter, Result, refused};
 use crate::io::atomic::{AtomicDir, DirectoryState, OutputClaim, claim_directory, claim_file};
 use crate::io::{atomic, input, suggest};
 use crate::parse;
@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 
 /// Output of a command: none, a file or a directory.
 #[derive(Debug, Clone, Copy)]
-pub enum Out {
+pub enum OutputKind {
     /// To stdout alone.
     Nothing,
     /// To a file, and files with other endings beside it.
@@ -52,7 +52,7 @@ pub trait Command: clap::Args + Send + Sync + 'static {
     /// Its name on the command line.
     const NAME: &'static str;
     /// Its output.
-    const OUT: Out = Out::Nothing;
+    const OUT: OutputKind = OutputKind::Nothing;
     /// True if its document can be written as a page or a picture.
     const PLOT: bool = true;
     /// True if a page stands in its directory.
@@ -89,15 +89,17 @@ pub trait Command: clap::Args + Send + Sync + 'static {
         Ok(())
     }
 
-    /// Names of the files of [`Out::Directory`].
+    /// Names of the files of [`OutputKind::Directory`].
     fn output_names(&self) -> Vec<Cow<'static, str>> {
         match Self::OUT {
-            Out::Directory { files, .. } => files.iter().map(|name| (*name).into()).collect(),
+            OutputKind::Directory { files, .. } => {
+                files.iter().map(|name| (*name).into()).collect()
+            }
             _ => Vec::new(),
         }
     }
 
-    /// Endings of the files beside [`Out::File`], itself included: "" is the file itself.
+    /// Endings of the files beside [`OutputKind::File`], itself included: "" is the file itself.
     fn endings(&self) -> Vec<Cow<'static, str>> {
         vec!["".into()]
     }
@@ -113,7 +115,7 @@ pub trait Answer: Serialize {
         None
     }
 
-    /// The files to be written; of [`Out::File`] their names are endings.
+    /// The files to be written; of [`OutputKind::File`] their names are endings.
     fn files(&self) -> Vec<OutputFile<'_>> {
         Vec::new()
     }
@@ -248,9 +250,11 @@ impl<C: Command> clap::Args for Invocation<C> {
                 .value_parser(ValueParser::path_buf())
         };
         match C::OUT {
-            Out::Nothing => {}
-            Out::File { help, .. } => command = command.arg(path().value_name("FILE").help(help)),
-            Out::Directory { path: default, .. } => {
+            OutputKind::Nothing => {}
+            OutputKind::File { help, .. } => {
+                command = command.arg(path().value_name("FILE").help(help))
+            }
+            OutputKind::Directory { path: default, .. } => {
                 let out = path().value_name("DIR").default_value(default);
                 command = command.arg(out.help("Directory to make"));
             }
@@ -289,7 +293,7 @@ impl<C: Command> FromArgMatches for Invocation<C> {
                 .map(move |path| (str::to_owned(id), path))
         };
         let by_default = match C::OUT {
-            Out::File { name, .. } if request.writes_by_default() => Some(name.into()),
+            OutputKind::File { name, .. } if request.writes_by_default() => Some(name.into()),
             _ => None,
         };
         Ok(Self {
@@ -497,7 +501,7 @@ pub fn answered<C: Command>(
     let answer = asked.request.run(&context)?;
     let document = answer.document();
     let name = |ending: &str| match C::OUT {
-        Out::File { name, .. } => beside(Path::new(name), ending).display().to_string(),
+        OutputKind::File { name, .. } => beside(Path::new(name), ending).display().to_string(),
         _ => ending.to_owned(),
     };
     let mut files = Vec::new();
@@ -506,7 +510,7 @@ pub fn answered<C: Command>(
         Ok(())
     };
     match C::OUT {
-        Out::Directory { .. } => {
+        OutputKind::Directory { .. } => {
             let page = C::PAGE.then_some(&document);
             each_file(&answer, page, &mut manifest, &context, keep)?;
         }
@@ -602,7 +606,7 @@ impl<C: Command> Invocation<C> {
         let mut claims = OutputClaims::default();
         claims.note_missing(self.out.iter().chain(&self.plots));
         match (C::OUT, &self.out) {
-            (Out::Directory { .. }, Some(out)) => {
+            (OutputKind::Directory { .. }, Some(out)) => {
                 let names = self.request.output_names();
                 let present = |text: &str| serde_json::from_str::<Manifest>(text).ok();
                 let recognise = |text: &str| {
@@ -623,7 +627,7 @@ impl<C: Command> Invocation<C> {
                 let claim = claim_directory(out, &names, inputs(), force, recognise)?;
                 claims.own.push(claim);
             }
-            (Out::File { name, .. }, Some(out)) => {
+            (OutputKind::File { name, .. }, Some(out)) => {
                 self.request.check_out()?;
                 let endings = self.request.endings();
                 let is_new = !out.exists() && !out.to_string_lossy().ends_with('/');
@@ -663,7 +667,7 @@ impl<C: Command> Invocation<C> {
         // all are on the disk before any has its name
         let (mut written, mut filled) = (Vec::new(), Vec::new());
         match (C::OUT, &self.out) {
-            (Out::Directory { .. }, Some(out)) => {
+            (OutputKind::Directory { .. }, Some(out)) => {
                 let before = std::fs::read_to_string(out.join(MANIFEST)).unwrap_or_default();
                 let before = serde_json::from_str::<Manifest>(&before).ok();
                 let mut directory = AtomicDir::create(out)?;
@@ -680,7 +684,7 @@ impl<C: Command> Invocation<C> {
                 }
                 written.push(out.clone());
             }
-            (Out::File { .. }, Some(out)) => {
+            (OutputKind::File { .. }, Some(out)) => {
                 for file in answer.files() {
                     let path = beside(out, &file.name);
                     let text: String = file.parts.collect();
@@ -695,7 +699,7 @@ impl<C: Command> Invocation<C> {
             let form = ending(path);
             let bytes = match form == PAGE_ENDING {
                 true => document.html().into(),
-                false => encode(document.svg(), &form).map_err(Failure::could_not)?,
+                false => encode(document.svg(), &form).map_err(Failure::failed)?,
             };
             filled.push(atomic::filled(path, &bytes)?);
             written.push(path.clone());

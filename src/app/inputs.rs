@@ -1,13 +1,13 @@
 //! Inputs that several commands share: files, settings, outages.
 
-use super::{Context, Failure, Refuse, Result, refused};
+use super::{Context, Failure, IntoFailure, Result, refused};
 use crate::io::model_file::{self, ModelFile, TurnOn};
 use crate::io::recordings::{self, Gaps, ReadOptions};
 use crate::io::toml_file::TomlSource;
 use crate::io::{scenario_file, trajectory_file};
 use crate::parse;
 use crate::report::readable;
-use nav_sim_navigation::ekf::{BeliefError, FilterStates, InitialSettings};
+use nav_sim_navigation::ekf::{FilterModelError, FilterStates, InitialSettings};
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::outage::Outage;
@@ -279,14 +279,14 @@ pub(crate) fn merge(into: &mut toml::Table, over: toml::Table) {
 
 /// Why a model has no filter: by the file that is at fault, of the model and the one with the settings; `advice` is on settings.
 pub(crate) fn no_filter(
-    e: &BeliefError,
+    e: &FilterModelError,
     model: &Path,
     settings: Option<&Path>,
     advice: &str,
 ) -> Failure {
     let within = |failure: Failure, file: &Path| failure.within(&file.display().to_string());
     match e {
-        BeliefError::Setting(_) => {
+        FilterModelError::Setting(_) => {
             let failure = Failure::input(e).hint(advice.to_owned());
             settings.into_iter().fold(failure, within)
         }

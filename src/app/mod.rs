@@ -6,11 +6,11 @@ pub(crate) mod inputs;
 pub mod reading;
 
 pub use crate::failure::{Failure, Result};
-pub(crate) use crate::failure::{Refuse, refused};
+pub(crate) use crate::failure::{IntoFailure, refused};
 pub use crate::io::input::Input;
 pub use command::{
-    Answer, Command, Inputs, Invocation, Manifest, Out, OutputFile, PlainAnswer, RenderedAnswer,
-    answered,
+    Answer, Command, Inputs, Invocation, Manifest, OutputFile, OutputKind, PlainAnswer,
+    RenderedAnswer, answered,
 };
 pub(crate) use command::{argument, is_path, is_repeated};
 pub use context::{Context, DEFAULT_SEED, Reporter};

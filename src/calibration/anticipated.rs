@@ -12,17 +12,17 @@ use crate::curve::{CalibrationError, Estimator, Group, Replicate, Scope, average
 use crate::fit::Fit;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::model::ModelSpec;
-use crate::noise::{Composite, Kind, Model, Process, Spread};
-use crate::outcome::{Bootstrap, Inference, ModelChoice, Outcome, Settings};
+use crate::noise::{Composite, Model, Process, ProcessKind, Spread};
+use crate::outcome::{Bootstrap, CalibrationSettings, Inference, ModelChoice, Outcome};
 use crate::pipeline::fit_curve;
-use crate::uncertainty::bootstrap::{CurveSampler, Scattering, with_variances};
+use crate::uncertainty::bootstrap::{CurveSampler, ScatterSource, with_variances};
 use crate::uncertainty::intervals::{intervals, practical_intervals};
 use crate::wavelet::default_levels;
 use rayon::prelude::*;
 
 /// Recordings of an IMU that are planned.
 #[derive(Debug, Clone, Copy)]
-pub struct Anticipated<'a> {
+pub struct PlannedRecordings<'a> {
     /// The noise.
     pub model: &'a Model,
     /// Variation of its parameters between recordings; none: they do not vary.
@@ -33,7 +33,7 @@ pub struct Anticipated<'a> {
     pub samples: usize,
 }
 
-impl Anticipated<'_> {
+impl PlannedRecordings<'_> {
     /// The outcomes of each sensor (of each axis where the axes differ): the model itself, with the intervals that
     /// would be expected, in the inference.
     ///
@@ -42,11 +42,11 @@ impl Anticipated<'_> {
     pub fn outcomes(
         &self,
         estimator: Estimator,
-        settings: &Settings,
-        scattering: Scattering,
+        settings: &CalibrationSettings,
+        scattering: ScatterSource,
         bootstrap: Bootstrap,
     ) -> Result<Vec<Outcome>, CalibrationError> {
-        let settings = Settings {
+        let settings = CalibrationSettings {
             estimators: vec![estimator],
             rate_hz: self.model.rate_hz,
             ..settings.clone()
@@ -83,14 +83,14 @@ impl Anticipated<'_> {
         &self,
         scope: Scope,
         estimator: Estimator,
-        settings: &Settings,
-        scattering: Scattering,
+        settings: &CalibrationSettings,
+        scattering: ScatterSource,
         bootstrap: Bootstrap,
     ) -> Result<Outcome, CalibrationError> {
         let composite = in_order(self.model.axis(scope.channels()[0]));
         let group = self.expected(scope, &composite, estimator, settings)?;
         let spec = ModelSpec::of(composite.processes.iter().map(Process::kind));
-        let settings = &Settings {
+        let settings = &CalibrationSettings {
             model: ModelChoice::Given(spec),
             ..settings.clone()
         };
@@ -145,7 +145,7 @@ impl Anticipated<'_> {
         scope: Scope,
         composite: &Composite,
         estimator: Estimator,
-        settings: &Settings,
+        settings: &CalibrationSettings,
     ) -> Result<Group, CalibrationError> {
         let levels = 1..=default_levels(self.samples);
         let classical: Vec<f64> = levels.map(|level| composite.haar_wv(level)).collect();
@@ -251,7 +251,7 @@ fn in_order(composite: &Composite) -> Composite {
     processes.sort_by(|a, b| {
         // phi rises with the correlation time, beta falls.
         let time = |p: &Process| match p.kind() {
-            Kind::GaussMarkov => -p.shape(),
+            ProcessKind::GaussMarkov => -p.shape(),
             _ => p.shape(),
         };
         a.kind().cmp(&b.kind()).then(time(a).total_cmp(&time(b)))
@@ -264,7 +264,7 @@ mod tests {
     use super::*;
     use crate::calibrate;
     use crate::imu::Channel;
-    use crate::noise::{Law, Variation};
+    use crate::noise::{ParameterDistribution, Variation};
     use crate::tests::{imu, inferred, recorded, settings, white_and_walk};
     use approx::assert_relative_eq;
 
@@ -277,7 +277,7 @@ mod tests {
     }
 
     /// Parameters that differ from recording to recording, on each axis for itself.
-    fn spread(parameters: &[(&str, &str)], law: Law) -> Spread {
+    fn spread(parameters: &[(&str, &str)], law: ParameterDistribution) -> Spread {
         let axis = model().axes[0].clone();
         let variation = |(p, key): &(&str, &str)| Variation::new(&axis, p, key, law).unwrap();
         let laws: Vec<Variation> = parameters.iter().map(variation).collect();
@@ -302,9 +302,9 @@ mod tests {
         })
     }
 
-    fn anticipated(spread: Option<&Spread>, samples: usize, scattering: Scattering) -> Outcome {
+    fn anticipated(spread: Option<&Spread>, samples: usize, scattering: ScatterSource) -> Outcome {
         let model = model();
-        let plan = Anticipated {
+        let plan = PlannedRecordings {
             model: &model,
             spread,
             recordings: RECORDINGS,
@@ -335,7 +335,7 @@ mod tests {
                 .composite
         };
         let forced = scatter(&(0..150).map(made).collect::<Vec<_>>());
-        let planned = anticipated(None, SAMPLES, Scattering::All);
+        let planned = anticipated(None, SAMPLES, ScatterSource::All);
         let drawn = scatter(&planned.inference.unwrap().drawn);
         assert_relative_eq!(drawn[..], forced[..], max_relative = 0.27);
     }
@@ -344,8 +344,11 @@ mod tests {
     /// 0.1/√12 = 2.9 %, however long they are; 400 draws know that to 3.5 %, four times.
     #[test]
     fn endless_recordings_leave_what_they_differ_by() {
-        let spread = spread(&[("WN", "sigma2")], Law::Normal { sd: 0.1 });
-        let endless = anticipated(Some(&spread), 1 << 16, Scattering::BetweenRecordings);
+        let spread = spread(
+            &[("WN", "sigma2")],
+            ParameterDistribution::Normal { sd: 0.1 },
+        );
+        let endless = anticipated(Some(&spread), 1 << 16, ScatterSource::BetweenRecordings);
         let deviation = scatter(&endless.inference.unwrap().drawn)[0];
         assert_relative_eq!(deviation, 0.1 / 12.0_f64.sqrt(), max_relative = 0.14);
     }
@@ -356,8 +359,8 @@ mod tests {
     #[test]
     fn few_recordings_widen_intervals_by_students_law() {
         let both = [("WN", "sigma2"), ("RW", "gamma2")];
-        let spread = spread(&both, Law::Normal { sd: 0.1 });
-        let endless = anticipated(Some(&spread), 1 << 16, Scattering::BetweenRecordings);
+        let spread = spread(&both, ParameterDistribution::Normal { sd: 0.1 });
+        let endless = anticipated(Some(&spread), 1 << 16, ScatterSource::BetweenRecordings);
         let stretch = 3.182_446 / 1.959_964 * (2.365_974_f64 / 3.0).sqrt();
         let found = endless.inference.as_ref().unwrap().stretch;
         assert_relative_eq!(found, stretch, max_relative = 0.02);
@@ -370,14 +373,14 @@ mod tests {
     /// by 1.25·42 %/√120 = 5 %; the ends by 400 draws by 7 %: twice both are 17 %.
     #[test]
     fn laboratories_state_what_was_anticipated() {
-        let law = Law::Lognormal {
+        let law = ParameterDistribution::Lognormal {
             median: 1.0,
             sd: 0.3,
             median_ci95: None,
             sd_ci95: None,
         };
         let spread = spread(&[("WN", "sigma2")], law);
-        let planned = half(&anticipated(Some(&spread), SAMPLES, Scattering::All));
+        let planned = half(&anticipated(Some(&spread), SAMPLES, ScatterSource::All));
         let model = model();
         let laboratory = |seed: u64| {
             let (imu, accel) = (imu(&model, Some(&spread), seed), Channel::named("accel"));

@@ -50,7 +50,7 @@ mod turn_on;
 // Intervals to be expected of a calibration that is planned.
 mod anticipated;
 
-pub use anticipated::Anticipated;
+pub use anticipated::PlannedRecordings;
 pub use curve::{
     CalibrationError, CalibrationFault, Estimator, Group, Pool, RecordingWarmUp, Replicate, Scope,
     Trim, WarmUp, average, grouped, implied, log_bias, median, replicates, robust_bias, trend,
@@ -63,14 +63,18 @@ pub use fit::{Fit, Termination, Weighting, estimate, fit};
 pub use format::{duration, percent};
 pub use model::{ModelSpec, SpecError};
 pub use outcome::{
-    Advance, AxesDiffer, Bootstrap, CurveDeparture, FitRange, Goodness, IndistinctProcesses,
-    Inference, LevelSpread, ModelCandidate, ModelChoice, ModelRanking, Outcome, ParameterInterval,
-    ParameterSpread, Practical, PracticalIntervals, ScaleMisfit, Settings, Undetermined, model_of,
-    tau_s,
+    Advance, AxesDiffer, Bootstrap, CalibrationSettings, CurveDeparture, FitRange, Goodness,
+    IndistinctProcesses, Inference, LevelSpread, ModelCandidate, ModelChoice, ModelRanking,
+    Outcome, ParameterInterval, ParameterSpread, Practical, PracticalIntervals, ScaleMisfit,
+    Undetermined, model_of, tau_s,
 };
-pub use pipeline::{calibrate, calibrate_with_progress, fit_curve, infer, infer_with_progress};
+pub use pipeline::{
+    add_intervals, add_intervals_with_progress, calibrate, calibrate_with_progress, fit_curve,
+};
 pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};
-pub use uncertainty::{ALIKE_LEVEL, Scattering, WIDEST, derived_interval, figures_with_intervals};
+pub use uncertainty::{
+    ALIKE_LEVEL, ScatterSource, UNDETERMINED_RATIO, derived_interval, figures_with_intervals,
+};
 
 #[cfg(test)]
 pub(crate) mod tests;

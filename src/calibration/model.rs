@@ -1,16 +1,16 @@
 //! Specification of a model, the kinds of its processes: "2*AR1+RW+WN+QN".
 
-use crate::noise::{Kind, labels};
+use crate::noise::{ProcessKind, labels};
 use std::fmt;
 use std::str::FromStr;
 
 /// Processes with a shape parameter that one model may have: the search is over all their combinations.
 const MOST_SHAPES: usize = 5;
 
-/// The kinds of process of a model, in the order of [`Kind::ALL`].
+/// The kinds of process of a model, in the order of [`ProcessKind::ALL`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelSpec {
-    kinds: Vec<Kind>,
+    kinds: Vec<ProcessKind>,
 }
 
 /// Why a specification means no model.
@@ -28,23 +28,27 @@ impl ModelSpec {
 
     /// N1 = WN + AR1 + RW of the paper.
     pub fn n1() -> Self {
-        Self::of([Kind::White, Kind::Ar1, Kind::RandomWalk])
+        Self::of([
+            ProcessKind::White,
+            ProcessKind::Ar1,
+            ProcessKind::RandomWalk,
+        ])
     }
 
     /// N2 = WN + QN + 2 AR1 + RW of the paper: the usual model.
     pub fn n2() -> Self {
         Self::of([
-            Kind::White,
-            Kind::Quantization,
-            Kind::Ar1,
-            Kind::Ar1,
-            Kind::RandomWalk,
+            ProcessKind::White,
+            ProcessKind::Quantization,
+            ProcessKind::Ar1,
+            ProcessKind::Ar1,
+            ProcessKind::RandomWalk,
         ])
     }
 
     /// A sum of processes that can be distinguished.
-    pub(crate) fn of(kinds: impl IntoIterator<Item = Kind>) -> Self {
-        let mut kinds: Vec<Kind> = kinds.into_iter().collect();
+    pub(crate) fn of(kinds: impl IntoIterator<Item = ProcessKind>) -> Self {
+        let mut kinds: Vec<ProcessKind> = kinds.into_iter().collect();
         kinds.sort_unstable();
         Self { kinds }
     }
@@ -57,13 +61,15 @@ impl ModelSpec {
     /// Returns true if another model equals this one with some amplitudes zero and some AR1 at the
     /// ends of their range: an AR1 is white noise at phi = 0 and a random walk at phi = 1.
     pub(crate) fn is_special_case_of(&self, other: &Self) -> bool {
-        let count = |spec: &Self, kind: Kind| spec.kinds.iter().filter(|k| **k == kind).count();
-        let more = |kind: Kind| count(self, kind).saturating_sub(count(other, kind));
+        let count =
+            |spec: &Self, kind: ProcessKind| spec.kinds.iter().filter(|k| **k == kind).count();
+        let more = |kind: ProcessKind| count(self, kind).saturating_sub(count(other, kind));
         // A white noise or random walk that the other model lacks must be one of its AR1 at the end of its
         // range, and that AR1 is then free for nothing else.
-        let (white, walk) = (more(Kind::White), more(Kind::RandomWalk));
-        let others: usize = Kind::ALL.into_iter().map(more).sum::<usize>() - white - walk;
-        others == 0 && count(self, Kind::Ar1) + white + walk <= count(other, Kind::Ar1)
+        let (white, walk) = (more(ProcessKind::White), more(ProcessKind::RandomWalk));
+        let others: usize = ProcessKind::ALL.into_iter().map(more).sum::<usize>() - white - walk;
+        others == 0
+            && count(self, ProcessKind::Ar1) + white + walk <= count(other, ProcessKind::Ar1)
     }
 
     /// The model without the process at an index.
@@ -74,7 +80,7 @@ impl ModelSpec {
     }
 
     /// The kinds of process.
-    pub fn kinds(&self) -> &[Kind] {
+    pub fn kinds(&self) -> &[ProcessKind] {
         &self.kinds
     }
 
@@ -85,7 +91,10 @@ impl ModelSpec {
 
     /// Words that may stand between plus signs.
     pub fn legal() -> impl Iterator<Item = &'static str> {
-        Kind::ALL.iter().map(|k| k.code()).chain(["N1", "N2"])
+        ProcessKind::ALL
+            .iter()
+            .map(|k| k.code())
+            .chain(["N1", "N2"])
     }
 }
 
@@ -110,16 +119,16 @@ impl FromStr for ModelSpec {
                 "" => return Err(refused("a process is missing".to_owned())),
                 "N1" => Self::n1().kinds,
                 "N2" => Self::n2().kinds,
-                code => vec![Kind::named(code).ok_or_else(|| SpecError {
+                code => vec![ProcessKind::named(code).ok_or_else(|| SpecError {
                     term: Some(name.to_owned()),
                     ..refused(format!("\"{name}\" is no process"))
                 })?],
             };
             kinds.extend(std::iter::repeat_n(own, counted).flatten());
         }
-        for kind in Kind::ALL {
+        for kind in ProcessKind::ALL {
             let count = kinds.iter().filter(|k| **k == kind).count();
-            if count > 1 && !matches!(kind, Kind::Ar1 | Kind::GaussMarkov) {
+            if count > 1 && !matches!(kind, ProcessKind::Ar1 | ProcessKind::GaussMarkov) {
                 let code = kind.code();
                 return Err(refused(format!(
                     "{count} {code} equal one {code}: their wavelet variances are proportional"
@@ -139,7 +148,7 @@ impl fmt::Display for ModelSpec {
     /// "WN+QN+2*AR1+RW"
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut separator = "";
-        for kind in Kind::ALL {
+        for kind in ProcessKind::ALL {
             let count = self.kinds.iter().filter(|k| **k == kind).count();
             match count {
                 0 => continue,

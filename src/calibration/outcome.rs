@@ -4,7 +4,7 @@ use crate::curve::{CalibrationError, Estimator, Pool, Scope, Trim, implied};
 use crate::fit::{Fit, Weighting, avlr, refit, score};
 use crate::imu::Axis;
 use crate::model::{ModelSpec, SpecError};
-use crate::noise::practical::{AllanMinimum, Pair};
+use crate::noise::practical::{AllanMinimum, NoiseDensities};
 use crate::noise::{Composite, Model, ParameterRef};
 use crate::wavelet::{Curve, Tuning};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -48,7 +48,7 @@ pub struct Outcome {
     pub fit: Fit,
     /// Difference of the pooled axes, where there is one.
     pub axes_differ: Option<AxesDiffer>,
-    /// Intervals of its parameters and goodness of fit, once [`infer`](crate::infer) was asked for them.
+    /// Intervals of its parameters and goodness of fit, once [`add_intervals`](crate::infer) was asked for them.
     pub inference: Option<Inference>,
     /// White noise, quantization noise, flicker noise and random walk read off the curve, where the model does not describe it.
     pub reading: Option<Box<Outcome>>,
@@ -72,7 +72,7 @@ impl Outcome {
     pub(crate) fn estimate_again(
         &self,
         curve: &Curve,
-        settings: &Settings,
+        settings: &CalibrationSettings,
     ) -> Result<Fit, CalibrationError> {
         match self.estimator {
             Estimator::Avlr => avlr(curve, &self.spec),
@@ -91,7 +91,7 @@ impl Outcome {
 
 /// Settings of a calibration.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
+pub struct CalibrationSettings {
     /// The curves to fit.
     pub estimators: Vec<Estimator>,
     /// Choice of the model.
@@ -179,7 +179,7 @@ impl std::fmt::Display for ModelChoice {
     }
 }
 
-impl Default for Settings {
+impl Default for CalibrationSettings {
     /// Settings that suit most recordings: DR-AWV, N2. At 1 Hz, until a rate is known.
     fn default() -> Self {
         Self {
@@ -194,7 +194,7 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
+impl CalibrationSettings {
     /// Returns true for a level within the range of the fit; the ends may be off by rounding.
     pub(crate) fn counts(&self, level: u32) -> bool {
         let scale_s = tau_s(level, self.rate_hz);
@@ -272,7 +272,7 @@ pub struct Inference {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Practical {
     /// N and K, of the policy "matched" over the default horizon.
-    pub walk: Pair,
+    pub walk: NoiseDensities,
     /// B.
     pub minimum: Option<AllanMinimum>,
     /// 95 % intervals of N, K and B.

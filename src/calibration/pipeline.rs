@@ -2,7 +2,7 @@
 
 use crate::curve::{CalibrationError, Estimator, Group, average, implied};
 use crate::fit::{Fit, estimate};
-use crate::outcome::{Advance, Bootstrap, ModelChoice, Outcome, Settings};
+use crate::outcome::{Advance, Bootstrap, CalibrationSettings, ModelChoice, Outcome};
 use crate::reading::reading;
 use crate::selection::choose;
 use crate::uncertainty::bootstrap::{by_bootstrap, inference};
@@ -14,7 +14,10 @@ use rayon::prelude::*;
 ///
 /// # Errors
 /// When a trim leaves no replicate, or a curve is too short for the model.
-pub fn calibrate(groups: &[Group], settings: &Settings) -> Result<Vec<Outcome>, CalibrationError> {
+pub fn calibrate(
+    groups: &[Group],
+    settings: &CalibrationSettings,
+) -> Result<Vec<Outcome>, CalibrationError> {
     calibrate_with_progress(groups, settings, &|_| {})
 }
 
@@ -25,7 +28,7 @@ pub fn calibrate(groups: &[Group], settings: &Settings) -> Result<Vec<Outcome>, 
 /// The same as [`calibrate`].
 pub fn calibrate_with_progress(
     groups: &[Group],
-    settings: &Settings,
+    settings: &CalibrationSettings,
     advance: Advance<'_>,
 ) -> Result<Vec<Outcome>, CalibrationError> {
     let jobs: Vec<_> = groups
@@ -53,11 +56,11 @@ pub fn fit_curve(
     group: &Group,
     estimator: Estimator,
     mut curve: Curve,
-    settings: &Settings,
+    settings: &CalibrationSettings,
     advance: Advance<'_>,
 ) -> Result<Outcome, CalibrationError> {
     let without_root = curve.ignored.clone();
-    leave_out(&mut curve, settings);
+    restrict_to_range(&mut curve, settings);
     let (spec, ranking) = match &settings.model {
         ModelChoice::Given(spec) => {
             advance(settings.model.steps());
@@ -80,7 +83,7 @@ pub fn fit_curve(
         .map_err(group.named(estimator))
     };
     let mut fit = fitted(&curve)?;
-    while count_exceeded(&mut curve, &without_root, &fit, settings) {
+    while include_exceeded(&mut curve, &without_root, &fit, settings) {
         fit = fitted(&curve)?;
     }
     let mut outcome = Outcome {
@@ -101,7 +104,7 @@ pub fn fit_curve(
 }
 
 /// Ignores the scales outside the range of a fit.
-fn leave_out(curve: &mut Curve, settings: &Settings) {
+fn restrict_to_range(curve: &mut Curve, settings: &CalibrationSettings) {
     let outside = |level: &&u32| !settings.counts(**level) && !curve.ignored.contains(*level);
     let outside: Vec<u32> = curve.levels.iter().filter(outside).copied().collect();
     curve.ignored.extend(outside);
@@ -109,7 +112,12 @@ fn leave_out(curve: &mut Curve, settings: &Settings) {
 
 /// Includes scales without a robust root where the fit exceeds the classical variance, an upper bound. Returns true if
 /// any was added.
-fn count_exceeded(curve: &mut Curve, without_root: &[u32], fit: &Fit, settings: &Settings) -> bool {
+fn include_exceeded(
+    curve: &mut Curve,
+    without_root: &[u32],
+    fit: &Fit,
+    settings: &CalibrationSettings,
+) -> bool {
     let implied = implied(&fit.composite, curve);
     let scales = curve.levels.iter().zip(&curve.wv).zip(implied);
     let is_exceeded = |level: &u32| without_root.contains(level) && settings.counts(*level);
@@ -124,21 +132,21 @@ fn count_exceeded(curve: &mut Curve, without_root: &[u32], fit: &Fit, settings: 
 
 /// Bootstraps every outcome from its group: intervals and tests. The same seed gives the same numbers on any number of
 /// threads.
-pub fn infer(
+pub fn add_intervals(
     groups: &[Group],
     outcomes: &mut [Outcome],
-    settings: &Settings,
+    settings: &CalibrationSettings,
     bootstrap: Bootstrap,
 ) {
-    infer_with_progress(groups, outcomes, settings, bootstrap, &|_| {});
+    add_intervals_with_progress(groups, outcomes, settings, bootstrap, &|_| {});
 }
 
-/// Runs [`infer`] and reports progress: `advance` receives the number of draws done since its last
+/// Runs [`add_intervals`] and reports progress: `advance` receives the number of draws done since its last
 /// call.
-pub fn infer_with_progress(
+pub fn add_intervals_with_progress(
     groups: &[Group],
     outcomes: &mut [Outcome],
-    settings: &Settings,
+    settings: &CalibrationSettings,
     bootstrap: Bootstrap,
     advance: Advance<'_>,
 ) {
@@ -164,10 +172,10 @@ pub(crate) fn fit_given(curve: Curve, model: &str, rate_hz: f64) -> Outcome {
         },
         replicates: Vec::new(),
     };
-    let settings = Settings {
+    let settings = CalibrationSettings {
         model: ModelChoice::Given(model.parse().unwrap()),
         rate_hz,
-        ..Settings::default()
+        ..CalibrationSettings::default()
     };
     fit_curve(&group, Estimator::Given, curve, &settings, &|_| {}).unwrap()
 }
@@ -190,7 +198,7 @@ mod tests {
         curve.ignored = vec![6, 7];
         curve.wv[5] *= 0.1;
         curve.wv[6] *= 10.0;
-        let outcome = fit_given(curve, "WN+RW", Settings::default().rate_hz);
+        let outcome = fit_given(curve, "WN+RW", CalibrationSettings::default().rate_hz);
         assert_eq!(outcome.curve.ignored, [7]);
     }
 
@@ -227,11 +235,11 @@ mod tests {
             from_s: 0.04,
             to_s: 81.92,
         };
-        let settings = |fit_range| Settings {
+        let settings = |fit_range| CalibrationSettings {
             model: ModelChoice::Given("WN+AR1+RW".parse().unwrap()),
             rate_hz: 100.0,
             fit_range,
-            ..Settings::default()
+            ..CalibrationSettings::default()
         };
         let fit = |curve: &Curve, range| {
             let (curve, settings) = (curve.clone(), settings(range));

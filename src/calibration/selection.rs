@@ -15,8 +15,8 @@
 use crate::curve::{CalibrationError, Estimator, Group, implied, p_value};
 use crate::fit::{Fit, Weighting, fit, refit, too_few_scales};
 use crate::model::ModelSpec;
-use crate::noise::Kind;
-use crate::outcome::{Advance, ModelCandidate, ModelChoice, ModelRanking, Settings};
+use crate::noise::ProcessKind;
+use crate::outcome::{Advance, CalibrationSettings, ModelCandidate, ModelChoice, ModelRanking};
 use crate::uncertainty::bootstrap::CurveSampler;
 use crate::wavelet::Curve;
 use rayon::prelude::*;
@@ -38,10 +38,10 @@ const SEED: u64 = 1;
 /// All sums of WN, QN, RW, DR and up to two AR1 that so many scales can carry.
 fn sums(scales: usize) -> Vec<ModelSpec> {
     let single = [
-        Kind::White,
-        Kind::Quantization,
-        Kind::RandomWalk,
-        Kind::Drift,
+        ProcessKind::White,
+        ProcessKind::Quantization,
+        ProcessKind::RandomWalk,
+        ProcessKind::Drift,
     ];
     let mut all = Vec::new();
     for bits in 0..1_u32 << single.len() {
@@ -51,7 +51,8 @@ fn sums(scales: usize) -> Vec<ModelSpec> {
                 .enumerate()
                 .filter(|(i, _)| bits >> i & 1 == 1)
                 .map(|(_, k)| *k);
-            let spec = ModelSpec::of(chosen.chain(std::iter::repeat_n(Kind::Ar1, correlated)));
+            let spec =
+                ModelSpec::of(chosen.chain(std::iter::repeat_n(ProcessKind::Ar1, correlated)));
             // At least one scale more than parameters, or the model meets the curve exactly and its distance
             // tells nothing.
             if (1..scales).contains(&spec.parameters()) {
@@ -71,13 +72,13 @@ pub(crate) fn choose(
     group: &Group,
     estimator: Estimator,
     curve: &Curve,
-    settings: &Settings,
+    settings: &CalibrationSettings,
     advance: Advance<'_>,
 ) -> Result<(ModelSpec, ModelRanking), CalibrationError> {
     let stage = ModelChoice::Auto.steps() / ModelChoice::STAGES;
     // One weighting for all candidates, whatever their models expect.
     let reported = settings;
-    let settings = &Settings {
+    let settings = &CalibrationSettings {
         weighting: Weighting::Edof,
         ..settings.clone()
     };
@@ -133,9 +134,9 @@ struct CandidateSet<'a> {
     estimator: Estimator,
     curve: &'a Curve,
     /// With the weighting that is the same for all candidates.
-    settings: &'a Settings,
+    settings: &'a CalibrationSettings,
     /// With the weighting of the fit that is reported.
-    reported: &'a Settings,
+    reported: &'a CalibrationSettings,
     fits: Vec<(ModelSpec, Fit)>,
 }
 

@@ -7,8 +7,8 @@ use crate::rng::StreamKey;
 use crate::tests::{inferred, measured, plain_settings, white_and_walk};
 use crate::{FitRange, ModelChoice, Outcome, Pool, Weighting, calibrate, grouped};
 
-fn settings() -> Settings {
-    Settings {
+fn settings() -> CalibrationSettings {
+    CalibrationSettings {
         model: ModelChoice::Auto,
         ..plain_settings("WN")
     }
@@ -125,7 +125,7 @@ fn a_rejected_model_is_not_preferred_to_one_that_passes() {
 #[test]
 fn the_chosen_model_passes_the_test_of_its_own_fit() {
     let noise = |run: u64| white_and_walk(1.0, [3e-7, 1e-6, 3e-6, 3e-4][run as usize]);
-    let settings = Settings {
+    let settings = CalibrationSettings {
         weighting: Weighting::Model,
         ..settings()
     };
@@ -151,7 +151,7 @@ fn candidates_are_sums_that_the_counted_scales_can_carry() {
         from_s: 2.0,
         to_s: 64.0,
     });
-    let settings = Settings {
+    let settings = CalibrationSettings {
         fit_range,
         ..settings()
     };

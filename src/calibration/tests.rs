@@ -3,10 +3,10 @@
 use crate::curve::{Estimator, Group, Pool, Replicate, Trim, grouped, replicates};
 use crate::imu::Channel;
 use crate::noise::{Composite, Model, Process, Spread, VirtualImu};
-use crate::outcome::{Bootstrap, ModelChoice, Outcome, Settings};
+use crate::outcome::{Bootstrap, CalibrationSettings, ModelChoice, Outcome};
 use crate::rng::{Generator, StreamKey};
-use crate::wavelet::{Curve, RobustVariance, Tuning, both};
-use crate::{Weighting, calibrate, infer};
+use crate::wavelet::{Curve, RobustVariance, Tuning, classical_and_robust};
+use crate::{Weighting, add_intervals, calibrate};
 use rand_distr::{Distribution, StandardNormal};
 
 pub(crate) fn generator(seed: u64, run: u64) -> Generator {
@@ -55,7 +55,8 @@ pub(crate) fn replicate(classical: Vec<f64>, robust: Vec<RobustVariance>) -> Rep
 
 /// The wavelet variances of a signal.
 pub(crate) fn measured(name: String, signal: &[f64], levels: u32) -> Replicate {
-    let (classical, robust) = both(signal, levels, &Tuning::new(0.6).unwrap()).unwrap();
+    let (classical, robust) =
+        classical_and_robust(signal, levels, &Tuning::new(0.6).unwrap()).unwrap();
     Replicate {
         name,
         samples: signal.len(),
@@ -64,17 +65,17 @@ pub(crate) fn measured(name: String, signal: &[f64], levels: u32) -> Replicate {
 }
 
 /// Classical averages, fitted with a sum of processes.
-pub(crate) fn settings(spec: &str) -> Settings {
-    Settings {
+pub(crate) fn settings(spec: &str) -> CalibrationSettings {
+    CalibrationSettings {
         estimators: vec![Estimator::Awv],
         model: ModelChoice::Given(spec.parse().unwrap()),
-        ..Settings::default()
+        ..CalibrationSettings::default()
     }
 }
 
 /// The same of samples a second apart, with the weights of the literature.
-pub(crate) fn plain_settings(spec: &str) -> Settings {
-    Settings {
+pub(crate) fn plain_settings(spec: &str) -> CalibrationSettings {
+    CalibrationSettings {
         trim: Trim::Count(0),
         tuning: Tuning::new(0.6).unwrap(),
         weighting: Weighting::Edof,
@@ -98,7 +99,7 @@ pub(crate) fn recorded(
     recordings: u64,
     channels: &[Channel],
     samples: usize,
-    settings: &Settings,
+    settings: &CalibrationSettings,
 ) -> Vec<Group> {
     let signals = (1..=recordings).flat_map(|run| {
         let recording = imu.recording(run, channels, samples).unwrap();
@@ -108,8 +109,13 @@ pub(crate) fn recorded(
 }
 
 /// The first outcome of a calibration, with what other recordings would have given.
-pub(crate) fn inferred(groups: &[Group], settings: &Settings, draws: usize, seed: u64) -> Outcome {
+pub(crate) fn inferred(
+    groups: &[Group],
+    settings: &CalibrationSettings,
+    draws: usize,
+    seed: u64,
+) -> Outcome {
     let mut outcomes = calibrate(groups, settings).unwrap();
-    infer(groups, &mut outcomes, settings, Bootstrap { draws, seed });
+    add_intervals(groups, &mut outcomes, settings, Bootstrap { draws, seed });
     outcomes.remove(0)
 }

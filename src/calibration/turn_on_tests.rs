@@ -4,7 +4,7 @@ use super::*;
 use crate::curve::{Pool, grouped, replicates};
 use crate::imu::Recording;
 use crate::noise::{Composite, Model, Process};
-use crate::outcome::Settings;
+use crate::outcome::CalibrationSettings;
 use crate::pipeline::calibrate;
 use crate::tests::{generator, imu, normal, settings};
 use rayon::prelude::*;
@@ -50,8 +50,8 @@ fn spreads(
     spec: &str,
     change: impl Fn(u64, &mut Recording),
 ) -> Vec<TurnOnSpread> {
-    let settings = Settings {
-        estimators: Settings::default().estimators,
+    let settings = CalibrationSettings {
+        estimators: CalibrationSettings::default().estimators,
         ..settings(spec)
     };
     let mut signals = Vec::new();

@@ -31,7 +31,7 @@ pub(crate) fn run(args: &BatchArgs, mut session: Session) -> Result<(), Failure>
         flag::register_conditional_default(number, Arc::clone(&is_stopped))
             .and_then(|_| flag::register(number, Arc::clone(&is_stopped)))
             .and_then(|_| flag::register_usize(number, Arc::clone(&signal), number as usize))
-            .map_err(Failure::could_not)?;
+            .map_err(Failure::failed)?;
     }
     let limit = args.time_limit.map(Duration::try_from_secs_f64);
     let deadline = limit.and_then(|limit| Instant::now().checked_add(limit.ok()?));

@@ -113,7 +113,7 @@ fn study_text(args: &DemoArgs, seed: u64) -> Result<String, Failure> {
             .all(|part| matches!(part, Component::Normal(_)));
     let trajectory = match is_below {
         true => Path::new(&"../".repeat(out.components().count())).join(TRAJECTORY),
-        false => std::path::absolute(TRAJECTORY).map_err(Failure::could_not)?,
+        false => std::path::absolute(TRAJECTORY).map_err(Failure::failed)?,
     };
     let (trajectory, runs) = (
         toml::Value::from(trajectory.display().to_string()),

@@ -294,7 +294,7 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
         .num_threads(threads)
         .build_global();
     let outcome = pool
-        .map_err(Failure::could_not)
+        .map_err(Failure::failed)
         .and_then(|()| command.run(session(&common)));
     interrupt::settle();
     match outcome {
@@ -388,7 +388,7 @@ fn man(args: &ManArgs) -> Result<String, Failure> {
     };
     clap_mangen::Man::new(of_command)
         .render(&mut page)
-        .map_err(Failure::could_not)?;
+        .map_err(Failure::failed)?;
     Ok(String::from_utf8_lossy(&page).into_owned())
 }
 

@@ -1,6 +1,6 @@
 //! The ranges of schemas are those of the readers.
 
-use super::{SchemaKind as Kind, schema_of};
+use super::{SchemaKind as ProcessKind, schema_of};
 use crate::io::{
     Failure, contamination_file, fusion_files, model_file, scenario_file, trajectory_file,
 };
@@ -10,7 +10,7 @@ use std::path::Path;
 /// A file with sound values, and its keys whose other values are refused for reasons that no range has: another key, the
 /// length of the whole.
 struct Sample {
-    kind: Kind,
+    kind: ProcessKind,
     text: &'static str,
     loose: &'static [&'static str],
 }
@@ -171,7 +171,7 @@ factor = 4.0
 
 const SAMPLES: [Sample; 6] = [
     Sample {
-        kind: Kind::Scenario,
+        kind: ProcessKind::Scenario,
         text: SCENARIO,
         loose: &[
             "imu.rate_hz",
@@ -184,40 +184,42 @@ const SAMPLES: [Sample; 6] = [
         ],
     },
     Sample {
-        kind: Kind::Model,
+        kind: ProcessKind::Model,
         text: ANY_PROCESS,
         loose: &["rate_hz"],
     },
     Sample {
-        kind: Kind::Initial,
+        kind: ProcessKind::Initial,
         text: INITIAL,
         loose: &[],
     },
     Sample {
-        kind: Kind::Profile,
+        kind: ProcessKind::Profile,
         text: STANDING,
         loose: &["duration_s", "climb_m", "speed_m_s", "ramp_s"],
     },
     Sample {
-        kind: Kind::Profile,
+        kind: ProcessKind::Profile,
         text: MOVING,
         loose: &["_m", "_deg", "_s", "_s2"],
     },
     Sample {
-        kind: Kind::Contamination,
+        kind: ProcessKind::Contamination,
         text: CONTAMINATION,
         loose: &["0.share", "3.share", ".sigma2", ".sigma"],
     },
 ];
 
-fn read(kind: Kind, path: &Path) -> Result<(), Failure> {
+fn read(kind: ProcessKind, path: &Path) -> Result<(), Failure> {
     match kind {
-        Kind::Scenario => scenario_file::read(path).map(|_| ()),
-        Kind::Study => unreachable!("what a run takes is for its options to say"),
-        Kind::Model => model_file::read(path).map(|_| ()),
-        Kind::Initial => fusion_files::read_initial(path).map(|_| ()),
-        Kind::Profile => trajectory_file::load(path, None).map(|_| ()),
-        Kind::Contamination => contamination_file::find(&path.to_string_lossy(), 100.0).map(|_| ()),
+        ProcessKind::Scenario => scenario_file::read(path).map(|_| ()),
+        ProcessKind::Study => unreachable!("what a run takes is for its options to say"),
+        ProcessKind::Model => model_file::read(path).map(|_| ()),
+        ProcessKind::Initial => fusion_files::read_initial(path).map(|_| ()),
+        ProcessKind::Profile => trajectory_file::load(path, None).map(|_| ()),
+        ProcessKind::Contamination => {
+            contamination_file::find(&path.to_string_lossy(), 100.0).map(|_| ())
+        }
     }
 }
 
@@ -397,6 +399,6 @@ fn schemas_have_the_bounds_of_their_readers() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     // the keys of a study are those of a run, whose options clap bounds
-    bounds[Kind::Study as usize] = usize::MAX;
+    bounds[ProcessKind::Study as usize] = usize::MAX;
     assert!(bounds.iter().all(|n| *n > 5), "{bounds:?}");
 }

@@ -99,7 +99,7 @@ impl Session {
         let mut stdout = std::io::stdout().lock();
         match writeln!(stdout, "{}", safe(text)).and_then(|()| stdout.flush()) {
             Err(e) if e.kind() != ErrorKind::BrokenPipe => {
-                let failure = Failure::could_not(format!("standard output: {}", system_words(&e)));
+                let failure = Failure::failed(format!("standard output: {}", system_words(&e)));
                 self.failure(&failure);
                 remove_unfinished();
                 std::process::exit(failure.code().into());

@@ -73,7 +73,7 @@ impl Command for CheckFiles {
                 }));
                 let message = format!("{wrong} of {} files refused", files.len());
                 Some(if failures.iter().any(|failure| failure.code() == 1) {
-                    Failure::could_not(message)
+                    Failure::failed(message)
                 } else {
                     Failure::input(message)
                 })

@@ -1,7 +1,8 @@
 //! `nav-sim compare`: run directories → ratios between runs; two models → what changed.
 
 use crate::app::{
-    Answer, Command, Context, Failure, Inputs, Manifest, Out, PlainAnswer, Refuse, Result, refused,
+    Answer, Command, Context, Failure, Inputs, IntoFailure, Manifest, OutputKind, PlainAnswer,
+    Result, refused,
 };
 use crate::commands::run::RUN_FILES;
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
@@ -61,7 +62,7 @@ pub enum TableForm {
 impl Command for Compare {
     type Answer = PlainAnswer;
     const NAME: &'static str = "compare";
-    const OUT: Out = Out::File {
+    const OUT: OutputKind = OutputKind::File {
         name: "comparison.json",
         help: "File to write, with a page (.html) beside it [default: comparison.json]",
     };

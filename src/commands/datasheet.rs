@@ -1,6 +1,6 @@
 //! `nav-sim datasheet`: models from data sheets, and the catalogue of IMUs.
 
-use crate::app::{Command, Context, Failure, Out, PlainAnswer, Refuse, Result};
+use crate::app::{Command, Context, Failure, IntoFailure, OutputKind, PlainAnswer, Result};
 use crate::io::datasheet::{
     CATALOGUE, Datasheet, DatasheetEntry, Figure, GRADE, StatedQuantity, catalogued, measured, read,
 };
@@ -43,7 +43,7 @@ pub struct DatasheetArgs {
 impl Command for DatasheetArgs {
     type Answer = PlainAnswer;
     const NAME: &'static str = "datasheet";
-    const OUT: Out = Out::File {
+    const OUT: OutputKind = OutputKind::File {
         name: "model.toml",
         help: "Model file (default: stdout)",
     };

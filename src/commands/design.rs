@@ -8,7 +8,8 @@ use crate::io::draws_file::DrawsFile;
 use crate::io::model_file::ModelFile;
 use crate::parse;
 use nav_sim_calibration::{
-    Anticipated, Bootstrap, Estimator, Outcome, ParameterInterval, Scattering, Settings,
+    Bootstrap, CalibrationSettings, Estimator, Outcome, ParameterInterval, PlannedRecordings,
+    ScatterSource,
 };
 use nav_sim_document::{Document, Importance, Table, Tone, readable, window};
 use nav_sim_navigation::ekf::FilterStates;
@@ -134,16 +135,16 @@ impl Design {
         hours: f64,
     ) -> Result<DesignOutcome> {
         let model = &file.model;
-        let anticipated = Anticipated {
+        let anticipated = PlannedRecordings {
             model,
             spread: file.spread.as_ref(),
             recordings,
             samples: (hours * 3600.0 * model.rate_hz).round() as usize,
         };
-        let settings = Settings::default();
+        let settings = CalibrationSettings::default();
         let outcomes =
             |scattering| anticipated.outcomes(self.estimator, &settings, scattering, bootstrap);
-        let all = outcomes(Scattering::All)?;
+        let all = outcomes(ScatterSource::All)?;
         let designed = |all: &[Outcome]| -> Vec<DesignedParameter> {
             all.iter()
                 .flat_map(|o| designed(o, model.rate_hz))
@@ -151,7 +152,7 @@ impl Design {
         };
         let mut parameters = designed(&all);
         if file.spread.is_some() {
-            let endless = designed(&outcomes(Scattering::BetweenRecordings)?);
+            let endless = designed(&outcomes(ScatterSource::BetweenRecordings)?);
             for (parameter, endless) in parameters.iter_mut().zip(endless) {
                 parameter.endless_half_width_pct = endless.half_width_pct;
             }

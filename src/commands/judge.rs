@@ -1,7 +1,7 @@
 //! `nav-sim judge`: the solution of any filter against a reference.
 
 use super::fuse::{Columns, TIME, number, table};
-use crate::app::{Command, Context, Failure, Out, PlainAnswer, Result, refused};
+use crate::app::{Command, Context, Failure, OutputKind, PlainAnswer, Result, refused};
 use crate::io::trajectory_file::{load_reference, load_solution, parse_origin};
 use crate::parse::numbers;
 use crate::report::verdict::{drive_line, tone};
@@ -70,7 +70,7 @@ fn origin(text: &str) -> Result<[f64; 3], &'static str> {
 impl Command for Judge {
     type Answer = PlainAnswer;
     const NAME: &'static str = "judge";
-    const OUT: Out = Out::Directory {
+    const OUT: OutputKind = OutputKind::Directory {
         path: "out/judge",
         files: &["summary.json", "errors.csv"],
     };

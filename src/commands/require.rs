@@ -1,7 +1,9 @@
 //! The IMU that a limit needs, what a given one makes of it, and a ranking of several.
 
 use crate::app::inputs::{self, ScenarioArgs};
-use crate::app::{Command, Context, Failure, Inputs, Out, PlainAnswer, Refuse, Result, refused};
+use crate::app::{
+    Command, Context, Failure, Inputs, IntoFailure, OutputKind, PlainAnswer, Result, refused,
+};
 use crate::io::datasheet::{self, CATALOGUE, Datasheet};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::input::listed;
@@ -9,8 +11,8 @@ use crate::io::model_file::{self, ModelFile, PROGRAM, TurnOn, known};
 use crate::parse;
 use crate::report::csv::merged;
 use nav_sim_document::{Document, Importance, Table, Tone, counted, readable, seconds, window};
-use nav_sim_navigation::ekf::BeliefError;
-use nav_sim_navigation::metrics::Expected;
+use nav_sim_navigation::ekf::FilterModelError;
+use nav_sim_navigation::metrics::ExpectedRun;
 use nav_sim_navigation::require::{
     Drift, HardestLimit, ImuParameters, ImuSearch, IntensityBound as Bound, Limit, LimitQuantity,
     Margins, OutagePlacements, RequireError, evenly, worst_without_imu_errors,
@@ -86,7 +88,7 @@ impl FromStr for OutageRequest {
 impl Command for Require {
     type Answer = PlainAnswer;
     const NAME: &'static str = "require";
-    const OUT: Out = Out::File {
+    const OUT: OutputKind = OutputKind::File {
         name: "needed.toml",
         help: "Model file of the required IMU",
     };
@@ -625,7 +627,7 @@ impl Requirements {
         long: &OutagePlacements<'_>,
         scenario: &Scenario,
         model: &Model,
-    ) -> Result<Bridged, RequireError> {
+    ) -> Result<OutageCurves, RequireError> {
         let curves = long.curves(scenario, model)?;
         let longest = self.longest_of(long, scenario, model, &curves)?;
         let length_s = self.length_of(&longest);
@@ -724,10 +726,10 @@ impl Requirements {
     ) -> Result<Option<Outage>, RequireError> {
         let (scenario, outages) = (scenario.with_full_noise(), [outage]);
         let track = self.track.with_outages(&outages);
-        let expected = Expected::along(
+        let expected = ExpectedRun::along(
             &track,
             &scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0),
-            &scenario.belief(model, &outages, &track)?,
+            &scenario.filter_model(model, &outages, &track)?,
             model,
         );
         Ok(expected
@@ -826,7 +828,7 @@ impl Requirements {
         scenario: &Scenario,
         model: &Model,
         curves: &[Vec<Drift>],
-    ) -> Result<LongestOutage, BeliefError> {
+    ) -> Result<LongestOutage, FilterModelError> {
         let is_missed = |drift: &Drift| self.limits.iter().any(|l| drift.exceeds(l));
         let bracket = |(outage, curve): (&Outage, &Vec<Drift>)| {
             let missed = curve.iter().position(is_missed)?;
@@ -1001,7 +1003,7 @@ impl LongestOutage {
 }
 
 /// Curves of errors, the longest outage within the limits, and the hardest limit.
-type Bridged = (Vec<Vec<Drift>>, LongestOutage, Option<HardestLimit>);
+type OutageCurves = (Vec<Vec<Drift>>, LongestOutage, Option<HardestLimit>);
 
 /// Result of a model against the limits.
 #[derive(Debug, Serialize)]

@@ -1,7 +1,9 @@
 //! `nav-sim synthesize`: replicate recordings of a noise model.
 
 use crate::app::reading::{ChannelSet, channel_set};
-use crate::app::{Answer, Command, Context, Failure, Inputs, Out, OutputFile, Result, refused};
+use crate::app::{
+    Answer, Command, Context, Failure, Inputs, OutputFile, OutputKind, Result, refused,
+};
 use crate::io::model_file::{self, ModelFile};
 use crate::io::{contamination_file, recordings};
 use crate::parse;
@@ -59,7 +61,7 @@ pub struct Synthesis {
     schema_version: u32,
     seed: u64,
     #[serde(flatten)]
-    drawn: Drawn,
+    drawn: SynthesisRecord,
     #[serde(skip)]
     file: ModelFile,
     #[serde(skip)]
@@ -71,7 +73,7 @@ pub struct Synthesis {
 }
 
 #[derive(Debug, Serialize)]
-struct Drawn {
+struct SynthesisRecord {
     rate_hz: f64,
     samples: usize,
     spread: bool,
@@ -83,7 +85,7 @@ struct Drawn {
 impl Command for Synthesize {
     type Answer = Synthesis;
     const NAME: &'static str = "synthesize";
-    const OUT: Out = Out::Directory {
+    const OUT: OutputKind = OutputKind::Directory {
         path: "out/replicates",
         files: &[],
     };
@@ -119,7 +121,7 @@ impl Command for Synthesize {
             .map(|name| find(name, rate_hz))
             .transpose()?;
         let channels = self.wanted(&file, context)?;
-        reaches(contamination.as_ref(), self.replicates, &channels, context)?;
+        refuse_ineffective(contamination.as_ref(), self.replicates, &channels, context)?;
         let samples = match self.duration {
             Some(s) => (s * rate_hz).round(),
             None => self.samples.unwrap_or(524_284) as f64,
@@ -132,7 +134,7 @@ impl Command for Synthesize {
         let mut synthesis = Synthesis {
             schema_version: 1,
             seed: context.seed_or(None),
-            drawn: Drawn {
+            drawn: SynthesisRecord {
                 rate_hz,
                 samples: samples as usize,
                 spread: self.spread,
@@ -236,7 +238,7 @@ impl Synthesis {
 
 impl Answer for Synthesis {
     fn document(&self) -> Document {
-        let Drawn {
+        let SynthesisRecord {
             rate_hz,
             samples,
             axes,
@@ -265,7 +267,7 @@ impl Answer for Synthesis {
 
 /// Refuses a contamination that touches nothing of what is made: the replicates would be clean by another name. Says
 /// which of its rules do not.
-fn reaches(
+fn refuse_ineffective(
     contamination: Option<&Contamination>,
     replicates: u64,
     channels: &[Channel],

@@ -1,7 +1,7 @@
 //! `nav-sim trajectory`: reference trajectories.
 
 use crate::app::inputs::ScenarioArgs;
-use crate::app::{Command, Context, Failure, Invocation, Out, PlainAnswer, Result, inputs};
+use crate::app::{Command, Context, Failure, Invocation, OutputKind, PlainAnswer, Result, inputs};
 use crate::io::trajectory_file::{self, parse_origin};
 use crate::parse;
 use crate::report::{gnss_csv, imu_csv, initial_toml};
@@ -81,7 +81,7 @@ pub struct Convert {
 impl Command for Convert {
     type Answer = PlainAnswer;
     const NAME: &'static str = "trajectory convert";
-    const OUT: Out = Out::File {
+    const OUT: OutputKind = OutputKind::File {
         name: "trajectory.csv",
         help: "Table to write (.csv, .csv.gz or .tum); without it, standard output",
     };
@@ -267,7 +267,7 @@ const RECORDED: [&str; 4] = ["imu.csv", "gnss.csv", "reference.csv", "initial.to
 impl Command for Record {
     type Answer = PlainAnswer;
     const NAME: &'static str = "trajectory record";
-    const OUT: Out = Out::Directory {
+    const OUT: OutputKind = OutputKind::Directory {
         path: "out/recording",
         files: &RECORDED,
     };

@@ -1,18 +1,21 @@
 //! `nav-sim tune`: the smallest factors on the variances of a noise model that make its filter consistent with other truths.
 
 use crate::app::inputs::{self, SettingsArgs};
-use crate::app::{Command, Context, Failure, Input, Inputs, Out, PlainAnswer, Result, refused};
+use crate::app::{
+    Command, Context, Failure, Input, Inputs, OutputKind, PlainAnswer, Result, refused,
+};
 use crate::io::model_file::{self, ModelFile, PROGRAM, known};
 use crate::parse;
 use crate::report::in_order;
 use nav_sim_document::{Document, Table, Tone, readable, seconds, short_names};
-use nav_sim_navigation::ekf::{BeliefError, FilterStates};
+use nav_sim_navigation::ekf::{FilterModelError, FilterStates};
 use nav_sim_navigation::metrics::{PerState, VerdictKind};
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
-    Aim, Factor, FilterConsistency, Task, Track, TrueErrors, aiding_factor, drive, scaled,
+    ConsistencyCriterion, Factor, FilterConsistency, Track, TrueErrors, TuningProblem,
+    aiding_factor, drive, scaled,
 };
 use nav_sim_navigation::simulation::{NEES_DOF, REPORTED_NAMES, TOLERANCE};
 use nav_sim_signal::imu::Sensor;
@@ -39,8 +42,8 @@ pub struct Tune {
     #[command(flatten)]
     settings: SettingsArgs,
     /// Meaning of consistent: worst, no error of any truth exceeds what the filter states; mean, the NEES is right on average
-    #[arg(id = "for", long = "for", value_name = "AIM", value_parser = parse::one_of::<Aim>(&Aim::NAMES), default_value_t)]
-    aim: Aim,
+    #[arg(id = "for", long = "for", value_name = "AIM", value_parser = parse::one_of::<ConsistencyCriterion>(&ConsistencyCriterion::NAMES), default_value_t)]
+    aim: ConsistencyCriterion,
     /// Filter to tune: full (a bias state for each process), 15 (one bias per axis) or 21 (and a scale factor per axis);
     /// these two take longer; the filter that `run` makes by default is assessed too
     #[arg(long, value_name = "STATES", default_value = "full")]
@@ -57,7 +60,7 @@ const DAY_S: f64 = 86_400.0;
 impl Command for Tune {
     type Answer = PlainAnswer;
     const NAME: &'static str = "tune";
-    const OUT: Out = Out::File {
+    const OUT: OutputKind = OutputKind::File {
         name: "tuned.toml",
         help: "Model file to write",
     };
@@ -199,7 +202,7 @@ impl Tune {
         truths: &[TrueErrors],
         track: &Track,
         outages: &[Outage],
-    ) -> std::result::Result<TuneResult, BeliefError> {
+    ) -> std::result::Result<TuneResult, FilterModelError> {
         let mut scenario = given.clone();
         match self.filter {
             // what goes with the filter of 21 states beside the model stays
@@ -209,22 +212,24 @@ impl Tune {
         let filter_of_run = given.filter.states;
         // What is wrong with the vehicle's own measurements no noise of the IMU stands for: their sigmas come first.
         let aiding = &given.aiding;
-        let belief = scenario.with_full_noise().belief(model, outages, track)?;
+        let filter_model = scenario
+            .with_full_noise()
+            .filter_model(model, outages, track)?;
         let known = TrueErrors {
             aiding: aiding.clone(),
             ..TrueErrors::from(model.clone())
         };
-        let aiding_sigmas =
-            (!aiding.is_none()).then(|| aiding_factor(track, &belief, &known).unwrap_or(f64::NAN));
+        let aiding_sigmas = (!aiding.is_none())
+            .then(|| aiding_factor(track, &filter_model, &known).unwrap_or(f64::NAN));
         let widened = aiding_sigmas
             .filter(|factor| *factor > 1.0)
             .map(|factor| track.with_aiding_sigmas(factor));
         let analysed = widened.as_ref().unwrap_or(track);
         let full = scenario.with_full_noise();
-        let full = |model: &Model| full.belief(model, outages, analysed);
-        let tuned = |model: &Model| scenario.belief(model, outages, analysed);
-        let of_run = |model: &Model| given.belief(model, outages, analysed);
-        let task = Task {
+        let full = |model: &Model| full.filter_model(model, outages, analysed);
+        let tuned = |model: &Model| scenario.filter_model(model, outages, analysed);
+        let of_run = |model: &Model| given.filter_model(model, outages, analysed);
+        let task = TuningProblem {
             model,
             truths,
             track: analysed,
@@ -237,18 +242,22 @@ impl Tune {
         Ok(TuneResult {
             filter: self.filter,
             filter_of_run,
-            before: Task { track, ..task }.consistency(task.filter, &[])?,
+            before: TuningProblem { track, ..task }.consistency(task.filter, &[])?,
             aiding_sigmas,
             after,
             of_run: (self.filter != filter_of_run)
                 .then(|| task.consistency(&of_run, &factors))
                 .transpose()?,
-            informed: truths
+            consistency_of_matched: truths
                 .iter()
                 .all(|truth| truth.imu.without_states().next().is_none())
                 .then(|| {
-                    task.informed(|truth| {
-                        knowing(&scenario, &truth.imu).belief(&truth.model, outages, analysed)
+                    task.consistency_of_matched(|truth| {
+                        with_true_imu_states(&scenario, &truth.imu).filter_model(
+                            &truth.model,
+                            outages,
+                            analysed,
+                        )
                     })
                 })
                 .transpose()?,
@@ -265,7 +274,7 @@ impl Tune {
 }
 
 /// The scenario with the filter that has states for what the true IMU is stated to have beside its noise.
-fn knowing(scenario: &Scenario, imu: &ImuSettings) -> Scenario {
+fn with_true_imu_states(scenario: &Scenario, imu: &ImuSettings) -> Scenario {
     let mut knowing = scenario.with_full_noise();
     let initial = &mut knowing.initial;
     for (sensor, bias, scale) in [
@@ -329,11 +338,11 @@ struct TuneResult {
     /// The tuned model in the filter that `run` makes of it, where that is another.
     of_run: Option<FilterConsistency>,
     /// A filter that knows the truth, each truth its own; none where there are errors of which no filter has states.
-    informed: Option<FilterConsistency>,
+    consistency_of_matched: Option<FilterConsistency>,
     /// Names of the truths.
     truths: Vec<String>,
     /// Condition under which the filter counts as consistent.
-    aim: Aim,
+    aim: ConsistencyCriterion,
     /// Sensors without noise that a factor could multiply, where a truth has some.
     without_factor: Vec<Sensor>,
 }
@@ -402,8 +411,10 @@ impl TuneResult {
     /// Why the factors are of no use, if they are not.
     fn fault(&self) -> Option<String> {
         let is_overconfident = match self.aim {
-            Aim::Worst => self.after.largest.ratio > 1.0 + TOLERANCE,
-            Aim::Mean => self.after.nees / NEES_DOF as f64 > (1.0 + TOLERANCE).powi(2),
+            ConsistencyCriterion::Worst => self.after.largest.ratio > 1.0 + TOLERANCE,
+            ConsistencyCriterion::Mean => {
+                self.after.nees / NEES_DOF as f64 > (1.0 + TOLERANCE).powi(2)
+            }
         };
         let is_at_limit = self.factors.iter().any(Factor::is_at_limit);
         let names: Vec<&str> = self
@@ -433,25 +444,35 @@ impl TuneResult {
             _ if !self.without_factor.is_empty() => {
                 "give it the noise of its data sheet (nav-sim datasheet) or of the truth, and tune again"
             }
-            Aim::Mean => {
+            ConsistencyCriterion::Mean => {
                 "--for worst, other processes, or the turn-on bias and scale factors of the truth"
             }
-            Aim::Worst => "other processes, or the turn-on bias and scale factors of the truth",
+            ConsistencyCriterion::Worst => {
+                "other processes, or the turn-on bias and scale factors of the truth"
+            }
         }
     }
 
     /// Horizontal RMSE at the outages' ends over that of a filter that knows the truth, less 1; NaN without one.
     fn cost(&self, found: &FilterConsistency) -> f64 {
         let square = |h: &FilterConsistency| h.horizontal_m().map(|x| x * x).sum::<f64>();
-        (square(found) / self.informed.as_ref().map_or(f64::NAN, square)).sqrt() - 1.0
+        (square(found)
+            / self
+                .consistency_of_matched
+                .as_ref()
+                .map_or(f64::NAN, square))
+        .sqrt()
+            - 1.0
     }
 
     fn filters(&self) -> impl Iterator<Item = (&'static str, &FilterConsistency)> {
         let tuned = [("untuned", &self.before), ("tuned", &self.after)].into_iter();
         let of_run = self.of_run.iter().map(|h| ("tuned, default of run", h));
-        tuned
-            .chain(of_run)
-            .chain(self.informed.iter().map(|h| ("knows the truth", h)))
+        tuned.chain(of_run).chain(
+            self.consistency_of_matched
+                .iter()
+                .map(|h| ("knows the truth", h)),
+        )
     }
 
     /// The truth in which an error is largest.
@@ -595,12 +616,12 @@ impl TuneResult {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nav_sim_navigation::simulation::lincov::Departure;
+    use nav_sim_navigation::simulation::lincov::WorstRatio;
 
     fn consistency(ratio: f64, nees: f64) -> FilterConsistency {
         FilterConsistency {
             nees,
-            largest: Departure {
+            largest: WorstRatio {
                 ratio,
                 state: 8,
                 outage: Some(0),
@@ -625,9 +646,9 @@ mod tests {
             before: consistency(2.0, 30.0),
             after: consistency(1.0, 8.8),
             of_run: None,
-            informed: Some(consistency(1.0, 9.0)),
+            consistency_of_matched: Some(consistency(1.0, 9.0)),
             truths: vec!["truth.toml".to_owned()],
-            aim: Aim::Worst,
+            aim: ConsistencyCriterion::Worst,
             without_factor: Vec::new(),
         }
     }
@@ -701,7 +722,7 @@ mod tests {
             ..consistency(1.0, 9.0)
         };
         let tuned = TuneResult {
-            informed: Some(ends([1.0, 1.0])),
+            consistency_of_matched: Some(ends([1.0, 1.0])),
             ..tuned()
         };
         assert!((tuned.cost(&ends([3.0, 4.0])) - (12.5_f64.sqrt() - 1.0)).abs() < 1e-12);
@@ -712,7 +733,7 @@ mod tests {
     #[test]
     fn a_verdict_that_is_not_met_has_its_reason() {
         let mut tuned = tuned();
-        tuned.aim = Aim::Mean;
+        tuned.aim = ConsistencyCriterion::Mean;
         let bound = 9.0 * (1.0 + TOLERANCE).powi(2);
         for (nees, is_met) in [(0.999 * bound, true), (1.001 * bound, false)] {
             tuned.after.nees = nees;

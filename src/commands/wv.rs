@@ -1,7 +1,7 @@
 //! `nav-sim wv`: wavelet variances and Allan deviations of static recordings.
 
 use crate::app::reading::{RecordingRequest, VarianceRequest};
-use crate::app::{Answer, Command, Context, Out, OutputFile, Result};
+use crate::app::{Answer, Command, Context, OutputFile, OutputKind, Result};
 use crate::commands::calibrate::{is_abnormal, recordings_line, visit};
 use crate::io::recordings::ReadOptions;
 use crate::parse;
@@ -10,8 +10,8 @@ use crate::report::curves::{
 };
 use crate::report::in_order;
 use nav_sim_calibration::{
-    Diagnosis, Pool, Replicate, Settings, calibrate, diagnose, duration, grouped, median,
-    replicates,
+    CalibrationSettings, Diagnosis, Pool, Replicate, calibrate, diagnose, duration, grouped,
+    median, replicates,
 };
 use nav_sim_document::{Cell, Chart, ChartAxis, Colour, Document, Panel, Series, Table, Tone};
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
@@ -40,7 +40,7 @@ pub struct Wv {
 impl Command for Wv {
     type Answer = SignalsFile;
     const NAME: &'static str = "wv";
-    const OUT: Out = Out::File {
+    const OUT: OutputKind = OutputKind::File {
         name: "curves.json",
         help: "Write the curves as JSON",
     };
@@ -68,10 +68,10 @@ impl Command for Wv {
         let looks: Vec<_> = looks.into_iter().collect::<Result<_>>()?;
         let (signals, measured): (Vec<_>, Vec<_>) = looks.into_iter().unzip();
         let rate_hz = report.files[0].rate_hz;
-        let settings = Settings {
+        let settings = CalibrationSettings {
             tuning,
             rate_hz,
-            ..Settings::default()
+            ..CalibrationSettings::default()
         };
         Ok(SignalsFile {
             schema_version: 1,
@@ -172,7 +172,7 @@ pub(super) fn outliers(signals: &[SignalCurves]) -> Option<String> {
 }
 
 /// Each recording against the others, as `calibrate` compares them with its default model: none where that has no fit.
-fn compared(signals: Vec<(Channel, Replicate)>, settings: &Settings) -> Vec<Diagnosis> {
+fn compared(signals: Vec<(Channel, Replicate)>, settings: &CalibrationSettings) -> Vec<Diagnosis> {
     let names = in_order(signals.iter().map(|(_, replicate)| replicate.name.as_str()));
     if names.len() < 2 {
         return Vec::new();

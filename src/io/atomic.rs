@@ -519,7 +519,7 @@ fn is_empty(directory: &Path) -> bool {
 }
 
 /// Text (blanks removed) by which nav-sim recognises its own files, per ending.
-const MARKS: [(&str, &str); 10] = [
+const SIGNATURES: [(&str, &str); 10] = [
     ("trajectory.csv", "(nav-simtrajectoryconvert)"),
     (".toml", "program=\"nav-sim"),
     (".txt", "(nav-simexport)"),
@@ -543,7 +543,7 @@ fn is_own(text: &str, kind: &str) -> bool {
         .strip_prefix(HEADER)
         .filter(|_| kind.ends_with("trajectory.csv"));
     let first = rows.and_then(|rows| rows.lines().next());
-    let mark = MARKS.iter().find(|(ending, _)| kind.ends_with(ending));
+    let mark = SIGNATURES.iter().find(|(ending, _)| kind.ends_with(ending));
     let is_marked = |mark: &str| text.split_whitespace().collect::<String>().contains(mark);
     text.is_empty()
         || mark.is_some_and(|(_, mark)| is_marked(mark))

@@ -12,16 +12,16 @@
 //! assert!((found.margin() + 2_f64.ln()).abs() < 1e-15);
 //! ```
 
-use crate::ekf::{Belief, BeliefError};
+use crate::ekf::{FilterModel, FilterModelError};
 use crate::imu::Sensor;
 use crate::metrics::{QuadraticForm, name_and_limit};
-use crate::noise::{Composite, Flicker, Kind, Model, Process, continuous};
+use crate::noise::{Composite, Flicker, Model, Process, ProcessKind, continuous};
 use crate::scenario::Scenario;
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
 use crate::simulation::ExperimentError;
 use crate::simulation::lincov::{
-    Crossing, Instant, Moments, NamedSource, Track, TruthSide, errors_in_outages,
+    Instant, Moments, NamedSource, RootSearch, Track, TruthModel, errors_in_outages,
 };
 use crate::trajectory::Trajectory;
 use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
@@ -160,7 +160,7 @@ pub enum RequireError {
     },
     /// The model has no filter.
     #[error(transparent)]
-    Belief(#[from] BeliefError),
+    FilterModel(#[from] FilterModelError),
     /// Trajectory, rates and fixes do not fit together.
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
@@ -317,7 +317,11 @@ impl<'a> OutagePlacements<'a> {
     ///
     /// # Errors
     /// When the model has no such filter.
-    pub fn drifts(&self, scenario: &Scenario, model: &Model) -> Result<Vec<Drift>, BeliefError> {
+    pub fn drifts(
+        &self,
+        scenario: &Scenario,
+        model: &Model,
+    ) -> Result<Vec<Drift>, FilterModelError> {
         self.drifts_in(&self.outages, scenario, model)
     }
 
@@ -329,10 +333,16 @@ impl<'a> OutagePlacements<'a> {
         &self,
         scenario: &Scenario,
         model: &Model,
-    ) -> Result<Vec<Vec<Drift>>, BeliefError> {
-        let belief = self.belief(scenario, model)?;
-        let all = TruthSide::together(&self.sources(scenario, model));
-        let laws = errors_in_outages(&self.track, &belief, &all, &self.outages, Moments::Reports);
+    ) -> Result<Vec<Vec<Drift>>, FilterModelError> {
+        let filter_model = self.filter_model(scenario, model)?;
+        let all = TruthModel::together(&self.sources(scenario, model));
+        let laws = errors_in_outages(
+            &self.track,
+            &filter_model,
+            &all,
+            &self.outages,
+            Moments::Reports,
+        );
         let curve = |(instants, outage): (Vec<Instant>, &Outage)| {
             // A report within the outage is what an outage would leave that ended there.
             let drift = |instant: &Instant| Drift::of(instant, instant.t_s - outage.start_s);
@@ -358,7 +368,7 @@ impl<'a> OutagePlacements<'a> {
         scenario: &Scenario,
         model: &Model,
         limits: &[Limit],
-    ) -> Result<HardestLimit, BeliefError> {
+    ) -> Result<HardestLimit, FilterModelError> {
         Ok(hardest(limits, &self.drifts(scenario, model)?))
     }
 
@@ -371,13 +381,18 @@ impl<'a> OutagePlacements<'a> {
         outages: &[Outage],
         scenario: &Scenario,
         model: &Model,
-    ) -> Result<Vec<Drift>, BeliefError> {
-        let all = TruthSide::together(&self.sources(scenario, model));
-        Ok(self.ends(outages, &self.belief(scenario, model)?, &all))
+    ) -> Result<Vec<Drift>, FilterModelError> {
+        let all = TruthModel::together(&self.sources(scenario, model));
+        Ok(self.ends(outages, &self.filter_model(scenario, model)?, &all))
     }
 
-    fn ends(&self, outages: &[Outage], belief: &Belief, truth: &TruthSide) -> Vec<Drift> {
-        let ends = errors_in_outages(&self.track, belief, truth, outages, Moments::End);
+    fn ends(
+        &self,
+        outages: &[Outage],
+        filter_model: &FilterModel,
+        truth: &TruthModel,
+    ) -> Vec<Drift> {
+        let ends = errors_in_outages(&self.track, filter_model, truth, outages, Moments::End);
         let drift = |(instants, outage): (Vec<Instant>, &Outage)| {
             Drift::of(
                 instants.last().expect("ends"),
@@ -388,15 +403,19 @@ impl<'a> OutagePlacements<'a> {
     }
 
     /// The filter that knows every process: the best that this IMU allows, whatever reduction is chosen later.
-    fn belief(&self, scenario: &Scenario, model: &Model) -> Result<Belief, BeliefError> {
+    fn filter_model(
+        &self,
+        scenario: &Scenario,
+        model: &Model,
+    ) -> Result<FilterModel, FilterModelError> {
         scenario
             .with_full_noise()
-            .belief(model, &self.outages, &self.track)
+            .filter_model(model, &self.outages, &self.track)
     }
 
     fn sources(&self, scenario: &Scenario, model: &Model) -> Vec<NamedSource> {
         let truth = Truth::Model(model);
-        TruthSide::sources(
+        TruthModel::sources(
             &scenario.experiment(self.trajectory, truth, &[], &self.outages, 0),
             model,
         )
@@ -467,11 +486,11 @@ const EVEN: f64 = 0.02;
 
 impl ImuParameters {
     /// The processes.
-    const PROCESSES: [(Sensor, Kind); IMU_PARAMETERS] = [
-        (Sensor::Accel, Kind::White),
-        (Sensor::Accel, Kind::GaussMarkov),
-        (Sensor::Gyro, Kind::White),
-        (Sensor::Gyro, Kind::GaussMarkov),
+    const PROCESSES: [(Sensor, ProcessKind); IMU_PARAMETERS] = [
+        (Sensor::Accel, ProcessKind::White),
+        (Sensor::Accel, ProcessKind::GaussMarkov),
+        (Sensor::Gyro, ProcessKind::White),
+        (Sensor::Gyro, ProcessKind::GaussMarkov),
     ];
 
     /// The noise model.
@@ -598,7 +617,7 @@ impl ImuSearch<'_> {
         &self,
         mut imu: ImuParameters,
         places: &[usize],
-    ) -> Result<ImuParameters, BeliefError> {
+    ) -> Result<ImuParameters, FilterModelError> {
         for _ in 0..ROUNDS {
             let (worst, squares) = self.squares(&imu, places)?;
             let total: f64 = squares.iter().sum();
@@ -630,7 +649,7 @@ impl ImuSearch<'_> {
         which: usize,
         others: f64,
         places: &[usize],
-    ) -> Result<IntensityBound, BeliefError> {
+    ) -> Result<IntensityBound, FilterModelError> {
         let base = imu.times(std::array::from_fn(
             |i| if i == which { 1.0 } else { others },
         ));
@@ -655,16 +674,20 @@ impl ImuSearch<'_> {
         imu: &ImuParameters,
         which: usize,
         places: &[usize],
-    ) -> Result<IntensityBound, BeliefError> {
+    ) -> Result<IntensityBound, FilterModelError> {
         self.limit_of(imu, which, NONE, places)
     }
 
-    fn worst(&self, imu: &ImuParameters) -> Result<HardestLimit, BeliefError> {
+    fn worst(&self, imu: &ImuParameters) -> Result<HardestLimit, FilterModelError> {
         let all: Vec<usize> = (0..self.course.outages.len()).collect();
         self.worst_of(imu, &all)
     }
 
-    fn worst_of(&self, imu: &ImuParameters, places: &[usize]) -> Result<HardestLimit, BeliefError> {
+    fn worst_of(
+        &self,
+        imu: &ImuParameters,
+        places: &[usize],
+    ) -> Result<HardestLimit, FilterModelError> {
         let model = imu.model(self.scenario.imu.rate_hz);
         let outages: Vec<Outage> = places.iter().map(|at| self.course.outages[*at]).collect();
         let drifts = self.course.drifts_in(&outages, self.scenario, &model)?;
@@ -682,8 +705,8 @@ impl ImuSearch<'_> {
         imu: &ImuParameters,
         weights: [f64; IMU_PARAMETERS],
         places: &mut Vec<usize>,
-    ) -> Result<(f64, ImuParameters), BeliefError> {
-        let crossing = Crossing {
+    ) -> Result<(f64, ImuParameters), FilterModelError> {
+        let crossing = RootSearch {
             bounds: (-RANGE, RANGE),
             step: 0.7,
             exact: EXACT,
@@ -694,7 +717,7 @@ impl ImuSearch<'_> {
         let mut start = 0.0;
         loop {
             let margin_there = |ln: f64| {
-                Ok::<_, BeliefError>(self.worst_of(&scaled(ln), places)?.margin() - RESERVE)
+                Ok::<_, FilterModelError>(self.worst_of(&scaled(ln), places)?.margin() - RESERVE)
             };
             let (ln, there) = crossing.from(start, margin_there)?;
             let worst = self.worst(&scaled(ln))?;
@@ -712,10 +735,10 @@ impl ImuSearch<'_> {
         &self,
         imu: &ImuParameters,
         places: &[usize],
-    ) -> Result<(HardestLimit, [f64; IMU_PARAMETERS + 1]), BeliefError> {
+    ) -> Result<(HardestLimit, [f64; IMU_PARAMETERS + 1]), FilterModelError> {
         let worst = self.worst_of(imu, places)?;
         let (course, model) = (self.course, imu.model(self.scenario.imu.rate_hz));
-        let belief = course.belief(self.scenario, &model)?;
+        let filter_model = course.filter_model(self.scenario, &model)?;
         let sources = course.sources(self.scenario, &model);
         let outage = &course.outages[worst.place..=worst.place];
         // each group of sources alone, under the gains of the filter that knows them all
@@ -726,7 +749,7 @@ impl ImuSearch<'_> {
                 own.unwrap_or(IMU_PARAMETERS) == group
             };
             let own: Vec<NamedSource> = sources.iter().filter(is_own).cloned().collect();
-            let drift = course.ends(outage, &belief, &TruthSide::together(&own))[0];
+            let drift = course.ends(outage, &filter_model, &TruthModel::together(&own))[0];
             drift.square(worst.limit.quantity)
         };
         let groups = (0..=IMU_PARAMETERS).into_par_iter();
@@ -750,7 +773,7 @@ pub struct Margins {
 }
 
 /// Correlation time of the negligible biases of the error-free IMU (s); its value has no effect.
-const SLOW_S: f64 = 300.0;
+const ERROR_FREE_T_CORR_S: f64 = 300.0;
 
 impl Margins {
     /// The margins of an IMU, beside that of one without errors.
@@ -771,8 +794,8 @@ pub fn worst_without_imu_errors(
     course: &OutagePlacements<'_>,
     scenario: &Scenario,
     limits: &[Limit],
-) -> Result<HardestLimit, BeliefError> {
-    let perfect = ImuParameters::perfect(SLOW_S).model(scenario.imu.rate_hz);
+) -> Result<HardestLimit, FilterModelError> {
+    let perfect = ImuParameters::perfect(ERROR_FREE_T_CORR_S).model(scenario.imu.rate_hz);
     course.worst(&without_imu_errors(scenario), &perfect, limits)
 }
 

@@ -2,7 +2,7 @@
 //! [Minaretzis et al.](crate::bibliography::Minaretzis24), Section V.
 
 use crate::earth::GravityModel;
-use crate::ekf::{Belief, BeliefError, FilterStates, FixUpdate, InitialSettings};
+use crate::ekf::{FilterModel, FilterModelError, FilterStates, FixUpdate, InitialSettings};
 use crate::imu::Sensor;
 use crate::noise::Model;
 use crate::noise::reduction::{self, ReductionError};
@@ -129,7 +129,7 @@ impl Scenario {
         &'a self,
         trajectory: &'a Trajectory,
         truth: Truth<'a>,
-        beliefs: &'a [Belief],
+        filter_models: &'a [FilterModel],
         outages: &'a [Outage],
         seed: u64,
     ) -> Experiment<'a> {
@@ -138,7 +138,7 @@ impl Scenario {
             rate_hz: self.imu.rate_hz,
             gravity: self.filter.gravity,
             truth,
-            beliefs,
+            filter_models,
             gnss: &self.gnss,
             initial: &self.initial,
             defects: &self.imu,
@@ -198,12 +198,12 @@ impl Scenario {
     ///
     /// # Errors
     /// When the model has no such filter.
-    pub fn belief(
+    pub fn filter_model(
         &self,
         model: &Model,
         outages: &[Outage],
         track: &Track,
-    ) -> Result<Belief, BeliefError> {
+    ) -> Result<FilterModel, FilterModelError> {
         let longest = outages
             .iter()
             .map(|o| o.end_s - o.start_s)
@@ -211,21 +211,21 @@ impl Scenario {
         // The scales over which the reduction has to agree: from one fix, below which the filter sees none of
         // them, to several times the longest outage.
         let (interval_s, window_s) = (1.0 / self.gnss.rate_hz, reduction::window_s(longest));
-        let mut belief = Belief::new(model, self.filter.states, interval_s, window_s)
+        let mut filter_model = FilterModel::new(model, self.filter.states, interval_s, window_s)
             .map_err(|e| self.blame(e))?;
         if self.filter.states.is_reduced() && self.filter.reduction == Reduction::Covariance {
             // The wavelet reduction is where this search starts, hence made in either case.
-            belief = reduced_belief(model, belief, track, AxisGrouping::Level);
+            filter_model = reduced_belief(model, filter_model, track, AxisGrouping::Level);
         }
-        Ok(belief
+        Ok(filter_model
             .with_initial(&self.initial)
             .with_vehicle(self.aiding.state_sigmas()))
     }
 
     /// Names the key at fault where fixes are too rare for a reduction.
-    fn blame(&self, error: BeliefError) -> BeliefError {
+    fn blame(&self, error: FilterModelError) -> FilterModelError {
         match error {
-            BeliefError::Reduction {
+            FilterModelError::Reduction {
                 source: source @ ReductionError::TooFewScales { .. },
                 ..
             } => SettingError::new("gnss.rate_hz", self.gnss.rate_hz, source.to_string()).into(),

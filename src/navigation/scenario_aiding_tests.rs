@@ -9,7 +9,7 @@ use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
 use crate::simulation::REPORTED;
 use crate::simulation::lincov::{
-    AssessedInstant, FilterPass, STRAPDOWN, Track, TruthSide, strapdown_over_sigma,
+    AssessedInstant, FilterPass, STRAPDOWN, Track, TruthModel, strapdown_over_sigma,
 };
 use crate::tests::{drive, gauss_markov, samples};
 use crate::trajectory::Trajectory;
@@ -54,14 +54,20 @@ pub(crate) fn scenario(aiding: &str) -> Scenario {
 
 /// Errors and beliefs at the end of the outage by the covariance analysis, and the root mean squares of errors and the
 /// mean stated deviations of `runs` runs there.
-fn both(scenario: &Scenario, runs: u64) -> (AssessedInstant, [[f64; REPORTED]; 2]) {
+fn classical_and_robust(scenario: &Scenario, runs: u64) -> (AssessedInstant, [[f64; REPORTED]; 2]) {
     let (trajectory, model) = (town(), consumer());
     let outages = [OUTAGE];
     let track = scenario.track(&trajectory, &model, &outages).unwrap();
-    let beliefs = [scenario.belief(&model, &outages, &track).unwrap()];
-    let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &outages, 5);
-    let truth = TruthSide::together(&TruthSide::sources(&experiment, &model));
-    let judged = FilterPass::new(&track, &beliefs[0])
+    let filter_models = [scenario.filter_model(&model, &outages, &track).unwrap()];
+    let experiment = scenario.experiment(
+        &trajectory,
+        Truth::Model(&model),
+        &filter_models,
+        &outages,
+        5,
+    );
+    let truth = TruthModel::together(&TruthModel::sources(&experiment, &model));
+    let judged = FilterPass::new(&track, &filter_models[0])
         .errors_at_ends(&truth)
         .remove(0);
     let found = run(&experiment, runs, &|_| {}).unwrap().remove(0).runs;
@@ -78,7 +84,7 @@ fn both(scenario: &Scenario, runs: u64) -> (AssessedInstant, [[f64; REPORTED]; 2
 fn runs_have_the_errors_that_the_analysis_states() {
     let runs = 400;
     let horizontal = |x: [f64; REPORTED]| x[0].hypot(x[1]);
-    let free = horizontal(both(&scenario(""), runs).0.errors.rmse());
+    let free = horizontal(classical_and_robust(&scenario(""), runs).0.errors.rmse());
     let nhc = "nhc.lever_arm_m = [-0.15, 0.3, 0.5]";
     let moving = "noise_sigma_m_s = 0.02, sideslip_s2_m = 0.004, walk_sigma_m_s = 0.08, correlation_time_s = 3";
     let slips = "slip_s2_m = 0.005, noise_sigma_m_s = 0.01, scale_sigma = 0.005";
@@ -106,7 +112,7 @@ fn runs_have_the_errors_that_the_analysis_states() {
             format!("heading = {{ source = 'antennas', {turned} }}"),
         ),
     ] {
-        let (judged, [rms, see]) = both(&scenario(&aiding), runs);
+        let (judged, [rms, see]) = classical_and_robust(&scenario(&aiding), runs);
         let (expected, sigma) = (judged.errors.rmse(), judged.sigma());
         for i in 0..REPORTED {
             let ratio = rms[i] / expected[i];
@@ -140,14 +146,20 @@ fn the_scale_of_a_wheel_moves_a_position_along_the_track() {
     // A loud accelerometer: the wheel alone says how fast the vehicle is.
     let model = gauss_markov(RATE_HZ, [1.0, 1e-12], [1e-3, 1e-6], [200.0; 2]);
     let track = scenario.track(&trajectory, &model, &outages).unwrap();
-    let beliefs = [scenario.belief(&model, &outages, &track).unwrap()];
-    let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &outages, 5);
-    let sources = TruthSide::sources(&experiment, &model);
+    let filter_models = [scenario.filter_model(&model, &outages, &track).unwrap()];
+    let experiment = scenario.experiment(
+        &trajectory,
+        Truth::Model(&model),
+        &filter_models,
+        &outages,
+        5,
+    );
+    let sources = TruthModel::sources(&experiment, &model);
     let wheel = sources
         .iter()
         .find(|source| source.name == "aiding.odometer.scale")
         .unwrap();
-    let errors = FilterPass::new(&track, &beliefs[0]).errors_at_ends(&wheel.side)[0].errors;
+    let errors = FilterPass::new(&track, &filter_models[0]).errors_at_ends(&wheel.side)[0].errors;
     let (north, east) = ((40.0 * DEG).cos(), (40.0 * DEG).sin());
     let p = errors.covariance;
     let along =
@@ -176,13 +188,19 @@ fn a_creep_that_lasts_moves_a_position_by_its_integral() {
     }];
     let model = gauss_markov(RATE_HZ, [1.0, 1e-12], [1e-3, 1e-6], [200.0; 2]);
     let track = scenario.track(&trajectory, &model, &outages).unwrap();
-    let beliefs = [scenario.belief(&model, &outages, &track).unwrap()];
-    let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &outages, 5);
-    let creep = TruthSide::sources(&experiment, &model)
+    let filter_models = [scenario.filter_model(&model, &outages, &track).unwrap()];
+    let experiment = scenario.experiment(
+        &trajectory,
+        Truth::Model(&model),
+        &filter_models,
+        &outages,
+        5,
+    );
+    let creep = TruthModel::sources(&experiment, &model)
         .into_iter()
         .find(|source| source.name == "aiding.zupt.creep")
         .unwrap();
-    let errors = FilterPass::new(&track, &beliefs[0]).errors_at_ends(&creep.side)[0].errors;
+    let errors = FilterPass::new(&track, &filter_models[0]).errors_at_ends(&creep.side)[0].errors;
     let lasting_s = seconds - tau * (1.0 - (-seconds / tau).exp());
     let expected = sigma * (2.0 * tau * lasting_s).sqrt();
     // along the vehicle; the mean over 0.1 s takes a little of it
@@ -204,9 +222,9 @@ fn zero_velocity_at_rest_has_the_steady_state_of_the_scalar_filter() {
     let white = 1e-3;
     let model = gauss_markov(RATE_HZ, [white, 1e-20], [1e-9, 1e-12], [200.0; 2]);
     let track: Track = scenario.track(&trajectory, &model, &outages).unwrap();
-    let belief = scenario.belief(&model, &outages, &track).unwrap();
-    let judged = &FilterPass::new(&track, &belief)
-        .errors(&TruthSide::default())
+    let filter_model = scenario.filter_model(&model, &outages, &track).unwrap();
+    let judged = &FilterPass::new(&track, &filter_model)
+        .errors(&TruthModel::default())
         .reports[118];
     // a sample's variance, times its interval squared, at fifty samples a second
     let (q, r) = (white / RATE_HZ, 0.03_f64.powi(2));
@@ -221,7 +239,10 @@ fn a_state_for_the_wheel_keeps_a_filter_honest() {
     let nees = |scale_sigma: f64| {
         let odometer =
             format!("odometer.truth.scale_sigma = 0.02\nodometer.scale_sigma = {scale_sigma}");
-        both(&scenario(&odometer), 1).0.consistency().nees
+        classical_and_robust(&scenario(&odometer), 1)
+            .0
+            .consistency()
+            .nees
     };
     assert_abs_diff_eq!(nees(0.02), 9.0, epsilon = 1e-6);
     assert!(nees(0.0) > 20.0, "{}", nees(0.0));
@@ -264,9 +285,9 @@ fn figures_of_a_pass_are_those_of_its_instants() {
         end_s: 100.0,
     }];
     let track = scenario.track(&trajectory, &model, &outages).unwrap();
-    let beliefs = [scenario.belief(&model, &outages, &track).unwrap()];
-    let pass = FilterPass::new(&track, &beliefs[0]);
-    let mut found = pass.assess(&beliefs[0], &model);
+    let filter_models = [scenario.filter_model(&model, &outages, &track).unwrap()];
+    let pass = FilterPass::new(&track, &filter_models[0]);
+    let mut found = pass.assess(&filter_models[0], &model);
     let window = Outage {
         start_s: 20.0,
         end_s: 40.0,
@@ -288,8 +309,14 @@ fn figures_of_a_pass_are_those_of_its_instants() {
         assert_relative_eq!(ratio, 5.0, max_relative = 1e-12);
     }
 
-    let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &outages, 5);
-    let strapdown = TruthSide::sources(&experiment, &model)
+    let experiment = scenario.experiment(
+        &trajectory,
+        Truth::Model(&model),
+        &filter_models,
+        &outages,
+        5,
+    );
+    let strapdown = TruthModel::sources(&experiment, &model)
         .into_iter()
         .find(|source| source.name == STRAPDOWN)
         .unwrap();
@@ -303,7 +330,7 @@ fn figures_of_a_pass_are_those_of_its_instants() {
     let [of_reports, of_end] = [&law.reports[1..], &law.outage_ends].map(largest);
     assert!(of_end > of_reports, "{of_end} {of_reports}");
     assert_relative_eq!(
-        strapdown_over_sigma(&track, &beliefs[0]),
+        strapdown_over_sigma(&track, &filter_models[0]),
         of_end,
         max_relative = 1e-12
     );

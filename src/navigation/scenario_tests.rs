@@ -138,10 +138,13 @@ fn what_is_expected_beside_the_model_adds_states_to_any_filter() {
         let track = scenario.track(&standing(), &model, &[]).unwrap();
         let full = scenario
             .with_full_noise()
-            .belief(&model, &[], &track)
+            .filter_model(&model, &[], &track)
             .unwrap()
             .states;
-        (scenario.belief(&model, &[], &track).unwrap().states, full)
+        (
+            scenario.filter_model(&model, &[], &track).unwrap().states,
+            full,
+        )
     };
     for (text, expected) in [
         ("", (15, 21)),
@@ -201,8 +204,8 @@ fn a_drift_that_a_filter_knows_grows_with_time() {
         end_s: t_s,
     }];
     let track = scenario.track(&standing(), &model, &outages).unwrap();
-    let belief = scenario.belief(&model, &outages, &track).unwrap();
-    let sigma = FilterPass::new(&track, &belief).sigma_at_ends()[0];
+    let filter_model = scenario.filter_model(&model, &outages, &track).unwrap();
+    let sigma = FilterPass::new(&track, &filter_model).sigma_at_ends()[0];
     let n = rate_hz * t_s;
     let expected = slope * n * (n + 1.0) * (2.0 * n + 1.0) / (12.0 * rate_hz * rate_hz);
     for (i, sigma) in sigma.into_iter().enumerate().take(3) {

@@ -1,7 +1,7 @@
 //! Wavelet-variance curves as JSON: of signals (`wv`), and of fits (`<model>.wv.json`).
 
 use nav_sim_calibration::{
-    Diagnosis, Estimator, Group, Outcome, Replicate, Settings, implied, tau_s,
+    CalibrationSettings, Diagnosis, Estimator, Group, Outcome, Replicate, implied, tau_s,
 };
 use nav_sim_document::{Mark, short_names};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
@@ -231,7 +231,11 @@ pub(crate) struct ReplicateCurve {
 
 impl CurvesFile {
     /// The file of some outcomes and the groups they are of.
-    pub(crate) fn new(groups: &[Group], outcomes: &[Outcome], settings: &Settings) -> Self {
+    pub(crate) fn new(
+        groups: &[Group],
+        outcomes: &[Outcome],
+        settings: &CalibrationSettings,
+    ) -> Self {
         let replicates = |o: &Outcome| {
             groups
                 .iter()
@@ -250,7 +254,11 @@ impl CurvesFile {
     }
 }
 
-fn fitted(outcome: &Outcome, replicates: &[Replicate], settings: &Settings) -> FittedCurve {
+fn fitted(
+    outcome: &Outcome,
+    replicates: &[Replicate],
+    settings: &CalibrationSettings,
+) -> FittedCurve {
     let Outcome {
         curve,
         fit,

@@ -19,7 +19,7 @@ const BLOCK: usize = 256;
 const FINE: f64 = 4.0;
 
 /// Median of |x| of a standard normal.
-const NORMAL: f64 = 0.674_489_75;
+const MAD_OF_NORMAL: f64 = 0.674_489_75;
 
 /// True if `count` of `trials` is more than a chance of `p` explains.
 fn is_beyond(count: usize, trials: usize, p: f64) -> bool {
@@ -89,7 +89,7 @@ fn step(axis: &[f64]) -> Option<f64> {
 
 /// Quantizer step of a column; `None` for a constant one.
 #[must_use]
-pub fn grain(axis: &[f64]) -> Option<QuantizerStep> {
+pub fn quantizer_step(axis: &[f64]) -> Option<QuantizerStep> {
     let step = step(axis)?;
     let changes = median(changes(axis)) / step;
     Some(QuantizerStep { step, changes })
@@ -110,7 +110,9 @@ fn present(axis: &[f64]) -> Cow<'_, [f64]> {
 fn chance(axes: &[&[f64]], held: f64) -> f64 {
     let most: Vec<f64> = axes
         .iter()
-        .map(|axis| grain(axis).map_or(1.0, |grain| 10.0 / grain.changes))
+        .map(|axis| {
+            quantizer_step(axis).map_or(1.0, |quantizer_step| 10.0 / quantizer_step.changes)
+        })
         .collect();
     let rows = axes.first().map_or(0, |axis| axis.len());
     let starts = (0..rows.saturating_sub(1)).step_by(BLOCK);
@@ -288,11 +290,13 @@ pub fn frozen(axis: &[f64]) -> Vec<Range<usize>> {
     const LEAST: usize = 16;
     let axes = [axis];
     let long = |least| runs(&axes).filter(move |(_, rows)| *rows >= least);
-    let grain = long(LEAST).next().and_then(|_| grain(axis));
-    let Some(grain) = grain.filter(|grain| grain.changes >= FINE) else {
+    let quantizer_step = long(LEAST).next().and_then(|_| quantizer_step(axis));
+    let Some(quantizer_step) =
+        quantizer_step.filter(|quantizer_step| quantizer_step.changes >= FINE)
+    else {
         return Vec::new();
     };
-    let longest = (axis.len() as f64 / LEVEL).ln() / grain.changes.ln();
+    let longest = (axis.len() as f64 / LEVEL).ln() / quantizer_step.changes.ln();
     let least = ((3.0 * longest).ceil() as usize).max(LEAST);
     long(least).map(|(from, rows)| from..from + rows).collect()
 }
@@ -331,8 +335,9 @@ pub fn interpolated(axis: &[f64]) -> Option<f64> {
 /// White noise of a column (units·√s), from the median change of its samples; none where steps hide it.
 #[must_use]
 pub fn white_noise(axis: &[f64], rate_hz: f64) -> Option<f64> {
-    let grain = grain(&present(axis)).filter(|grain| grain.changes >= FINE)?;
-    Some(grain.changes * grain.step / (NORMAL * SQRT_2 * rate_hz.sqrt()))
+    let quantizer_step =
+        quantizer_step(&present(axis)).filter(|quantizer_step| quantizer_step.changes >= FINE)?;
+    Some(quantizer_step.changes * quantizer_step.step / (MAD_OF_NORMAL * SQRT_2 * rate_hz.sqrt()))
 }
 
 /// Change of the mean from one second to the next from which on a unit moves (m/s² or rad/s): 0.3° of tilt, or turning with
@@ -398,10 +403,10 @@ pub fn moving(recording: &Recording) -> (usize, usize) {
             .iter()
             .map(|square| (square.max(step * step) / level).ln().abs());
         // the squares of second differences of white noise are of half as many
-        let explained = 2.0 * NORMAL / (width as f64).sqrt() * sampling;
+        let explained = 2.0 * MAD_OF_NORMAL / (width as f64).sqrt() * sampling;
         let is_stationary = median(levels) < explained;
         let usual = if is_stationary {
-            median(usual.into_iter()) / NORMAL
+            median(usual.into_iter()) / MAD_OF_NORMAL
         } else {
             0.0
         };
@@ -561,7 +566,7 @@ fn sign_correlation(a: &[i8], b: &[i8], tests: f64) -> Option<f64> {
 
 /// Marks of the samples of a sensor, to be found again in another recording: hashes of some of its windows of 64 rows.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Marks {
+pub struct SampleFingerprint {
     /// One window in this many is kept, a power of two.
     one_in: u64,
     hashes: HashSet<u64>,
@@ -569,7 +574,7 @@ pub struct Marks {
 
 /// The marks of all axes of a sensor. Windows with fewer than 16 changes are left out: rows of coarse steps agree by chance.
 #[must_use]
-pub fn marks(axes: &[&[f64]]) -> Marks {
+pub fn marks(axes: &[&[f64]]) -> SampleFingerprint {
     const WINDOW: usize = 64;
     const BASE: u64 = 0x9e37_79b9_7f4a_7c15;
     let rows = axes.first().map_or(0, |axis| axis.len());
@@ -600,13 +605,13 @@ pub fn marks(axes: &[&[f64]]) -> Marks {
     if 2 * kept.len() < windows {
         kept.clear();
     }
-    Marks {
+    SampleFingerprint {
         one_in,
         hashes: kept,
     }
 }
 
-impl Marks {
+impl SampleFingerprint {
     /// Share of the samples that are those of another recording, from four windows on.
     #[must_use]
     pub fn shared_with(&self, other: &Self) -> Option<f64> {

@@ -137,7 +137,7 @@ impl Descent<'_> {
     /// The damped step within the ranges, and the decrease that the quadratic model expects of it.
     fn step(&self, at: &[f64], (gradient, curvature): &(Vec<f64>, Matrix)) -> (Vec<f64>, f64) {
         let n = at.len();
-        let mut problem = Bounded::new(n);
+        let mut problem = BoundedStep::new(n);
         // Shifted so that the start is 0, and scaled to a unit diagonal.
         let scale: Vec<f64> = (0..n)
             .map(|i| (curvature[i][i] + self.damping).sqrt())
@@ -217,7 +217,7 @@ pub type Vector = [f64; MOST];
 
 /// A bounded quadratic problem of size `n`.
 #[derive(Debug, Clone, Copy)]
-pub struct Bounded {
+pub struct BoundedStep {
     /// Variables.
     pub n: usize,
     /// G.
@@ -243,7 +243,7 @@ const FLAT: f64 = 1e-15;
 /// A pivot below this share of the diagonal element means that the column depends on those before it.
 const DEPENDENT: f64 = 1e-13;
 
-impl Bounded {
+impl BoundedStep {
     /// All zero: bounds 0 … ∞.
     pub const fn new(n: usize) -> Self {
         let zero = [0.0; MOST];
@@ -434,7 +434,7 @@ mod tests {
     use approx::assert_abs_diff_eq;
     use rand::{RngExt, SeedableRng};
 
-    fn objective(p: &Bounded, x: &Vector) -> f64 {
+    fn objective(p: &BoundedStep, x: &Vector) -> f64 {
         let quadratic: f64 = (0..p.n)
             .flat_map(|i| (0..p.n).map(move |j| (i, j)))
             .map(|(i, j)| x[i] * p.gram[i][j] * x[j])
@@ -448,7 +448,7 @@ mod tests {
         let mut generator = Generator::seed_from_u64(11);
         for case in 0..500 {
             let n = 1 + case % 7;
-            let mut p = Bounded::new(n);
+            let mut p = BoundedStep::new(n);
             let columns: Vec<Vec<f64>> = (0..n)
                 .map(|_| {
                     (0..n + 3)
@@ -486,7 +486,7 @@ mod tests {
 
     #[test]
     fn equal_columns_do_not_hang_and_do_not_blow_up() {
-        let mut p = Bounded::new(3);
+        let mut p = BoundedStep::new(3);
         p.gram = [[1.0; MOST]; MOST];
         p.right = [1.0; MOST];
         let x = p.minimise();

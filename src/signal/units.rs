@@ -45,7 +45,7 @@ impl SettingError {
     }
 
     /// The same with what to do about it.
-    pub const fn advising(mut self, advice: &'static str) -> Self {
+    pub const fn with_advice(mut self, advice: &'static str) -> Self {
         self.advice = Some(advice);
         self
     }

@@ -3,10 +3,10 @@
 
 use crate::shared::{data, outage, shipped_model};
 use glam::DQuat;
-use nav_sim::navigation::ekf::{Belief, FilterStates};
+use nav_sim::navigation::ekf::{FilterModel, FilterStates};
 use nav_sim::navigation::frames::RollPitchYaw;
 use nav_sim::navigation::fusion::alignment::{Alignment, coarse};
-use nav_sim::navigation::fusion::{Finding, Settings};
+use nav_sim::navigation::fusion::{Finding, FusionSettings};
 use nav_sim::navigation::metrics::VerdictKind;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
@@ -168,15 +168,15 @@ pub(crate) fn phone() -> Model {
     shipped_model("examples/phone.toml")
 }
 
-pub(crate) fn belief() -> Belief {
-    let mut belief = Belief::new(&phone(), FilterStates::Reduced15, 1.0, 800.0).unwrap();
-    belief.add_constant(Sensor::Accel, TURN_ON.0);
-    belief.add_constant(Sensor::Gyro, TURN_ON.1);
-    belief
+pub(crate) fn filter_model() -> FilterModel {
+    let mut filter_model = FilterModel::new(&phone(), FilterStates::Reduced15, 1.0, 800.0).unwrap();
+    filter_model.add_constant(Sensor::Accel, TURN_ON.0);
+    filter_model.add_constant(Sensor::Gyro, TURN_ON.1);
+    filter_model
 }
 
-pub(crate) fn settings() -> Settings {
-    Settings {
+pub(crate) fn settings() -> FusionSettings {
+    FusionSettings {
         rows_hz: 10.0,
         ..crate::fusion::settings()
     }
@@ -226,7 +226,7 @@ fn every_start_is_as_good_as_it_says() {
         for velocity in [Some(0.1), Some(0.3), Some(0.6), None] {
             recorded(&trajectory, velocity, 3, |run, recording| {
                 // positions alone do not always have a course
-                let Ok(alignment) = coarse(&data(recording), &settings(), &belief()) else {
+                let Ok(alignment) = coarse(&data(recording), &settings(), &filter_model()) else {
                     assert!(velocity.is_none(), "{name} {velocity:?} {run}");
                     return;
                 };
@@ -286,8 +286,8 @@ fn one(steps: &[Step]) -> (Trajectory, SimulatedRecording) {
     (trajectory, found.unwrap())
 }
 
-fn aligned(recording: &SimulatedRecording, settings: &Settings) -> Alignment {
-    coarse(&data(recording), settings, &belief()).unwrap()
+fn aligned(recording: &SimulatedRecording, settings: &FusionSettings) -> Alignment {
+    coarse(&data(recording), settings, &filter_model()).unwrap()
 }
 
 /// One recording whose velocities are turned by a right angle from 15 s to then: a start there agrees with nothing after it.
@@ -344,7 +344,7 @@ fn a_start_that_the_next_minute_contradicts_is_given_up_for_a_later_one() {
 fn a_wrong_mounting_is_told() {
     let (_, recording) = one(DRIVES[1].1);
     let turned = |q_s_b| {
-        let settings = Settings {
+        let settings = FusionSettings {
             q_s_b,
             ..settings()
         };
@@ -374,7 +374,7 @@ fn a_wrong_mounting_is_told() {
 #[test]
 fn what_the_fixes_do_not_tell_is_said() {
     let (trajectory, mut recording) = one(DRIVES[0].1);
-    let withheld = Settings {
+    let withheld = FusionSettings {
         outages: vec![outage(10.0, 40.0)],
         ..settings()
     };

@@ -4,7 +4,8 @@
 
 use nav_sim::app::Context;
 use nav_sim::calibration::{
-    Bootstrap, Estimator, ModelChoice, Pool, Settings, calibrate, grouped, infer, replicates,
+    Bootstrap, CalibrationSettings, Estimator, ModelChoice, Pool, add_intervals, calibrate,
+    grouped, replicates,
 };
 use nav_sim::commands::run::{NavigateInputs, TrueImu, navigate};
 use nav_sim::io::draws_file::{Draws, DrawsFile};
@@ -38,11 +39,11 @@ impl World {
     }
 
     fn laboratory(&self, seed: u64) -> Calibrated {
-        let settings = Settings {
+        let settings = CalibrationSettings {
             estimators: vec![Estimator::Awv],
             model: ModelChoice::Given(self.fitted.parse().unwrap()),
             rate_hz: self.truth.rate_hz,
-            ..Settings::default()
+            ..CalibrationSettings::default()
         };
         let imu = VirtualImu {
             model: &self.truth,
@@ -57,7 +58,7 @@ impl World {
         }
         let groups = grouped(measured, Pool::Sensor);
         let mut outcomes = calibrate(&groups, &settings).unwrap();
-        infer(
+        add_intervals(
             &groups,
             &mut outcomes,
             &settings,

@@ -97,7 +97,7 @@ fn wavelet_variance_of_a_signal() {
     assert_eq!(signal.len(), 4096);
     let truth = &truth("wv_4096.json")["signals"]["clean"];
     let tuning = Tuning::new(0.6).unwrap();
-    let (classical, robust) = wavelet::both(&signal, 11, &tuning).unwrap();
+    let (classical, robust) = wavelet::classical_and_robust(&signal, 11, &tuning).unwrap();
     for (together, alone) in classical
         .iter()
         .zip(wavelet::classical(&signal, 11).unwrap())

@@ -3,8 +3,8 @@
 
 use crate::shared::{gauss_markov, outage, shipped, shipped_model, two_sided};
 use approx::assert_abs_diff_eq;
-use nav_sim::navigation::ekf::{Belief, FilterStates};
-use nav_sim::navigation::metrics::{EpochMetrics, Expected};
+use nav_sim::navigation::ekf::{FilterModel, FilterStates};
+use nav_sim::navigation::metrics::{EpochMetrics, ExpectedRun};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::gnss::BaroSettings;
@@ -33,9 +33,10 @@ fn model(scale: [f64; 6]) -> Model {
     Model::pooled(100.0, &accel, &gyro)
 }
 
-fn run(trajectory: &Trajectory, truth: &Model, beliefs: &[Belief]) -> Vec<RunResult> {
+fn run(trajectory: &Trajectory, truth: &Model, filter_models: &[FilterModel]) -> Vec<RunResult> {
     let scenario = Scenario::default();
-    let experiment = scenario.experiment(trajectory, Truth::Model(truth), beliefs, &OUTAGES, 23);
+    let experiment =
+        scenario.experiment(trajectory, Truth::Model(truth), filter_models, &OUTAGES, 23);
     monte_carlo::run(&experiment, RUNS, &|_| {}).unwrap()
 }
 
@@ -87,14 +88,15 @@ fn matched_models_are_inside_and_a_factor_of_four_is_outside() {
             0.25
         }
     };
-    let belief = |m: &Model| Belief::new(m, FilterStates::Reduced15, 1.0, 800.0).unwrap();
+    let filter_model =
+        |m: &Model| FilterModel::new(m, FilterStates::Reduced15, 1.0, 800.0).unwrap();
     for name in TRAJECTORIES {
-        let p = improbability(&run(&shipped(name), &right, &[belief(&right)])[0]);
+        let p = improbability(&run(&shipped(name), &right, &[filter_model(&right)])[0]);
         assert!(p > 1e-3, "{name}: {p}");
     }
     // One trajectory shows them all.
-    let beliefs = [0, 1, 2, 3, 4, 5].map(|i| belief(&with(i, factor(i))));
-    let results = run(&shipped(TRAJECTORIES[0]), &right, &beliefs);
+    let filter_models = [0, 1, 2, 3, 4, 5].map(|i| filter_model(&with(i, factor(i))));
+    let results = run(&shipped(TRAJECTORIES[0]), &right, &filter_models);
     for (name, result) in names.iter().zip(&results) {
         let p = improbability(result);
         assert!(p < 1e-6, "{name}: {p}");
@@ -112,10 +114,10 @@ fn the_full_filter_of_a_larger_model_is_inside() {
     let accel = axis(0.1, &[(0.05, 100.0), (0.01, 700.0)], 1e-10);
     let gyro = axis(1e-4, &[(5e-4, 200.0), (1e-4, 700.0)], 1e-14);
     let truth = Model::pooled(100.0, &accel, &gyro);
-    let belief = Belief::new(&truth, FilterStates::Full, 1.0, 800.0).unwrap();
-    assert_eq!(belief.states, 27);
+    let filter_model = FilterModel::new(&truth, FilterStates::Full, 1.0, 800.0).unwrap();
+    assert_eq!(filter_model.states, 27);
     for name in TRAJECTORIES {
-        let result = &run(&shipped(name), &truth, std::slice::from_ref(&belief))[0];
+        let result = &run(&shipped(name), &truth, std::slice::from_ref(&filter_model))[0];
         let p = improbability(result);
         assert!(p > 1e-3, "{name}: {p}");
     }
@@ -132,12 +134,12 @@ fn long_outages_shift_the_velocity_down_by_the_square_of_the_tilts() {
     let scenario = Scenario::default();
     let trajectory = shipped("land_vehicle");
     let track = scenario.track(&trajectory, &model, &outages).unwrap();
-    let beliefs = [scenario
+    let filter_models = [scenario
         .with_full_noise()
-        .belief(&model, &outages, &track)
+        .filter_model(&model, &outages, &track)
         .unwrap()];
     let truth = Truth::Model(&model);
-    let experiment = scenario.experiment(&trajectory, truth, &beliefs, &outages, 5);
+    let experiment = scenario.experiment(&trajectory, truth, &filter_models, &outages, 5);
     let result = monte_carlo::run(&experiment, 256, &|_| {})
         .unwrap()
         .remove(0);
@@ -168,8 +170,8 @@ fn long_outages_shift_the_velocity_down_by_the_square_of_the_tilts() {
             ..Scenario::default()
         };
         let track = scenario.track(&trajectory, &model, &outages).unwrap();
-        let experiment = scenario.experiment(&trajectory, truth, &beliefs, &outages, 5);
-        let expected = Expected::along(&track, &experiment, &beliefs[0], &model).unwrap();
+        let experiment = scenario.experiment(&trajectory, truth, &filter_models, &outages, 5);
+        let expected = ExpectedRun::along(&track, &experiment, &filter_models[0], &model).unwrap();
         assert_eq!(
             expected.summary.outages[0].beyond_linear, is_beyond,
             "{interval_s:?}"

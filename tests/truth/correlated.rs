@@ -1,9 +1,9 @@
 //! Fixes whose errors last: named from the innovations alone, and answered so that the solution is to be believed.
 
-use crate::fusion::{belief, recorded, settings};
+use crate::fusion::{filter_model, recorded, settings};
 use crate::shared::{data, shipped, shipped_model};
 use glam::DVec3;
-use nav_sim::navigation::fusion::{Correlation, Recorded, fuse_correlated, outcome};
+use nav_sim::navigation::fusion::{Correlation, DriveData, fuse_correlated, outcome};
 use nav_sim::navigation::gnss::GnssVelocity;
 use nav_sim::navigation::sensors::gnss::GnssSettings;
 use nav_sim::navigation::trajectory::reference::Reference;
@@ -39,7 +39,7 @@ fn told_of([tau_s, of_velocity_s]: [f64; 2], runs: u64) -> Told {
         receiver(3.0, 0.0)
     };
     let model = shipped_model("calib_data/tactical.toml");
-    let (belief, trajectory) = (belief(&model), shipped("land_vehicle"));
+    let (filter_model, trajectory) = (filter_model(&model), shipped("land_vehicle"));
     let reference: Reference = trajectory.clone().into();
     let mut told = Told::default();
     recorded(&trajectory, &model, &receiver, runs, |recording, start| {
@@ -57,12 +57,12 @@ fn told_of([tau_s, of_velocity_s]: [f64; 2], runs: u64) -> Told {
             fix.pos_sigma_n = DVec3::splat(3.0);
             fix.velocity = Some(GnssVelocity::new(v_n + off, DVec3::splat(0.1)));
         }
-        let data = Recorded {
+        let data = DriveData {
             gnss: &gnss,
             ..data(recording)
         };
         let asked = (Some(&reference), Correlation::Auto);
-        let weighed = fuse_correlated(&data, &belief, start, &settings(), asked).unwrap();
+        let weighed = fuse_correlated(&data, &filter_model, start, &settings(), asked).unwrap();
         told.named += usize::from(weighed.as_stated.is_some());
         for (sum, solution) in told
             .nees

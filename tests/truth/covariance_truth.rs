@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 use nav_sim::navigation::earth::GravityModel;
-use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
+use nav_sim::navigation::ekf::{FilterModel, FilterStates, InitialSettings};
 use nav_sim::navigation::frames::{NavState, RollPitchYaw};
 use nav_sim::signal::imu::ImuSample;
 use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::earth::ned_difference;
-use nav_sim_navigation::ekf::{Ekf, Fix, advance, settle, update};
+use nav_sim_navigation::ekf::{Ekf, Fix, advance, apply_pending_earth_step, update};
 use nav_sim_navigation::strapdown::Strapdown;
 use nav_sim_signal::lanes::{Lanes, Vec3};
 use nav_sim_signal::noise::continuous::white_sigma2;
@@ -85,7 +85,7 @@ fn worst_difference(increments: &[Vec<f64>], truth: &[Vec<f64>], outages: &[(f64
         &axis(0.06 / 60.0, 0.02),
         &axis(0.15 * DEG / 60.0, 20.0 * DEG_PER_HOUR),
     );
-    let belief = Belief::new(&model, FilterStates::Reduced15, 1.0, 800.0).unwrap();
+    let filter_model = FilterModel::new(&model, FilterStates::Reduced15, 1.0, 800.0).unwrap();
     let initial = InitialSettings {
         pos_sigma_m: [2.0; 3],
         vel_sigma_m_s: [0.1; 3],
@@ -95,7 +95,7 @@ fn worst_difference(increments: &[Vec<f64>], truth: &[Vec<f64>], outages: &[(f64
     let start = state(&truth[0]);
     let mut ekf = Ekf::new(
         Strapdown::new(&start, GravityModel::FirstOrder),
-        &belief,
+        &filter_model,
         &start,
         &initial,
     );
@@ -121,7 +121,7 @@ fn worst_difference(increments: &[Vec<f64>], truth: &[Vec<f64>], outages: &[(f64
             };
             update(&mut ekf, &fix);
         }
-        settle(&mut ekf);
+        apply_pending_earth_step(&mut ekf);
         for (i, sigma) in deviations(&ekf, &here).into_iter().enumerate() {
             worst = worst.max((sigma / truth[k / 100][10 + i] - 1.0).abs());
         }

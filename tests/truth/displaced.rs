@@ -1,9 +1,11 @@
 //! Causes of a solution that is not to be believed, found in its recording: an antenna elsewhere, fixes that are late.
 
-use crate::fusion::{belief, model, plainly_recorded, recorded, run, settings};
+use crate::fusion::{filter_model, model, plainly_recorded, recorded, run, settings};
 use crate::shared::{data, shipped};
 use glam::{DQuat, DVec3};
-use nav_sim::navigation::fusion::{Displaced, Recorded, Settings, displaced, outcome};
+use nav_sim::navigation::fusion::{
+    AntennaOffset, DriveData, FusionSettings, antenna_offset, outcome,
+};
 use nav_sim::navigation::sensors::gnss::GnssSettings;
 use nav_sim::navigation::trajectory::reference::Reference;
 use nav_sim::navigation::trajectory::{Trajectory, TrajectorySample};
@@ -14,7 +16,7 @@ const LATE_S: f64 = 0.12;
 
 /// What is found in runs along a trajectory with the antenna at `arm_b` and fixes stamped `late_s` late, of which the
 /// filter knows nothing.
-fn found(arm_b: DVec3, late_s: f64, settings: &Settings) -> Vec<Option<Displaced>> {
+fn found(arm_b: DVec3, late_s: f64, settings: &FusionSettings) -> Vec<Option<AntennaOffset>> {
     let gnss = GnssSettings {
         lever_arm_m: arm_b.to_array(),
         ..GnssSettings::default()
@@ -28,11 +30,16 @@ fn found(arm_b: DVec3, late_s: f64, settings: &Settings) -> Vec<Option<Displaced
         |recording, start| {
             let mut gnss = recording.gnss.clone();
             gnss.iter_mut().for_each(|fix| fix.t_s += late_s);
-            let data = Recorded {
+            let data = DriveData {
                 gnss: &gnss,
                 ..data(recording)
             };
-            all.push(displaced(&data, &belief(&model()), start, settings));
+            all.push(antenna_offset(
+                &data,
+                &filter_model(&model()),
+                start,
+                settings,
+            ));
         },
     );
     all
@@ -72,7 +79,7 @@ fn an_antenna_elsewhere_and_late_fixes_are_found() {
 /// Neither a sound recording nor one of another cause, an IMU that sits askew, is explained by them.
 #[test]
 fn other_causes_are_not_taken_for_them() {
-    let askew = Settings {
+    let askew = FusionSettings {
         q_s_b: DQuat::from_rotation_y(0.4),
         ..settings()
     };

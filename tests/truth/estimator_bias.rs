@@ -6,7 +6,7 @@ use nav_sim::calibration::{
 };
 use nav_sim::signal::noise::{Composite, Process, Synthesizer};
 use nav_sim::signal::rng::StreamKey;
-use nav_sim::signal::wavelet::{Curve, Tuning, both};
+use nav_sim::signal::wavelet::{Curve, Tuning, classical_and_robust};
 use nav_sim_calibration::trend;
 use rayon::prelude::*;
 
@@ -25,7 +25,7 @@ fn model(share: f64) -> Composite {
 
 /// The wavelet variances of a signal.
 fn measured(signal: &[f64]) -> Replicate {
-    let (classical, robust) = both(signal, 13, &tuning()).unwrap();
+    let (classical, robust) = classical_and_robust(signal, 13, &tuning()).unwrap();
     let (samples, trend) = (signal.len(), trend(signal));
     Replicate {
         name: String::new(),

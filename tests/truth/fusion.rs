@@ -7,9 +7,11 @@ use approx::{assert_abs_diff_eq, assert_relative_eq};
 use glam::{DQuat, DVec3};
 use nav_sim::io::model_file;
 use nav_sim::navigation::earth::GravityModel;
-use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
+use nav_sim::navigation::ekf::{FilterModel, FilterStates, InitialSettings};
 
-use nav_sim::navigation::fusion::{Recorded, Row, Settings, Solution, Start, fuse, outcome};
+use nav_sim::navigation::fusion::{
+    DriveData, FusionSettings, Solution, SolutionRow, Start, fuse, outcome,
+};
 use nav_sim::navigation::gnss::{GnssFix, GnssVelocity};
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::gnss::GnssSettings;
@@ -29,8 +31,8 @@ pub(crate) fn model() -> Model {
         .model
 }
 
-pub(crate) fn settings() -> Settings {
-    Settings {
+pub(crate) fn settings() -> FusionSettings {
+    FusionSettings {
         q_s_b: DQuat::IDENTITY,
         mounting_sigma_b: DVec3::ZERO,
         lever_arm_b: DVec3::ZERO,
@@ -42,8 +44,8 @@ pub(crate) fn settings() -> Settings {
     }
 }
 
-pub(crate) fn belief(model: &Model) -> Belief {
-    Belief::new(model, FilterStates::Reduced15, 1.0, 800.0).unwrap()
+pub(crate) fn filter_model(model: &Model) -> FilterModel {
+    FilterModel::new(model, FilterStates::Reduced15, 1.0, 800.0).unwrap()
 }
 
 /// Records runs of an experiment on a trajectory and hands each to `then`.
@@ -74,13 +76,20 @@ pub(crate) fn recorded(
 }
 
 pub(crate) fn run(
-    data: Recorded<'_>,
+    data: DriveData<'_>,
     start: &Start,
-    settings: &Settings,
+    settings: &FusionSettings,
     reference: &Trajectory,
 ) -> Solution {
     let reference = reference.clone().into();
-    fuse(&data, &belief(&model()), start, settings, Some(&reference)).unwrap()
+    fuse(
+        &data,
+        &filter_model(&model()),
+        start,
+        settings,
+        Some(&reference),
+    )
+    .unwrap()
 }
 
 /// Runs with the default receiver.
@@ -104,7 +113,7 @@ fn errors_are_as_large_as_the_filter_says() {
         lever_arm_m: [0.8, -0.3, -1.2],
         ..GnssSettings::default()
     };
-    let settings = Settings {
+    let settings = FusionSettings {
         lever_arm_b: gnss.lever_arm_m.into(),
         ..settings()
     };
@@ -133,7 +142,7 @@ fn what_is_not_measured_is_no_component_of_the_nis() {
         for velocity in gnss.iter_mut().filter_map(|fix| fix.velocity.as_mut()) {
             velocity.down = None;
         }
-        let data = Recorded {
+        let data = DriveData {
             gnss: &gnss,
             ..data(recording)
         };
@@ -177,7 +186,7 @@ fn fixes_between_samples_are_used_at_their_own_time() {
         };
         let worst = |late: f64| {
             let gnss: Vec<_> = (1..200).map(|k| fix(k, late)).collect();
-            let data = Recorded {
+            let data = DriveData {
                 imu: &recording.imu[..20_050],
                 gnss: &gnss,
                 aids: &[],
@@ -200,14 +209,14 @@ fn mounting_angles_take_a_turned_imu_back() {
         let imu = &recording.imu[..12_000];
         let turned = turned(imu, q_s_b);
         let outages = vec![outage(60.0, 80.0)];
-        let straight = Settings {
+        let straight = FusionSettings {
             outages: outages.clone(),
             ..settings()
         };
-        let solve = |imu: &[ImuIncrement], settings: &Settings| {
+        let solve = |imu: &[ImuIncrement], settings: &FusionSettings| {
             let gnss = &recording.gnss;
             run(
-                Recorded {
+                DriveData {
                     imu,
                     gnss,
                     aids: &[],
@@ -218,12 +227,12 @@ fn mounting_angles_take_a_turned_imu_back() {
             )
         };
         let a = solve(imu, &straight);
-        let b = solve(&turned, &Settings { q_s_b, ..straight });
+        let b = solve(&turned, &FusionSettings { q_s_b, ..straight });
         let (end_a, end_b) = (a.rows.last().unwrap(), b.rows.last().unwrap());
         // the sum of a sensor's biases, in its own axes: at the start as the belief has it
-        let belief = belief(&model());
+        let filter_model = filter_model(&model());
         for sensor in Sensor::ALL {
-            let initial = belief.initial_bias_sigma(sensor);
+            let initial = filter_model.initial_bias_sigma(sensor);
             let [at_start, at_end] = [&a.rows[0], end_a].map(|row| row.bias_sigma[sensor as usize]);
             assert!(
                 (at_start / initial - DVec3::ONE).length() < 1e-12,
@@ -267,7 +276,7 @@ fn after_a_gap_errors_are_as_large_as_the_filter_says() {
         let places = onsets(&recording.imu);
         let n = places.len() as f64;
         let upper = ChiSquared::new(9.0 * n).unwrap().inverse_cdf(1.0 - 1e-4) / n;
-        let smooth = Settings {
+        let smooth = FusionSettings {
             smooth: true,
             ..settings()
         };
@@ -275,7 +284,7 @@ fn after_a_gap_errors_are_as_large_as_the_filter_says() {
         let mean = |imu: &[ImuIncrement], ends: &[f64], later: &[f64]| -> Vec<[f64; 2]> {
             let gnss = &recording.gnss;
             let solution = run(
-                Recorded {
+                DriveData {
                     imu,
                     gnss,
                     aids: &[],
@@ -284,7 +293,7 @@ fn after_a_gap_errors_are_as_large_as_the_filter_says() {
                 &smooth,
                 &trajectory,
             );
-            let nees = |rows: &[Row], at: f64| {
+            let nees = |rows: &[SolutionRow], at: f64| {
                 rows.iter()
                     .find(|r| r.t_s >= at + 0.05)
                     .unwrap()

@@ -4,9 +4,9 @@
 
 use nalgebra::{DMatrix, DVector};
 use nav_sim::calibration::{ModelSpec, Weighting, fit};
-use nav_sim::signal::noise::{Composite, Kind, Process};
+use nav_sim::signal::noise::{Composite, Process, ProcessKind};
 use nav_sim::signal::rng::{Generator, StreamKey};
-use nav_sim::signal::wavelet::{Curve, Tuning, both};
+use nav_sim::signal::wavelet::{Curve, Tuning, classical_and_robust};
 use nav_sim_signal::wavelet::interval;
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -56,18 +56,21 @@ fn reduced(curve: &Curve, quantization: bool, log_kappas: &[f64]) -> f64 {
             .zip(&curve.edof)
             .map(|(nu, eta)| (0.5 * eta).sqrt() / nu),
     );
-    let column = |kind: Kind, kappa: f64| {
+    let column = |kind: ProcessKind, kappa: f64| {
         let shape = |level: &u32| kind.haar_shape_of_kappa(kappa, *level).0;
         let c = DVector::from_iterator(weights.len(), curve.levels.iter().map(shape));
         let norm = c.component_mul(&weights).norm();
         c / norm
     };
-    let mut columns = vec![column(Kind::White, 0.0), column(Kind::RandomWalk, 0.0)];
+    let mut columns = vec![
+        column(ProcessKind::White, 0.0),
+        column(ProcessKind::RandomWalk, 0.0),
+    ];
     for u in log_kappas {
-        columns.push(column(Kind::Ar1, u.exp()));
+        columns.push(column(ProcessKind::Ar1, u.exp()));
     }
     if quantization {
-        columns.push(column(Kind::Quantization, 0.0));
+        columns.push(column(ProcessKind::Quantization, 0.0));
     }
     let target = DVector::from_column_slice(&curve.wv).component_mul(&weights);
     let mut factors = DVector::repeat(weights.len(), 1.0);
@@ -177,22 +180,22 @@ fn simulate(model: &Composite, samples: usize, generator: &mut Generator) -> Vec
         let mut normal = || generator.sample::<f64, _>(StandardNormal);
         let size = process.amplitude().sqrt();
         match process.kind() {
-            Kind::White => x.iter_mut().for_each(|x| *x += size * normal()),
-            Kind::RandomWalk => {
+            ProcessKind::White => x.iter_mut().for_each(|x| *x += size * normal()),
+            ProcessKind::RandomWalk => {
                 let mut level = 0.0;
                 x.iter_mut().for_each(|x| {
                     level += size * normal();
                     *x += level;
                 });
             }
-            Kind::Ar1 => {
+            ProcessKind::Ar1 => {
                 let mut state = process.initial_variance().sqrt() * normal();
                 x.iter_mut().for_each(|x| {
                     state = process.shape() * state + size * normal();
                     *x += state;
                 });
             }
-            Kind::Quantization => {
+            ProcessKind::Quantization => {
                 let mut last = generator.random::<f64>();
                 x.iter_mut().for_each(|x| {
                     let u = generator.random::<f64>();
@@ -227,7 +230,7 @@ fn failures(cases: u64, robust: bool) -> Vec<String> {
             .iter()
             .map(|j| interval::edof_eta3(samples, *j))
             .collect();
-        let (classical, m_scales) = both(&signal, 15, &tuning).unwrap();
+        let (classical, m_scales) = classical_and_robust(&signal, 15, &tuning).unwrap();
         let curve = match robust {
             false => Curve {
                 wv: classical,

@@ -3,7 +3,7 @@
 
 use crate::common::drive::{DRIVE, MODEL, done, nav_sim, place_with};
 use crate::shared::{gauss_markov, shipped, two_sided};
-use nav_sim::navigation::ekf::Belief;
+use nav_sim::navigation::ekf::FilterModel;
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
@@ -44,12 +44,18 @@ fn run(
     runs: u64,
 ) -> Vec<RunResult> {
     let trajectory = shipped("land_vehicle");
-    let belief = |(model, own): &(&Model, Scenario)| {
+    let filter_model = |(model, own): &(&Model, Scenario)| {
         let track = own.track(&trajectory, model, &OUTAGES).unwrap();
-        own.belief(model, &OUTAGES, &track).unwrap()
+        own.filter_model(model, &OUTAGES, &track).unwrap()
     };
-    let beliefs: Vec<Belief> = filters.iter().map(belief).collect();
-    let experiment = imu.experiment(&trajectory, Truth::Model(truth), &beliefs, &OUTAGES, seed);
+    let filter_models: Vec<FilterModel> = filters.iter().map(filter_model).collect();
+    let experiment = imu.experiment(
+        &trajectory,
+        Truth::Model(truth),
+        &filter_models,
+        &OUTAGES,
+        seed,
+    );
     monte_carlo::run(&experiment, runs, &|_| {}).unwrap()
 }
 

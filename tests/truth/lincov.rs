@@ -2,11 +2,11 @@
 
 use crate::shared::{drive, outage, stands, white};
 use approx::assert_relative_eq;
-use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
+use nav_sim::navigation::ekf::{FilterModel, FilterStates, InitialSettings};
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
 use nav_sim::signal::noise::{Composite, Model, Process};
-use nav_sim_navigation::simulation::lincov::{DRIFT, FilterPass, TruthSide, assess};
+use nav_sim_navigation::simulation::lincov::{DRIFT, FilterPass, TruthModel, assess};
 
 const RATE_HZ: f64 = 100.0;
 
@@ -27,9 +27,10 @@ fn standing(process: Process) -> [f64; 2] {
     let track = scenario
         .track(&trajectory, &model, &[outage(0.0, 20.0)])
         .unwrap();
-    let belief = Model::pooled(RATE_HZ, &white(1e-4), &white(1e-4));
-    let belief = Belief::new(&belief, FilterStates::Reduced15, 1.0, 800.0).unwrap();
-    let end = assess(&track, &belief, &model).outage_ends[0];
+    let filter_model = Model::pooled(RATE_HZ, &white(1e-4), &white(1e-4));
+    let filter_model =
+        FilterModel::new(&filter_model, FilterStates::Reduced15, 1.0, 800.0).unwrap();
+    let end = assess(&track, &filter_model, &model).outage_ends[0];
     [end.rmse[5], end.rmse[2]]
 }
 
@@ -52,8 +53,8 @@ fn a_filter_that_is_right_is_so_after_hours() {
     let track = Scenario::default()
         .track(&path, &model, &[outage(200.0, 230.0)])
         .unwrap();
-    let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
-    let computed = assess(&track, &belief, &model);
+    let filter_model = FilterModel::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
+    let computed = assess(&track, &filter_model, &model);
     assert!(computed.reports.len() > 14_370 && computed.outage_ends.len() == 1);
     for found in computed.reports.iter().chain(&computed.outage_ends) {
         let is_right = (found.nees - 9.0).abs() < 1e-9 && found.divergence.abs() < 1e-9;
@@ -116,11 +117,11 @@ fn a_drift_of_the_gyroscope_is_felt_at_the_end_of_a_lever_arm() {
     let outages = [outage(0.0, n / RATE_HZ)];
     let track = scenario.track(&path, &truth, &outages).unwrap();
     let believed = Model::pooled(RATE_HZ, &white(1e-4), &white(1e-8));
-    let beliefs = [Belief::new(&believed, FilterStates::Reduced15, 1.0, 800.0).unwrap()];
-    let experiment = scenario.experiment(&path, Truth::Model(&truth), &beliefs, &outages, 1);
-    let sources = TruthSide::sources(&experiment, &truth);
+    let filter_models = [FilterModel::new(&believed, FilterStates::Reduced15, 1.0, 800.0).unwrap()];
+    let experiment = scenario.experiment(&path, Truth::Model(&truth), &filter_models, &outages, 1);
+    let sources = TruthModel::sources(&experiment, &truth);
     let drift = sources.iter().find(|source| source.name == DRIFT).unwrap();
-    let law = FilterPass::new(&track, &beliefs[0]).errors(&drift.side);
+    let law = FilterPass::new(&track, &filter_models[0]).errors(&drift.side);
     let fix = law
         .reports
         .iter()

@@ -4,7 +4,7 @@
 use crate::shared::{outage, stands, white};
 use approx::assert_relative_eq;
 use nav_sim::navigation::earth::GravityModel;
-use nav_sim::navigation::metrics::{Estimate, Expected, epochs};
+use nav_sim::navigation::metrics::{Estimate, ExpectedRun, epochs};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
@@ -16,7 +16,7 @@ use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::earth::gravity_down;
 use nav_sim_navigation::metrics::Budget;
 use nav_sim_navigation::simulation::Gains;
-use nav_sim_navigation::simulation::lincov::{FilterPass, TruthSide};
+use nav_sim_navigation::simulation::lincov::{FilterPass, TruthModel};
 
 const RATE_HZ: f64 = 100.0;
 const RUNS: u64 = 400;
@@ -70,9 +70,10 @@ fn assert_agree(name: &str, truth: &Model) {
     scenario.validate().unwrap();
     let (path, believed, outages) = (drive(), model(1.0), [OUTAGE]);
     let track = scenario.track(&path, &believed, &outages).unwrap();
-    let beliefs = [scenario.belief(&believed, &outages, &track).unwrap()];
-    let mut experiment = scenario.experiment(&path, Truth::Model(truth), &beliefs, &outages, 11);
-    let expected = Expected::along(&track, &experiment, &beliefs[0], truth).unwrap();
+    let filter_models = [scenario.filter_model(&believed, &outages, &track).unwrap()];
+    let mut experiment =
+        scenario.experiment(&path, Truth::Model(truth), &filter_models, &outages, 11);
+    let expected = ExpectedRun::along(&track, &experiment, &filter_models[0], truth).unwrap();
     for gains in [Gains::Own, Gains::Auto] {
         experiment.gains = gains;
         let sampled = &monte_carlo::run(&experiment, RUNS, &|_| {}).unwrap()[0];
@@ -90,7 +91,7 @@ fn assert_agree(name: &str, truth: &Model) {
 }
 
 /// Every ten seconds: ASEE within half a percent, RMSE and bias within their standard errors, NEES and coverage.
-fn assert_epochs_agree(name: &str, sampled: &RunResult, expected: &Expected) {
+fn assert_epochs_agree(name: &str, sampled: &RunResult, expected: &ExpectedRun) {
     for (s, e) in epochs(sampled).iter().zip(&expected.epochs).step_by(10) {
         assert_eq!((s.t_s, s.gnss, s.count), (e.t_s, e.gnss, RUNS));
         let near = |what: &str, sampled: Estimate, expected: f64| {
@@ -139,7 +140,7 @@ fn assert_epochs_agree(name: &str, sampled: &RunResult, expected: &Expected) {
 }
 
 /// At the outage's end: RMSE, NEES, and as many runs below each quantile as a binomial law allows.
-fn assert_outage_agrees(name: &str, sampled: &RunResult, expected: &Expected) {
+fn assert_outage_agrees(name: &str, sampled: &RunResult, expected: &ExpectedRun) {
     let summary = &expected.summary;
     let outage = &summary.outages[0];
     let records = || sampled.runs.iter().map(|r| &r.outages[0]);
@@ -238,10 +239,11 @@ fn constants_of_the_true_imu_have_their_closed_forms() {
     let down = |imu: &str, truth: &Model| {
         let scenario: Scenario = toml::from_str(&format!("initial.perfect = true\n{imu}")).unwrap();
         let track = scenario.track(&path, &believed, &outages).unwrap();
-        let beliefs = [scenario.belief(&believed, &outages, &track).unwrap()];
-        let experiment = scenario.experiment(&path, Truth::Model(truth), &beliefs, &outages, 1);
-        let sources = TruthSide::together(&TruthSide::sources(&experiment, truth));
-        let end = FilterPass::new(&track, &beliefs[0])
+        let filter_models = [scenario.filter_model(&believed, &outages, &track).unwrap()];
+        let experiment =
+            scenario.experiment(&path, Truth::Model(truth), &filter_models, &outages, 1);
+        let sources = TruthModel::together(&TruthModel::sources(&experiment, truth));
+        let end = FilterPass::new(&track, &filter_models[0])
             .errors(&sources)
             .outage_ends[0];
         (end.errors.rmse()[2], end.errors.mean[2])
@@ -282,11 +284,11 @@ fn budgets_add_up_to_the_true_errors() {
     let mut truth = model(4.0);
     truth.axes[3].processes.push(Process::drift(1e-9).unwrap());
     let track = scenario.track(&path, &believed, &outages).unwrap();
-    let beliefs = [scenario.belief(&believed, &outages, &track).unwrap()];
-    let experiment = scenario.experiment(&path, Truth::Model(&truth), &beliefs, &outages, 1);
-    let filter = FilterPass::new(&track, &beliefs[0]);
-    let sources = TruthSide::sources(&experiment, &truth);
-    let end = filter.errors(&TruthSide::together(&sources)).outage_ends[0];
+    let filter_models = [scenario.filter_model(&believed, &outages, &track).unwrap()];
+    let experiment = scenario.experiment(&path, Truth::Model(&truth), &filter_models, &outages, 1);
+    let filter = FilterPass::new(&track, &filter_models[0]);
+    let sources = TruthModel::sources(&experiment, &truth);
+    let end = filter.errors(&TruthModel::together(&sources)).outage_ends[0];
     let deviations = end.errors.rmse();
     let budget = &Budget::at_outage_ends(&filter, &sources)[0];
     for i in 0..9 {

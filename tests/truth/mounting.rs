@@ -1,14 +1,14 @@
 //! The mounting of an IMU found from the drive: as good as it says, whatever it is, or refused.
 
-use crate::alignment::{Step, belief, phone, recorded, settings, trajectory};
+use crate::alignment::{Step, filter_model, phone, recorded, settings, trajectory};
 use crate::fusion::turned;
 use crate::shared::{data, shipped};
 use glam::{DQuat, DVec3};
-use nav_sim::navigation::ekf::{Belief, FilterStates};
+use nav_sim::navigation::ekf::{FilterModel, FilterStates};
 use nav_sim::navigation::frames::RollPitchYaw;
 use nav_sim::navigation::fusion::alignment::coarse;
 use nav_sim::navigation::fusion::mounting::{Mounting, find};
-use nav_sim::navigation::fusion::{Recorded, Settings, fuse};
+use nav_sim::navigation::fusion::{DriveData, FusionSettings, fuse};
 use nav_sim::navigation::simulation::SimulatedRecording;
 use nav_sim::navigation::trajectory::reference::Reference;
 use nav_sim::signal::units::Refused;
@@ -42,19 +42,19 @@ fn rotation([roll, pitch, yaw]: [f64; 3]) -> DQuat {
 }
 
 fn found(recording: &SimulatedRecording, q_s_b: DQuat) -> Result<Mounting, Refused> {
-    found_with(recording, q_s_b, &belief())
+    found_with(recording, q_s_b, &filter_model())
 }
 
 fn found_with(
     recording: &SimulatedRecording,
     q_s_b: DQuat,
-    belief: &Belief,
+    filter_model: &FilterModel,
 ) -> Result<Mounting, Refused> {
-    let data = Recorded {
+    let data = DriveData {
         imu: &turned(&recording.imu, q_s_b),
         ..data(recording)
     };
-    find(&data, &settings(), belief)
+    find(&data, &settings(), filter_model)
 }
 
 /// Found less true, about the vehicle's axes (rad).
@@ -88,18 +88,18 @@ fn twelve_mountings_are_found_and_fused_with() {
         is_as_good_as_it_says(&mounting, truth);
         assert!(rotation(mounting.angles_deg()).angle_between(mounting.q_s_b) < 1e-6);
 
-        let data = Recorded {
+        let data = DriveData {
             imu: &turned(&recording.imu, truth),
             ..data(recording)
         };
-        let settings = Settings {
+        let settings = FusionSettings {
             q_s_b: mounting.q_s_b,
             mounting_sigma_b: mounting.sigma_b,
             rows_hz: 1.0,
             ..settings()
         };
-        let start = coarse(&data, &settings, &belief()).unwrap().start;
-        let solution = fuse(&data, &belief(), &start, &settings, Some(&reference)).unwrap();
+        let start = coarse(&data, &settings, &filter_model()).unwrap().start;
+        let solution = fuse(&data, &filter_model(), &start, &settings, Some(&reference)).unwrap();
         for (sum, look) in nees.iter_mut().zip(looks) {
             let mut rows = solution.rows.iter();
             let row = rows.find(|row| row.t_s >= f64::from(look)).unwrap();
@@ -201,7 +201,7 @@ fn some_way_backwards_does_not_matter() {
 /// A filter that expects no turn-on bias where there is one of 0.3 m/s² and 0.01 rad/s: refused, or as good as it says.
 #[test]
 fn a_filter_that_is_wrong_says_nothing_wrong() {
-    let careless = Belief::new(&phone(), FilterStates::Reduced15, 1.0, 800.0).unwrap();
+    let careless = FilterModel::new(&phone(), FilterStates::Reduced15, 1.0, 800.0).unwrap();
     recorded(&shipped("land_vehicle"), Some(0.1), 4, |run, recording| {
         let truth = rotation(MOUNTINGS[6 + run as usize]);
         match found_with(recording, truth, &careless) {

@@ -8,7 +8,9 @@ use approx::{assert_abs_diff_eq, assert_relative_eq};
 use nav_sim::calibration::{Estimator, ModelSpec, Trim, Weighting};
 use nav_sim::signal::imu::{Axis, Channel, Sensor};
 use nav_sim::signal::noise::contamination::{Contamination, Extent, Operation, Rule};
-use nav_sim::signal::noise::{Composite, Kind, Law, Model, Parameter, Process, Spread, Variation};
+use nav_sim::signal::noise::{
+    Composite, Model, Parameter, ParameterDistribution, Process, ProcessKind, Spread, Variation,
+};
 use nav_sim::signal::rng::StreamKey;
 use nav_sim::signal::wavelet::Tuning;
 use rand::RngExt;
@@ -20,14 +22,14 @@ const RATE: f64 = 100.0;
 /// WN + AR1 + RW whose parts lead at different scales of 2^12 samples and more; five replicates.
 fn design(samples: usize) -> Design {
     let process = |code, values: &[f64]| {
-        Process::of_values(Kind::named(code).unwrap(), values, RATE).unwrap()
+        Process::of_values(ProcessKind::named(code).unwrap(), values, RATE).unwrap()
     };
     let noise = Composite::new(vec![
         process("WN", &[1.0]),
         process("AR1", &[0.97, 0.01]),
         process("RW", &[1e-5]),
     ]);
-    let law = Law::Beta {
+    let law = ParameterDistribution::Beta {
         a: 2.0,
         b: 2.0,
         low: 0.9,
@@ -171,7 +173,7 @@ fn a_step_draws_the_random_walk_no_further_than_with_weights_of_the_literature()
     }
 }
 
-fn law(noise: &Composite, process: &str, parameter: &str, law: Law) -> Variation {
+fn law(noise: &Composite, process: &str, parameter: &str, law: ParameterDistribution) -> Variation {
     Variation::new(noise, process, parameter, law).unwrap()
 }
 
@@ -186,7 +188,7 @@ impl Example1 {
     }
 
     fn laws(&self) -> Vec<Variation> {
-        let uniform = Law::Beta {
+        let uniform = ParameterDistribution::Beta {
             a: 1.0,
             b: 1.0,
             low: 0.0,
@@ -205,7 +207,7 @@ impl Example1 {
         let (mut low, mut high) = (0.0, 0.5);
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if Kind::Ma1.haar_shape(middle, 1).0 > nu {
+            if ProcessKind::Ma1.haar_shape(middle, 1).0 > nu {
                 low = middle
             } else {
                 high = middle
@@ -231,7 +233,12 @@ fn example_1_of_the_paper_in_closed_form() {
     }
 }
 
-fn mean(law: Law, centre: f64, parameter: Parameter, f: impl Fn(f64) -> f64) -> f64 {
+fn mean(
+    law: ParameterDistribution,
+    centre: f64,
+    parameter: Parameter,
+    f: impl Fn(f64) -> f64,
+) -> f64 {
     nodes(law, centre, parameter)
         .into_iter()
         .map(|(x, w)| w * f(x))
@@ -242,7 +249,7 @@ fn mean(law: Law, centre: f64, parameter: Parameter, f: impl Fn(f64) -> f64) -> 
 #[test]
 fn moments_of_beta_laws() {
     for (a, b) in [(6.0, 2.0), (2.2, 6.1), (1.0, 1.0), (0.5, 0.7), (1.8, 3.5)] {
-        let law = Law::Beta {
+        let law = ParameterDistribution::Beta {
             a,
             b,
             low: 0.0,
@@ -264,7 +271,7 @@ fn moments_of_beta_laws() {
 /// Half a normal: mean √(2/π)·sd. A whole one: its moment-generating function at ½.
 #[test]
 fn moments_of_normal_laws() {
-    let law = Law::Normal { sd: 2.0 };
+    let law = ParameterDistribution::Normal { sd: 2.0 };
     let half = mean(law, 0.0, Parameter::Sigma2, |x| x);
     assert_abs_diff_eq!(
         half,
@@ -274,7 +281,11 @@ fn moments_of_normal_laws() {
     let whole = mean(law, 3.0, Parameter::Slope, |x| (0.5 * x).exp());
     assert_relative_eq!(whole, 2.0_f64.exp(), max_relative = 1e-11);
     assert_eq!(
-        nodes(Law::Normal { sd: 0.0 }, 3.0, Parameter::Sigma2),
+        nodes(
+            ParameterDistribution::Normal { sd: 0.0 },
+            3.0,
+            Parameter::Sigma2
+        ),
         [(3.0, 1.0)]
     );
 }
@@ -282,7 +293,7 @@ fn moments_of_normal_laws() {
 /// E exp(k(mu + sd Z)) = median^k exp(k² sd²/2); of phi the logarithm of 1/κ is normal, so E κ likewise.
 #[test]
 fn moments_of_lognormal_laws() {
-    let law = Law::Lognormal {
+    let law = ParameterDistribution::Lognormal {
         median: 3.0,
         sd: 0.5,
         median_ci95: None,
@@ -293,7 +304,7 @@ fn moments_of_lognormal_laws() {
         let found = mean(law, 1.0, Parameter::Sigma2, |x| x.powi(k));
         assert!((found / exact - 1.0).abs() < 1e-11, "{k}: {found} {exact}");
     }
-    let law = Law::Lognormal {
+    let law = ParameterDistribution::Lognormal {
         median: 0.9,
         sd: 0.5,
         median_ci95: None,

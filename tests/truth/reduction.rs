@@ -15,8 +15,8 @@ fn assessed(model: &str, trajectory: &str, outages: &[Outage], reduction: Reduct
     let mut scenario = Scenario::default();
     scenario.filter.reduction = reduction;
     let track = scenario.track(&path, &model, outages).unwrap();
-    let belief = scenario.belief(&model, outages, &track).unwrap();
-    assess(&track, &belief, &model)
+    let filter_model = scenario.filter_model(&model, outages, &track).unwrap();
+    assess(&track, &filter_model, &model)
 }
 
 /// Lowest and highest ratio of RMSE to sigma at the ends of outages, and the mean NEES.
@@ -76,8 +76,8 @@ fn a_model_of_fifteen_states_is_its_own_reduction() {
     let (scenario, outages) = (Scenario::default(), outages(90.0));
     let track = scenario.track(&path, &model, &outages).unwrap();
     let end = |scenario: &Scenario| {
-        let belief = scenario.belief(&model, &outages, &track).unwrap();
-        assess(&track, &belief, &model).outage_ends[1]
+        let filter_model = scenario.filter_model(&model, &outages, &track).unwrap();
+        assess(&track, &filter_model, &model).outage_ends[1]
     };
     let (reduced, full) = (end(&scenario), end(&scenario.with_full_noise()));
     assert_abs_diff_eq!(reduced.nees, 9.0, epsilon = 1e-6);

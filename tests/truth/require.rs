@@ -15,7 +15,7 @@ use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::signal::imu::Sensor;
 use nav_sim::signal::noise::{Composite, Model, Process};
 use nav_sim_navigation::simulation::REPORTED;
-use nav_sim_navigation::simulation::lincov::{FilterPass, Track, TruthSide};
+use nav_sim_navigation::simulation::lincov::{FilterPass, Track, TruthModel};
 
 const OUTAGE: Outage = Outage {
     start_s: 150.0,
@@ -67,8 +67,14 @@ fn the_imu_that_is_named_meets_the_limit_in_sampled_runs() {
     let model = imu.model(scenario.imu.rate_hz);
     let full = scenario.with_full_noise();
     let track = scenario.track(&trajectory, &model, &[OUTAGE]).unwrap();
-    let beliefs = [full.belief(&model, &[OUTAGE], &track).unwrap()];
-    let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &[OUTAGE], 5);
+    let filter_models = [full.filter_model(&model, &[OUTAGE], &track).unwrap()];
+    let experiment = scenario.experiment(
+        &trajectory,
+        Truth::Model(&model),
+        &filter_models,
+        &[OUTAGE],
+        5,
+    );
     let result = &monte_carlo::run(&experiment, 400, &|_| {}).unwrap()[0];
     let within = result
         .runs
@@ -195,13 +201,13 @@ fn end_of_outage(
     outage: &[Outage],
     track: &Track,
 ) -> [f64; REPORTED] {
-    let belief = scenario
+    let filter_model = scenario
         .with_full_noise()
-        .belief(model, outage, track)
+        .filter_model(model, outage, track)
         .unwrap();
     let experiment = scenario.experiment(trajectory, Truth::Model(model), &[], outage, 1);
-    let truth = TruthSide::together(&TruthSide::sources(&experiment, model));
-    FilterPass::new(track, &belief).errors_at_ends(&truth)[0]
+    let truth = TruthModel::together(&TruthModel::sources(&experiment, model));
+    FilterPass::new(track, &filter_model).errors_at_ends(&truth)[0]
         .errors
         .rmse()
 }

@@ -2,7 +2,7 @@
 
 use crate::common::drive::{MODEL, place_with};
 use nav_sim::io::{model_file, trajectory_file};
-use nav_sim::navigation::fusion::Recorded;
+use nav_sim::navigation::fusion::DriveData;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::SimulatedRecording;
 use nav_sim::navigation::trajectory::Trajectory;
@@ -81,8 +81,8 @@ pub(crate) fn white(sigma2: f64) -> Composite {
 }
 
 /// A recording without what the vehicle knows.
-pub(crate) fn data(recording: &SimulatedRecording) -> Recorded<'_> {
-    Recorded {
+pub(crate) fn data(recording: &SimulatedRecording) -> DriveData<'_> {
+    DriveData {
         imu: &recording.imu,
         gnss: &recording.gnss,
         aids: &[],

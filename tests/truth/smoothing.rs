@@ -1,13 +1,15 @@
 //! The smoother of `fuse`: a closed form at rest, consistency over simulated recordings, and identities.
 
-use crate::fusion::{belief, model, plainly_recorded, recorded, run, settings};
+use crate::fusion::{filter_model, model, plainly_recorded, recorded, run, settings};
 use crate::shared::{data, gauss_markov, outage, shipped, stands, two_sided, white};
 use approx::assert_relative_eq;
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
-use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
-use nav_sim::navigation::fusion::{FixCounts, FusionError, Row, Settings, Start, fuse, outcome};
-use nav_sim::navigation::fusion::{Recorded, Solution};
+use nav_sim::navigation::ekf::{FilterModel, FilterStates, InitialSettings};
+use nav_sim::navigation::fusion::{DriveData, Solution};
+use nav_sim::navigation::fusion::{
+    FixCounts, FusionError, FusionSettings, SolutionRow, Start, fuse, outcome,
+};
 use nav_sim::navigation::gnss::GnssFix;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::gnss::GnssSettings;
@@ -23,15 +25,15 @@ const OUTAGE: Outage = Outage {
     end_s: 390.0,
 };
 
-fn smoothing() -> Settings {
-    Settings {
+fn smoothing() -> FusionSettings {
+    FusionSettings {
         smooth: true,
         outages: vec![OUTAGE],
         ..settings()
     }
 }
 
-fn rows(solution: &Solution) -> &[Row] {
+fn rows(solution: &Solution) -> &[SolutionRow] {
     solution.smoothed.as_ref().unwrap()
 }
 
@@ -52,7 +54,7 @@ fn at_rest_the_smoothed_position_is_the_closed_form_of_an_integrated_wiener_proc
         axes: Default::default(),
     };
     let believed = Model::pooled(100.0, &white(SIGMA2), &Composite::default());
-    let belief = Belief::new(&believed, FilterStates::Full, 1.0, 800.0).unwrap();
+    let filter_model = FilterModel::new(&believed, FilterStates::Full, 1.0, 800.0).unwrap();
     let truth = trajectory.state(trajectory.start_s());
     let sigma = InitialSettings {
         pos_sigma_m: [2.0; 3],
@@ -83,17 +85,17 @@ fn at_rest_the_smoothed_position_is_the_closed_form_of_an_integrated_wiener_proc
     };
     let gnss: Vec<GnssFix> = times.iter().enumerate().map(fix).collect();
     let reference = trajectory.clone().into();
-    let smooth = Settings {
+    let smooth = FusionSettings {
         smooth: true,
         ..settings()
     };
     let mut solution = Solution::default();
     plainly_recorded(&trajectory, &free, 1, |recording, _| {
-        let recorded = Recorded {
+        let recorded = DriveData {
             gnss: &gnss,
             ..data(recording)
         };
-        solution = fuse(&recorded, &belief, &start, &smooth, Some(&reference)).unwrap();
+        solution = fuse(&recorded, &filter_model, &start, &smooth, Some(&reference)).unwrap();
     });
     // covariance of positions at two times: the start, and ∫∫ of white acceleration
     let prior = |a: f64, b: f64| {
@@ -157,12 +159,12 @@ impl Experiment {
         let model = Model::pooled(100.0, &accel, &gyro);
         let scenario: Scenario = toml::from_str(self.scenario).unwrap();
         assert_eq!(scenario.validate(), Ok(()));
-        let belief = Belief::new(&model, self.states, 1.0, 800.0)
+        let filter_model = FilterModel::new(&model, self.states, 1.0, 800.0)
             .unwrap()
             .with_initial(&scenario.initial);
         let experiment = scenario.experiment(trajectory, Truth::Model(&model), &[], &[], 23);
         let plan = Plan::new(&experiment).unwrap();
-        let settings = Settings {
+        let settings = FusionSettings {
             lever_arm_b: scenario.gnss.lever_arm_m.into(),
             ..smoothing()
         };
@@ -177,7 +179,7 @@ impl Experiment {
             };
             fuse(
                 &data(&recording),
-                &belief,
+                &filter_model,
                 &start,
                 &settings,
                 Some(&reference),
@@ -222,13 +224,14 @@ fn smoothed_errors_are_as_large_as_stated_and_smaller_than_the_filter_s() {
             }
         }
         // root mean square of smoothed over filtered, of the same rows
-        let ratio = |within: &dyn Fn(&Row) -> bool, of: &dyn Fn(&[f64; 9]) -> f64| {
-            let sum = |rows: &[Row]| -> f64 {
+        let ratio = |within: &dyn Fn(&SolutionRow) -> bool, of: &dyn Fn(&[f64; 9]) -> f64| {
+            let sum = |rows: &[SolutionRow]| -> f64 {
                 let some = rows.iter().filter(|row| within(row));
                 some.map(|row| of(&row.error.unwrap().values).powi(2)).sum()
             };
-            let of =
-                |rows: fn(&Solution) -> &[Row]| solutions.iter().map(|s| sum(rows(s))).sum::<f64>();
+            let of = |rows: fn(&Solution) -> &[SolutionRow]| {
+                solutions.iter().map(|s| sum(rows(s))).sum::<f64>()
+            };
             let (smoothed, filtered) = (of(rows), of(|s| s.rows.as_slice()));
             (smoothed / filtered).sqrt()
         };
@@ -242,8 +245,8 @@ fn smoothed_errors_are_as_large_as_stated_and_smaller_than_the_filter_s() {
             })
         });
         assert!(within < outside, "{name}: {within} {outside}");
-        let farthest = |rows: &[Row]| {
-            let sigma = |row: &&Row| row.sigma[0].hypot(row.sigma[1]);
+        let farthest = |rows: &[SolutionRow]| {
+            let sigma = |row: &&SolutionRow| row.sigma[0].hypot(row.sigma[1]);
             let rows = rows.iter().filter(|row| OUTAGE.withholds(row.t_s));
             rows.max_by(|a, b| sigma(a).total_cmp(&sigma(b)))
                 .unwrap()
@@ -268,14 +271,14 @@ fn smoothing_changes_nothing_that_it_should_not() {
     };
     recorded(&trajectory, &model(), &gnss, 1, |recording, start| {
         let solve = |rows_hz: f64, smooth: bool, outages: [Outage; 1]| {
-            let settings = Settings {
+            let settings = FusionSettings {
                 outages: outages.into(),
                 lever_arm_b: gnss.lever_arm_m.into(),
                 rows_hz,
                 smooth,
                 ..settings()
             };
-            let data = Recorded {
+            let data = DriveData {
                 imu: &recording.imu[..12_000],
                 ..data(recording)
             };
@@ -324,7 +327,7 @@ fn smoothing_changes_nothing_that_it_should_not() {
         // without a fix there is nothing to smooth
         let free = solve(1.0, true, [outage(0.0, 1e4)]);
         for (filtered, smoothed) in free.rows.iter().zip(rows(&free)) {
-            let apart = |of: fn(&Row) -> [f64; 9]| {
+            let apart = |of: fn(&SolutionRow) -> [f64; 9]| {
                 (0..9)
                     .map(|i| (of(filtered)[i] - of(smoothed)[i]).abs() / filtered.sigma[i])
                     .fold(0.0, f64::max)
@@ -344,16 +347,16 @@ fn a_tape_that_is_too_long_is_refused() {
             .take(1_000_000)
             .copied()
             .collect();
-        let recorded = Recorded {
+        let recorded = DriveData {
             imu: &imu,
             ..data(recording)
         };
-        let long = Settings {
+        let long = FusionSettings {
             rows_hz: 30_000.0,
             smooth: true,
             ..settings()
         };
-        let refused = fuse(&recorded, &belief(&model()), start, &long, None).unwrap_err();
+        let refused = fuse(&recorded, &filter_model(&model()), start, &long, None).unwrap_err();
         let FusionError::Memory {
             bytes, states: 15, ..
         } = refused

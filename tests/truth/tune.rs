@@ -2,8 +2,8 @@
 
 use crate::shared::{town, white_and_walk};
 use approx::{assert_abs_diff_eq, assert_relative_eq};
-use nav_sim::navigation::ekf::Belief;
-use nav_sim::navigation::metrics::{Estimate, Expected, VerdictKind};
+use nav_sim::navigation::ekf::FilterModel;
+use nav_sim::navigation::metrics::{Estimate, ExpectedRun, VerdictKind};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::imu::Truth;
@@ -13,7 +13,7 @@ use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::signal::imu::Sensor;
 use nav_sim::signal::noise::Model;
 use nav_sim_navigation::simulation::lincov::{
-    Aim, Factor, Filter, Task, Track, TrueErrors, scaled,
+    ConsistencyCriterion, Factor, Filter, Track, TrueErrors, TuningProblem, scaled,
 };
 
 const OUTAGES: [Outage; 1] = [Outage {
@@ -45,20 +45,22 @@ fn drive() -> Drive {
 }
 
 impl Drive {
-    fn belief(&self, model: &Model) -> Belief {
-        self.scenario.belief(model, &OUTAGES, &self.track).unwrap()
+    fn filter_model(&self, model: &Model) -> FilterModel {
+        self.scenario
+            .filter_model(model, &OUTAGES, &self.track)
+            .unwrap()
     }
 
-    fn factors(&self, truths: &[Model], aim: Aim) -> Vec<Factor> {
+    fn factors(&self, truths: &[Model], aim: ConsistencyCriterion) -> Vec<Factor> {
         let filter: &Filter<'_> =
-            &|model: &Model| self.scenario.belief(model, &OUTAGES, &self.track);
+            &|model: &Model| self.scenario.filter_model(model, &OUTAGES, &self.track);
         let model = &model(1.0, 1.0);
         let truths: &[TrueErrors] = &truths
             .iter()
             .cloned()
             .map(TrueErrors::from)
             .collect::<Vec<_>>();
-        let task = Task {
+        let task = TuningProblem {
             model,
             truths,
             track: &self.track,
@@ -69,29 +71,33 @@ impl Drive {
         let factors = task.factors().unwrap();
         let consistency = task.consistency(filter, &factors).unwrap();
         match aim {
-            Aim::Mean => assert_relative_eq!(consistency.nees, 9.0, max_relative = 5e-3),
-            Aim::Worst => assert_relative_eq!(consistency.largest.ratio, 1.0, max_relative = 5e-3),
+            ConsistencyCriterion::Mean => {
+                assert_relative_eq!(consistency.nees, 9.0, max_relative = 5e-3)
+            }
+            ConsistencyCriterion::Worst => {
+                assert_relative_eq!(consistency.largest.ratio, 1.0, max_relative = 5e-3)
+            }
         }
         factors
     }
 
     /// What a filter with these factors is expected to do.
-    fn expected(&self, factors: &[Factor], truth: &Model) -> Expected {
-        let belief = self.belief(&scaled(&model(1.0, 1.0), factors));
+    fn expected(&self, factors: &[Factor], truth: &Model) -> ExpectedRun {
+        let filter_model = self.filter_model(&scaled(&model(1.0, 1.0), factors));
         let truly = Truth::Model(truth);
         let experiment = self
             .scenario
             .experiment(&self.trajectory, truly, &[], &OUTAGES, 1);
-        Expected::along(&self.track, &experiment, &belief, truth).unwrap()
+        ExpectedRun::along(&self.track, &experiment, &filter_model, truth).unwrap()
     }
 
     /// NEES at the outage's end of a hundred runs.
-    fn sampled_nees(&self, belief: Belief, truth: &Model) -> Estimate {
-        let beliefs = [belief];
+    fn sampled_nees(&self, filter_model: FilterModel, truth: &Model) -> Estimate {
+        let filter_models = [filter_model];
         let experiment = self.scenario.experiment(
             &self.trajectory,
             Truth::Model(truth),
-            &beliefs,
+            &filter_models,
             &OUTAGES,
             11,
         );
@@ -110,7 +116,7 @@ fn a_sensor_four_times_as_noisy_is_found_and_runs_agree() {
         on_variance: 4.0,
     };
     let truth = scaled(&model(1.0, 1.0), &[four]);
-    let factors = drive.factors(std::slice::from_ref(&truth), Aim::Mean);
+    let factors = drive.factors(std::slice::from_ref(&truth), ConsistencyCriterion::Mean);
     for factor in &factors {
         let expected = if factor.sensor == Sensor::Gyro {
             4.0
@@ -119,8 +125,11 @@ fn a_sensor_four_times_as_noisy_is_found_and_runs_agree() {
         };
         assert_relative_eq!(factor.on_variance, expected, max_relative = 0.05);
     }
-    let before = drive.sampled_nees(drive.belief(&model(1.0, 1.0)), &truth);
-    let after = drive.sampled_nees(drive.belief(&scaled(&model(1.0, 1.0), &factors)), &truth);
+    let before = drive.sampled_nees(drive.filter_model(&model(1.0, 1.0)), &truth);
+    let after = drive.sampled_nees(
+        drive.filter_model(&scaled(&model(1.0, 1.0), &factors)),
+        &truth,
+    );
     let deviation = (18.0_f64 / 100.0).sqrt();
     assert_abs_diff_eq!(after.value, 9.0, epsilon = 4.0 * deviation);
     assert!(before.value - 9.0 > 6.0 * deviation, "{before:?}");
@@ -129,7 +138,7 @@ fn a_sensor_four_times_as_noisy_is_found_and_runs_agree() {
 #[test]
 fn a_model_that_is_true_needs_no_factor() {
     let drive = drive();
-    for aim in [Aim::Mean, Aim::Worst] {
+    for aim in [ConsistencyCriterion::Mean, ConsistencyCriterion::Worst] {
         let factors = drive.factors(&[model(1.0, 1.0)], aim);
         assert!(
             factors.iter().all(|f| f.on_variance == 1.0) && factors.len() == 2,
@@ -145,7 +154,7 @@ fn a_tuned_filter_is_honest_over_the_run_as_a_verdict_judges_it() {
     let drive = drive();
     let gyro = white_and_walk(1e-6, 1e-12);
     let truth = Model::pooled(100.0, &white_and_walk(1e-4, 1e-10), &gyro);
-    let factors = drive.factors(std::slice::from_ref(&truth), Aim::Worst);
+    let factors = drive.factors(std::slice::from_ref(&truth), ConsistencyCriterion::Worst);
     let verdict = drive.expected(&factors, &truth).summary.verdict;
     assert_ne!(
         verdict.kind,
@@ -160,7 +169,7 @@ fn a_tuned_filter_is_honest_over_the_run_as_a_verdict_judges_it() {
 fn the_worst_of_two_truths_is_covered() {
     let drive = drive();
     let truths = [model(4.0, 1.0), model(1.0, 4.0)];
-    let factors = drive.factors(&truths, Aim::Worst);
+    let factors = drive.factors(&truths, ConsistencyCriterion::Worst);
     assert!(
         factors.len() == 2 && factors.iter().all(|f| (2.0..6.0).contains(&f.on_variance)),
         "{factors:?}"
@@ -172,7 +181,7 @@ fn the_worst_of_two_truths_is_covered() {
 fn no_factor_is_larger_than_it_must_be() {
     let drive = drive();
     let truth = model(9.0, 4.0);
-    let factors = drive.factors(std::slice::from_ref(&truth), Aim::Worst);
+    let factors = drive.factors(std::slice::from_ref(&truth), ConsistencyCriterion::Worst);
     let largest = |factors: &[Factor]| {
         let record = drive.expected(factors, &truth).record;
         let ends = &record.outages[0];

@@ -5,8 +5,8 @@ use super::sampling::variance_of_log;
 use crate::imu::{Axis, Channel, Recording, Sensor, Signal};
 use crate::units::Refused;
 use crate::wavelet::{
-    Curve, Gappy, RobustVariance, Status, Tuning, WaveletError, both, default_levels, gappy,
-    interval,
+    Curve, GappyVariances, RobustVariance, RootStatus, Tuning, WaveletError, classical_and_robust,
+    default_levels, gappy, interval,
 };
 use rayon::prelude::*;
 use std::fmt;
@@ -144,7 +144,7 @@ impl Replicate {
     /// Returns true if the variance used at a level is the robust one. On coarse quantization steps
     /// a robust estimator falls back to the classical variance.
     pub(crate) fn is_robust(&self, estimator: Estimator, index: usize) -> bool {
-        estimator.is_robust() && self.robust[index].status != Status::Coarse
+        estimator.is_robust() && self.robust[index].status != RootStatus::Coarse
     }
 
     /// The wavelet variances that an estimator uses, from level 1 on (units²).
@@ -368,7 +368,7 @@ impl Term {
             nu: replicate.value(estimator, i),
             edof: replicate.edof(estimator, level, tuning),
             is_robust,
-            is_without_root: is_robust && replicate.robust[i].status == Status::NoRoot,
+            is_without_root: is_robust && replicate.robust[i].status == RootStatus::NoRoot,
         }
     }
 }
@@ -535,14 +535,15 @@ pub fn replicates(
             CalibrationError::new(CalibrationFault::TooShort, message)
         };
         let (classical, robust, coverage) = if signal.samples.iter().any(|x| x.is_nan()) {
-            let Gappy {
+            let GappyVariances {
                 classical,
                 robust,
                 coverage,
             } = gappy(&signal.samples, levels, tuning).map_err(error)?;
             (classical, robust, coverage)
         } else {
-            let (classical, robust) = both(&signal.samples, levels, tuning).map_err(error)?;
+            let (classical, robust) =
+                classical_and_robust(&signal.samples, levels, tuning).map_err(error)?;
             (classical, robust, Vec::new())
         };
         let (name, axis) = (recording.name.clone(), Some(channel.axis));
@@ -635,7 +636,7 @@ mod differing_tests {
     use super::*;
     use crate::tests::{generator, normal, replicate};
     use crate::wavelet::interval::edof_eta3;
-    use crate::wavelet::{RobustVariance, Status};
+    use crate::wavelet::{RobustVariance, RootStatus};
 
     /// 24 replicates whose variances differ by a common factor of deviation b, and by their noise √(2/eta3): b² is known to
     /// √(2/23) = 30 % of 24 (36 % of a median absolute deviation, four times within 2.5), and is far below b² where there is none.
@@ -653,7 +654,7 @@ mod differing_tests {
                     .collect();
                 let robust = |value: &f64| RobustVariance {
                     value: *value,
-                    status: Status::Ok,
+                    status: RootStatus::Ok,
                     zeros: 0.0,
                 };
                 let robust = nu.iter().map(robust).collect();

@@ -11,7 +11,7 @@ fn tuning() -> Tuning {
 fn replicate(samples: usize, classical: f64, robust: f64) -> Replicate {
     let robust = RobustVariance {
         value: robust,
-        status: Status::Ok,
+        status: RootStatus::Ok,
         zeros: 0.0,
     };
     Replicate {
@@ -131,7 +131,7 @@ fn a_scale_without_a_root_is_bounded_by_the_classical_average() {
     let mut replicates = eight()[..3].to_vec();
     replicates[..2]
         .iter_mut()
-        .for_each(|r| r.robust[0].status = Status::NoRoot);
+        .for_each(|r| r.robust[0].status = RootStatus::NoRoot);
     let curve = average(&replicates, Estimator::SrAwv, Trim::Count(0), &tuning()).unwrap();
     assert_eq!((curve.ignored, curve.classical), (vec![1], vec![1]));
     assert_relative_eq!(curve.wv[0], 2.0);

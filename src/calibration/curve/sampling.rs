@@ -4,11 +4,11 @@
 //! of the model ([Percival](crate::bibliography::Percival95)). Each nu_j is taken as chi-square with the degrees of
 //! freedom 2 nu²/var that follow, joined by the correlations that follow; where the record has few lengths of the
 //! scale, with those of var = 2/M² Σ (M − |k|) s_k² over the lags there are, s_k the autocovariance of the
-//! coefficients, and of a shape of its own ([`VarianceLaw`]). Drift is not noise: it adds to nu and, but for its product with
+//! coefficients, and of a shape of its own ([`VarianceDistribution`]). Drift is not noise: it adds to nu and, but for its product with
 //! the mean of the coefficients, not to its scatter. Quantization noise is not Gaussian: what that leaves of the scatter
-//! of a robust variance is in [`SamplingLaw::robust_edof`].
+//! of a robust variance is in [`SamplingDistribution::robust_edof`].
 
-use crate::noise::{Composite, Kind, Process};
+use crate::noise::{Composite, Process, ProcessKind};
 use crate::rng::Generator;
 use crate::wavelet::interval::edof_robust;
 use crate::wavelet::{Curve, QuantizationResponse, Tuning};
@@ -23,7 +23,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 /// The law of the wavelet variances of one model at levels 1, 2, …
 #[derive(Debug, Clone)]
-pub(crate) struct SamplingLaw {
+pub(crate) struct SamplingDistribution {
     /// Degrees of freedom per coefficient, of each level.
     per_coefficient: Vec<f64>,
     /// The part of the wavelet variance that is quantization noise, of each level.
@@ -34,13 +34,13 @@ pub(crate) struct SamplingLaw {
     /// remains in correlated coefficients ([`fourth_powers`]).
     fourth: Vec<f64>,
     /// Shape of the law of each level: a chi-square's but at the last levels.
-    pub(crate) shapes: Vec<VarianceLaw>,
+    pub(crate) shapes: Vec<VarianceDistribution>,
     /// Correlations between levels, and the lower Cholesky factor.
     pub(crate) correlation: DMatrix<f64>,
     factor: DMatrix<f64>,
 }
 
-impl SamplingLaw {
+impl SamplingDistribution {
     /// The law for a model, at levels 1 … `levels`.
     pub(crate) fn new(model: &Composite, levels: usize) -> Self {
         let products = products(model, levels);
@@ -119,7 +119,11 @@ impl SamplingLaw {
         let count = |i: usize| crate::wavelet::coefficient_count(samples, i as u32 + 1) as f64;
         let of_level = |(i, e): (usize, &f64)| {
             (e * count(i))
-                .max(of_few(&self.autocorrelations[i], count(i), i as u32 + 1))
+                .max(edof_few_lengths(
+                    &self.autocorrelations[i],
+                    count(i),
+                    i as u32 + 1,
+                ))
                 .max(1.0)
         };
         self.per_coefficient
@@ -196,16 +200,16 @@ fn fourth_powers(model: &Composite, level: usize) -> f64 {
 }
 
 /// The shape of the law of a level's wavelet variance; a chi-square's for a level that is not among the last.
-fn shape(model: &Composite, level: usize, levels: usize) -> VarianceLaw {
+fn shape(model: &Composite, level: usize, levels: usize) -> VarianceDistribution {
     /// Frequencies to a gain's main lobe, 1/tau wide: eight make the sums of powers of it integrals.
     const TO_A_LOBE: usize = 8;
     if !is_last(level, levels) {
-        return VarianceLaw::default();
+        return VarianceDistribution::default();
     }
     let m = f64::from(level as u32 - 1).exp2();
     // Up to 8/tau, beyond which there is a thousandth of a random walk's power and a hundredth of white noise's.
     let weight = |k: usize| gain(model, (k as f64 + 0.5) / (TO_A_LOBE as f64 * 2.0 * m), m);
-    VarianceLaw::new(&(0..8 * TO_A_LOBE).map(weight).collect::<Vec<f64>>())
+    VarianceDistribution::new(&(0..8 * TO_A_LOBE).map(weight).collect::<Vec<f64>>())
 }
 
 /// Returns true at a level whose scale fits only a few times into the record. Below level 4 a
@@ -226,7 +230,7 @@ fn gain(model: &Composite, f: f64, m: f64) -> f64 {
 }
 
 /// Degrees of freedom of a mean of `count` squares with these squared autocorrelations; 0 where the large-sample law holds.
-fn of_few(squared: &[f64], count: f64, level: u32) -> f64 {
+fn edof_few_lengths(squared: &[f64], count: f64, level: u32) -> f64 {
     let step = f64::from(level).exp2() / LAGS as f64;
     // Counted in steps of the lag, so that each lag kept stands for a step of them.
     let n = count / step;
@@ -331,7 +335,7 @@ const MANY_DEGREES: f64 = 60.0;
 
 /// Law of nu over its mean; the default is the chi-square's.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct VarianceLaw {
+pub(crate) struct VarianceDistribution {
     /// Points of the law of one degree of freedom a weight, rising; none: a chi-square.
     points: Vec<ScorePoint>,
     /// Degrees of freedom of that law.
@@ -346,7 +350,7 @@ struct ScorePoint {
     c: f64,
 }
 
-impl VarianceLaw {
+impl VarianceDistribution {
     /// The shape of a mean of squares with these weights, of any scale; the chi-square's where there is none.
     pub(crate) fn new(weights: &[f64]) -> Self {
         let sum: f64 = weights.iter().sum();
@@ -493,7 +497,7 @@ fn quantization_share(model: &Composite, level: u32) -> f64 {
 
 /// The part of a model's wavelet variance that is drift, at a level.
 pub(crate) fn drift_share(model: &Composite, level: u32) -> f64 {
-    share(model, level, |p| p.kind() == Kind::Drift)
+    share(model, level, |p| p.kind() == ProcessKind::Drift)
 }
 
 fn share(model: &Composite, level: u32, is_counted: impl Fn(&Process) -> bool) -> f64 {
@@ -511,7 +515,7 @@ fn share(model: &Composite, level: u32, is_counted: impl Fn(&Process) -> bool) -
 }
 
 fn is_quantization(process: &Process) -> bool {
-    process.kind() == Kind::Quantization
+    process.kind() == ProcessKind::Quantization
 }
 
 /// The curve a model implies, at the levels and of the kind (classical or robust) of a given one.

@@ -12,7 +12,7 @@ use rand::SeedableRng;
 #[test]
 fn white_noise_by_hand() {
     let model = Composite::new(vec![Process::white(1.0).unwrap()]);
-    let law = SamplingLaw::new(&model, 6);
+    let law = SamplingDistribution::new(&model, 6);
     assert_relative_eq!(law.per_coefficient[0], 2.0 / 3.0, max_relative = 1e-12);
     assert_relative_eq!(law.per_coefficient[1], 4.0 / 7.0, max_relative = 1e-12);
     assert_relative_eq!(law.edof(1000)[1], 997.0 * 4.0 / 7.0, max_relative = 1e-12);
@@ -31,11 +31,11 @@ fn few_coefficients_scatter_as_said() {
         Process::random_walk(1.0).unwrap(),
     ];
     for process in processes {
-        let law = SamplingLaw::new(&Composite::new(vec![process]), 8);
+        let law = SamplingDistribution::new(&Composite::new(vec![process]), 8);
         let mut nu = vec![Vec::new(); 2];
         for _ in 0..RECORDS {
             let mut walk = 0.0;
-            let walks = process.kind() == Kind::RandomWalk;
+            let walks = process.kind() == ProcessKind::RandomWalk;
             let signal: Vec<f64> = (0..512)
                 .map(|_| {
                     let step = generator.sample::<f64, _>(StandardNormal);
@@ -78,17 +78,17 @@ fn few_coefficients_scatter_as_said() {
 /// polynomials beyond the fourth. Independent coefficients of efficiency 0.6 would scatter by 28 % more.
 #[test]
 fn robust_variances_scatter_as_said() {
-    use crate::wavelet::both;
+    use crate::wavelet::classical_and_robust;
     const SIGNALS: usize = 1000;
     let tuning = Tuning::new(0.6).unwrap();
-    let law = SamplingLaw::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 6);
+    let law = SamplingDistribution::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 6);
     let mut generator = Generator::seed_from_u64(8);
     let mut logs = vec![Vec::new(); 6];
     for _ in 0..SIGNALS {
         let signal: Vec<f64> = (0..2048)
             .map(|_| generator.sample::<f64, _>(StandardNormal))
             .collect();
-        let (_, robust) = both(&signal, 6, &tuning).unwrap();
+        let (_, robust) = classical_and_robust(&signal, 6, &tuning).unwrap();
         logs.iter_mut()
             .zip(robust)
             .for_each(|(list, nu)| list.push(nu.value.ln()));
@@ -115,7 +115,7 @@ fn simulated_signals_scatter_so() {
         Process::white(1.0).unwrap(),
         Process::ar1(0.8, 0.5).unwrap(),
     ]);
-    let law = SamplingLaw::new(&model, 5);
+    let law = SamplingDistribution::new(&model, 5);
     let edof = law.edof(2048);
     let mut generator = Generator::seed_from_u64(11);
     let mut logs = vec![Vec::new(); 5];

@@ -1,8 +1,8 @@
 //! All recordings against one another, by one test.
 
-use super::contrasts::{AbnormalFile, LogVarianceTable, Noise, alarms};
+use super::contrasts::{AbnormalFile, LogVarianceTable, NullScatter, alarms};
 use super::diagnose::Alarm;
-use crate::curve::sampling::{SamplingLaw, drift_share};
+use crate::curve::sampling::{SamplingDistribution, drift_share};
 use crate::curve::{Estimator, Group, Replicate};
 use crate::imu::{Axis, Sensor};
 use crate::noise::Composite;
@@ -13,7 +13,7 @@ use crate::wavelet::interval::edof_robust;
 pub(super) struct RecordingComparison {
     axes: Vec<Axis>,
     table: LogVarianceTable,
-    noise: Vec<Noise>,
+    noise: Vec<NullScatter>,
     found: Vec<AbnormalFile>,
 }
 
@@ -21,7 +21,7 @@ impl RecordingComparison {
     pub(super) fn new(
         pieces: &[AxisReplicates<'_>],
         sensor: Sensor,
-        test: Test,
+        test: ComparedQuantity,
         efficiency: f64,
     ) -> Self {
         let levels = test.most_levels(pieces);
@@ -45,16 +45,16 @@ impl RecordingComparison {
                 let all = p.law.edof(r.map_or(longest, |r| r.samples)).into_iter();
                 all.take(levels).map(|e| test.edof(e, efficiency)).collect()
             };
-            Noise::new(p.law.first(levels), p.replicates.iter().map(edof).collect())
+            NullScatter::new(p.law.first(levels), p.replicates.iter().map(edof).collect())
         };
         let table = LogVarianceTable {
             logs: pieces.iter().map(of_piece).collect(),
-            above_only: test == Test::Outliers,
+            above_only: test == ComparedQuantity::Outliers,
         };
         let noise = pieces.iter().map(noise).collect();
         let name = match test {
-            Test::Noise => "noise",
-            Test::Outliers => "outliers",
+            ComparedQuantity::Noise => "noise",
+            ComparedQuantity::Outliers => "outliers",
         };
         Self::of(pieces, table, noise, sensor, name)
     }
@@ -62,7 +62,7 @@ impl RecordingComparison {
     fn of(
         pieces: &[AxisReplicates<'_>],
         table: LogVarianceTable,
-        noise: Vec<Noise>,
+        noise: Vec<NullScatter>,
         sensor: Sensor,
         name: &str,
     ) -> Self {
@@ -104,7 +104,7 @@ impl RecordingComparison {
         let last = &between[between.len().saturating_sub(LONGEST_SCALES)..];
         let mean = last.iter().map(|b| b * b).sum::<f64>() / last.len().max(1) as f64;
         // Of the standard deviation, whose logarithm is half that of the variance.
-        let own = vec![Noise::normal(files, 0.5 * mean.sqrt()); pieces.len()];
+        let own = vec![NullScatter::normal(files, 0.5 * mean.sqrt()); pieces.len()];
         Self::of(pieces, table, own, sensor, "drift")
     }
 
@@ -151,7 +151,7 @@ const MOST_DRIFT: f64 = 0.02;
 pub(super) struct AxisReplicates<'a> {
     pub(super) axis: Axis,
     pub(super) model: &'a Composite,
-    pub(super) law: SamplingLaw,
+    pub(super) law: SamplingDistribution,
     pub(super) replicates: Vec<Option<&'a Replicate>>,
 }
 
@@ -191,7 +191,7 @@ pub(super) fn axes<'a>(
                 .iter()
                 .find(|r| r.name == **name && r.axis == Some(axis))
         };
-        let law = SamplingLaw::new(model, levels);
+        let law = SamplingDistribution::new(model, levels);
         Some(AxisReplicates {
             axis,
             model,
@@ -204,7 +204,7 @@ pub(super) fn axes<'a>(
 
 /// Quantity in which recordings are compared.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Test {
+pub(super) enum ComparedQuantity {
     /// ln robust wavelet variance.
     Noise,
     /// ln (classical / robust): only more than in the others is suspect.
@@ -216,7 +216,7 @@ pub(super) fn excess_of_classical(r: &Replicate, level: usize) -> f64 {
     (r.classical[level] / r.robust[level].value).ln()
 }
 
-impl Test {
+impl ComparedQuantity {
     /// The quantity at a level; NaN where it is no evidence.
     pub(super) fn value(self, piece: &AxisReplicates<'_>, r: &Replicate, level: usize) -> f64 {
         match self {

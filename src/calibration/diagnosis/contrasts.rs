@@ -6,7 +6,7 @@
 //! numbers, alike on the axes, F follows Fisher's law with A and A(n − 1) degrees of freedom, or lies below.
 //! The spread is that of the contrast itself, so however the scales hang together, nothing is assumed of it.
 
-use crate::curve::sampling::SamplingLaw;
+use crate::curve::sampling::SamplingDistribution;
 use crate::rng::{Generator, StreamKey};
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -33,7 +33,7 @@ impl LogVarianceTable {
     /// for each level, independent from level to level; of their variance the axes of a file share a part.
     fn drawn(
         &self,
-        noise: &[Noise],
+        noise: &[NullScatter],
         between: &[f64],
         shared: f64,
         generator: &mut Generator,
@@ -46,7 +46,7 @@ impl LogVarianceTable {
                 .collect()
         };
         let common: Vec<Vec<f64>> = (0..files).map(|_| normals()).collect();
-        let mut file = |noise: &Noise, k: usize, own: &Option<Vec<f64>>| {
+        let mut file = |noise: &NullScatter, k: usize, own: &Option<Vec<f64>>| {
             own.as_ref().map(|own| {
                 let values = noise.draw(k, generator);
                 let difference = |(((value, b), common), seen): (((f64, &f64), &f64), &f64)| {
@@ -64,7 +64,7 @@ impl LogVarianceTable {
                     .collect()
             })
         };
-        let axis = |(files, noise): (&Files, &Noise)| {
+        let axis = |(files, noise): (&Files, &NullScatter)| {
             files
                 .iter()
                 .enumerate()
@@ -80,7 +80,7 @@ impl LogVarianceTable {
     /// Share that the axes of a file have in common of the variance by which the active files differ beyond
     /// their noise: the covariance between axes over the excess variance, over all levels, each weighted by
     /// its certainty.
-    fn shared(&self, noise: &[Noise], between: &[f64], active: &[bool]) -> f64 {
+    fn shared(&self, noise: &[NullScatter], between: &[f64], active: &[bool]) -> f64 {
         let (mut covariance, mut variance) = (0.0, 0.0);
         for (j, between) in between.iter().enumerate() {
             let contrasts = self.contrasts(noise, ScaleWindow { first: j, width: 1 }, j, active);
@@ -110,8 +110,8 @@ impl LogVarianceTable {
     }
 
     /// Standard deviation by which the active files differ at each level, beyond their noise.
-    pub(super) fn between(&self, noise: &[Noise], active: &[bool]) -> Vec<f64> {
-        let levels = noise.first().map_or(0, Noise::levels);
+    pub(super) fn between(&self, noise: &[NullScatter], active: &[bool]) -> Vec<f64> {
+        let levels = noise.first().map_or(0, NullScatter::levels);
         let level = |j: usize| {
             let contrasts = self.contrasts(noise, ScaleWindow { first: j, width: 1 }, j, active);
             let (mut squares, mut freedom, mut own) = (0.0, 0.0, 0.0);
@@ -135,7 +135,7 @@ impl LogVarianceTable {
     /// The contrasts of a window, of each axis with enough active files.
     fn contrasts(
         &self,
-        noise: &[Noise],
+        noise: &[NullScatter],
         window: ScaleWindow,
         index: usize,
         active: &[bool],
@@ -171,7 +171,7 @@ struct Contrast {
 }
 
 /// Statistics of the values without one or two of them.
-struct Rest {
+struct LeaveOutStatistics {
     mean: f64,
     /// Σ of the squares about the mean.
     squares: f64,
@@ -213,7 +213,7 @@ impl Contrast {
         })
     }
 
-    fn without(&self, one: usize, other: usize) -> Rest {
+    fn without(&self, one: usize, other: usize) -> LeaveOutStatistics {
         let (mut sum, mut squares, mut count) = (self.sum, self.squares, self.count);
         for value in [one, other]
             .into_iter()
@@ -223,7 +223,7 @@ impl Contrast {
             squares -= value * value;
             count -= 1.0;
         }
-        Rest {
+        LeaveOutStatistics {
             mean: sum / count,
             squares: (squares - sum * sum / count).max(0.0),
             count,
@@ -288,8 +288,12 @@ struct LargestDistances {
 }
 
 /// The largest distances of every file.
-fn furthest(table: &LogVarianceTable, noise: &[Noise], active: &[bool]) -> Vec<LargestDistances> {
-    let levels = noise.first().map_or(0, Noise::levels);
+fn furthest(
+    table: &LogVarianceTable,
+    noise: &[NullScatter],
+    active: &[bool],
+) -> Vec<LargestDistances> {
+    let levels = noise.first().map_or(0, NullScatter::levels);
     let count = active.iter().filter(|on| **on).count();
     let mut all = vec![
         LargestDistances {
@@ -353,7 +357,7 @@ impl ScaleWindow {
 
 /// Scatter of one axis by noise alone.
 #[derive(Debug, Clone)]
-pub(super) struct Noise {
+pub(super) struct NullScatter {
     kind: NoiseKind,
     /// Degrees of freedom, `[file][level]`.
     edof: Vec<Vec<f64>>,
@@ -365,13 +369,13 @@ pub(super) struct Noise {
 #[derive(Debug, Clone)]
 enum NoiseKind {
     /// Logarithms of wavelet variances.
-    Law(SamplingLaw),
+    Law(SamplingDistribution),
     /// One Gaussian number of unit variance, times what its deviation differs by from file to file: the standard deviation of
     /// its logarithm.
     Normal(f64),
 }
 
-impl Noise {
+impl NullScatter {
     /// Noise of files of one Gaussian number each, whose standard deviation is log-normal about 1 with `log_deviation`.
     pub(super) fn normal(files: usize, log_deviation: f64) -> Self {
         let kind = NoiseKind::Normal(log_deviation);
@@ -404,7 +408,7 @@ impl Noise {
     }
 
     /// Noise of files with these degrees of freedom, `[file][level]`.
-    pub(super) fn new(law: SamplingLaw, edof: Vec<Vec<f64>>) -> Self {
+    pub(super) fn new(law: SamplingDistribution, edof: Vec<Vec<f64>>) -> Self {
         let levels = edof.first().map_or(0, Vec::len);
         let deviations: Vec<Vec<f64>> = edof
             .iter()
@@ -468,7 +472,7 @@ pub(super) struct AbnormalFile {
 /// The abnormal files, the most abnormal first. `source` and `process` name the streams.
 pub(super) fn alarms(
     table: &LogVarianceTable,
-    noise: &[Noise],
+    noise: &[NullScatter],
     source: &str,
     process: &str,
 ) -> Vec<AbnormalFile> {
@@ -492,7 +496,7 @@ pub(super) fn alarms(
 
 fn most_abnormal(
     table: &LogVarianceTable,
-    noise: &[Noise],
+    noise: &[NullScatter],
     active: &[bool],
     source: &str,
     process: &str,
@@ -562,15 +566,15 @@ fn limit(mut values: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curve::sampling::{SamplingLaw, variance_of_log};
+    use crate::curve::sampling::{SamplingDistribution, variance_of_log};
     use crate::noise::{Composite, Process};
     use approx::assert_abs_diff_eq;
     use rand::SeedableRng;
 
-    fn noise(files: usize, levels: usize, edof: f64) -> Noise {
+    fn noise(files: usize, levels: usize, edof: f64) -> NullScatter {
         let white = Composite::new(vec![Process::white(1.0).unwrap()]);
-        Noise::new(
-            SamplingLaw::new(&white, levels),
+        NullScatter::new(
+            SamplingDistribution::new(&white, levels),
             vec![vec![edof; levels]; files],
         )
     }
@@ -636,7 +640,7 @@ mod tests {
 #[cfg(test)]
 mod alarm_tests {
     use super::*;
-    use crate::curve::sampling::SamplingLaw;
+    use crate::curve::sampling::SamplingDistribution;
     use crate::noise::{Composite, Process};
     use crate::rng::Generator;
     use rand::{RngExt, SeedableRng};
@@ -647,10 +651,10 @@ mod alarm_tests {
     #[test]
     fn four_recordings_that_share_their_differences_are_alarmed_as_said() {
         let white = Composite::new(vec![Process::white(1.0).unwrap()]);
-        let law = SamplingLaw::new(&white, 13);
+        let law = SamplingDistribution::new(&white, 13);
         let edof = law.edof(1 << 16);
-        let noise: Vec<Noise> = (0..3)
-            .map(|_| Noise::new(law.first(13), vec![edof.clone(); 4]))
+        let noise: Vec<NullScatter> = (0..3)
+            .map(|_| NullScatter::new(law.first(13), vec![edof.clone(); 4]))
             .collect();
         let mut generator = Generator::seed_from_u64(1);
         let mut file = || -> [Vec<f64>; 3] {

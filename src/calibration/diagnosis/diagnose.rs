@@ -1,16 +1,22 @@
 //! Each recording against the others, sensor by sensor.
 
-use super::comparison::{AxisReplicates, RecordingComparison, Test, axes, excess_of_classical};
+use super::comparison::{
+    AxisReplicates, ComparedQuantity, RecordingComparison, axes, excess_of_classical,
+};
 use super::contrasts::{FALSE_ALARM, FEWEST};
 use crate::curve::{Group, Replicate};
 use crate::imu::{Axis, Sensor};
-use crate::noise::{Kind, Process};
-use crate::outcome::{Outcome, Settings, tau_s};
+use crate::noise::{Process, ProcessKind};
+use crate::outcome::{CalibrationSettings, Outcome, tau_s};
 use serde::{Serialize, Serializer};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Diagnoses every recording, sensor by sensor. Without two recordings there is nothing to compare.
-pub fn diagnose(groups: &[Group], outcomes: &[Outcome], settings: &Settings) -> Vec<Diagnosis> {
+pub fn diagnose(
+    groups: &[Group],
+    outcomes: &[Outcome],
+    settings: &CalibrationSettings,
+) -> Vec<Diagnosis> {
     Sensor::ALL
         .into_iter()
         .flat_map(|sensor| of_sensor(sensor, groups, outcomes, settings))
@@ -21,7 +27,7 @@ fn of_sensor(
     sensor: Sensor,
     groups: &[Group],
     outcomes: &[Outcome],
-    settings: &Settings,
+    settings: &CalibrationSettings,
 ) -> Vec<Diagnosis> {
     let own: Vec<&Group> = groups.iter().filter(|g| g.scope.sensor == sensor).collect();
     let mut names: Vec<&str> = Vec::new();
@@ -40,7 +46,7 @@ fn of_sensor(
     } else {
         pieces
     };
-    let [noise, outliers] = [Test::Noise, Test::Outliers]
+    let [noise, outliers] = [ComparedQuantity::Noise, ComparedQuantity::Outliers]
         .map(|test| RecordingComparison::new(&pieces, sensor, test, settings.tuning.efficiency()));
     let drift = RecordingComparison::drift(&pieces, sensor, &noise);
     let diagnosis = |(index, name): (usize, &&str)| {
@@ -151,8 +157,9 @@ impl RobustExcess {
 }
 
 /// The findings of all signals of a sensor together.
-fn common(pieces: &[AxisReplicates<'_>], settings: &Settings) -> Vec<CommonFinding> {
-    let all = (0..Test::Outliers.most_levels(pieces)).map(|level| excess(pieces, level, settings));
+fn common(pieces: &[AxisReplicates<'_>], settings: &CalibrationSettings) -> Vec<CommonFinding> {
+    let all = (0..ComparedQuantity::Outliers.most_levels(pieces))
+        .map(|level| excess(pieces, level, settings));
     let (stepped, fine): (Vec<RobustExcess>, Vec<RobustExcess>) = all.partition(|e| e.is_stepped);
     let found: Vec<RobustExcess> = fine.into_iter().filter(|e| e.alarms(e.quantizer)).collect();
     let mut findings = Vec::new();
@@ -203,7 +210,7 @@ fn finding_at(
 /// Where recordings scatter unequally (one is shorter), t exceeds its limit for 2.5 % the more rarely
 /// ([Ibragimov and Müller](crate::bibliography::IbragimovMuller10)).
 fn drifts(pieces: &[AxisReplicates<'_>], rate_hz: f64) -> Vec<CommonFinding> {
-    let is_drift = |p: &Process| p.kind() == Kind::Drift;
+    let is_drift = |p: &Process| p.kind() == ProcessKind::Drift;
     if pieces
         .iter()
         .any(|p| p.model.processes.iter().any(is_drift))
@@ -254,8 +261,12 @@ fn student(values: &[f64]) -> Option<(f64, f64, f64)> {
     Some((mean, t, 2.0 * law.sf(t.abs())))
 }
 
-fn excess(pieces: &[AxisReplicates<'_>], level: usize, settings: &Settings) -> RobustExcess {
-    let (test, tuning) = (Test::Outliers, &settings.tuning);
+fn excess(
+    pieces: &[AxisReplicates<'_>],
+    level: usize,
+    settings: &CalibrationSettings,
+) -> RobustExcess {
+    let (test, tuning) = (ComparedQuantity::Outliers, &settings.tuning);
     let (mut of_quantizer, mut of_gaussian, mut variance, mut stepped) =
         (Vec::new(), Vec::new(), 0.0, 0);
     for piece in pieces.iter().filter(|p| !p.drifts(level)) {

@@ -3,15 +3,15 @@
 use super::*;
 use crate::curve::{Estimator, Replicate};
 use crate::imu::{Axis, Channel, Sensor};
-use crate::outcome::Settings;
+use crate::outcome::CalibrationSettings;
 use crate::tests::{generator, measured, normal, plain_settings};
 use crate::{Pool, Trim, calibrate, grouped, trend};
 use rand::RngExt;
 
 mod causes;
 
-fn settings(spec: &str) -> Settings {
-    Settings {
+fn settings(spec: &str) -> CalibrationSettings {
+    CalibrationSettings {
         estimators: vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv],
         trim: Trim::Count(1),
         ..plain_settings(spec)
@@ -66,7 +66,7 @@ fn set(
 /// Recordings of three axes of an accelerometer against one another.
 fn diagnosed(
     recordings: impl Iterator<Item = [Vec<f64>; 3]>,
-    settings: &Settings,
+    settings: &CalibrationSettings,
 ) -> Vec<Diagnosis> {
     let mut replicates = Vec::new();
     for (file, signals) in recordings.enumerate() {

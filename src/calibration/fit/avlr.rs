@@ -22,7 +22,7 @@ use super::least_squares::{Fit, outside, too_few_scales};
 use super::search::Termination;
 use crate::curve::{CalibrationError, CalibrationFault};
 use crate::model::ModelSpec;
-use crate::noise::{Composite, Kind, Process};
+use crate::noise::{Composite, Process, ProcessKind};
 use crate::wavelet::Curve;
 use std::f64::consts::{LN_2, PI, SQRT_2};
 
@@ -85,7 +85,7 @@ pub(crate) fn avlr(curve: &Curve, spec: &ModelSpec) -> Result<Fit, CalibrationEr
     })
 }
 
-fn term(kind: Kind, points: &[(f64, f64)]) -> Result<Process, CalibrationError> {
+fn term(kind: ProcessKind, points: &[(f64, f64)]) -> Result<Process, CalibrationError> {
     // adev at m = 1 on the line of a slope.
     let at_one = |slope: f64| {
         let stretch = &points[stretch(points, slope)];
@@ -93,13 +93,13 @@ fn term(kind: Kind, points: &[(f64, f64)]) -> Result<Process, CalibrationError> 
         (stretch.iter().map(|(x, y)| y - slope * x).sum::<f64>() / stretch.len() as f64).exp()
     };
     let value = match kind {
-        Kind::White => at_one(-0.5).powi(2),
-        Kind::Quantization if !begins(points, -1.0) => 0.0,
-        Kind::Quantization => at_one(-1.0).powi(2) / 3.0,
-        Kind::Flicker => at_one(0.0).powi(2) / (2.0 * LN_2 / PI),
-        Kind::RandomWalk => 3.0 * at_one(0.5).powi(2),
-        Kind::Drift => SQRT_2 * at_one(1.0),
-        Kind::Ar1 | Kind::GaussMarkov | Kind::Ma1 => {
+        ProcessKind::White => at_one(-0.5).powi(2),
+        ProcessKind::Quantization if !begins(points, -1.0) => 0.0,
+        ProcessKind::Quantization => at_one(-1.0).powi(2) / 3.0,
+        ProcessKind::Flicker => at_one(0.0).powi(2) / (2.0 * LN_2 / PI),
+        ProcessKind::RandomWalk => 3.0 * at_one(0.5).powi(2),
+        ProcessKind::Drift => SQRT_2 * at_one(1.0),
+        ProcessKind::Ar1 | ProcessKind::GaussMarkov | ProcessKind::Ma1 => {
             let code = kind.code();
             let message = format!("{code} has no slope of its own in the Allan deviation");
             return Err(CalibrationError::new(CalibrationFault::NoSlope, message));
@@ -175,7 +175,7 @@ mod tests {
         let flicker = Process::flicker(4.0).unwrap();
         // The first scales lie above the line, of which nu = ln 2/π·B²; from m = 1 to 2 the slope is −0.16, too far off.
         let above = (2..=16)
-            .map(|level| (Kind::Flicker.haar_shape(0.0, level).0 * PI / LN_2).ln())
+            .map(|level| (ProcessKind::Flicker.haar_shape(0.0, level).0 * PI / LN_2).ln())
             .sum::<f64>()
             / 15.0;
         assert_relative_eq!(

@@ -1,9 +1,9 @@
 //! Least squares: theta = argmin Σ Omega_j (nu_j − nu_j(theta))².
 
-use super::search::{Component, Effort, Objective, Range, SearchResult, Termination, search};
+use super::search::{Component, Objective, Range, SearchBudget, SearchResult, Termination, search};
 use crate::curve::{CalibrationError, CalibrationFault, falling_root, implied};
 use crate::model::ModelSpec;
-use crate::noise::{Composite, Kind, ParameterError, ParameterRef, Process};
+use crate::noise::{Composite, ParameterError, ParameterRef, Process, ProcessKind};
 use crate::wavelet::Curve;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::fmt::Display;
@@ -24,7 +24,7 @@ pub fn fit(
     let observed = |curve: &Curve| {
         let nu = curve.wv.clone();
         let weights = Weights { weighting, nu };
-        fit_near(curve, spec, rate_hz, weights, Effort::WHOLE, &[])
+        fit_near(curve, spec, rate_hz, weights, SearchBudget::WHOLE, &[])
     };
     match weighting {
         Weighting::Model => {
@@ -64,7 +64,14 @@ fn with_lack_of_fit(
             weighting: Weighting::Model,
             nu: expected(&wider, &fit),
         };
-        let first = fit_near(&wider, spec, rate_hz, weights, Effort::WHOLE, &fit.minima)?;
+        let first = fit_near(
+            &wider,
+            spec,
+            rate_hz,
+            weights,
+            SearchBudget::WHOLE,
+            &fit.minima,
+        )?;
         let before = fit.lack_of_fit;
         fit = Fit {
             lack_of_fit: variance,
@@ -136,7 +143,14 @@ fn settled(
     rate_hz: f64,
     first: Fit,
 ) -> Result<Fit, CalibrationError> {
-    let (mut visited, last) = reweighted(curve, spec, rate_hz, first, MOST_ROUNDS, Effort::WHOLE)?;
+    let (mut visited, last) = reweighted(
+        curve,
+        spec,
+        rate_hz,
+        first,
+        MOST_ROUNDS,
+        SearchBudget::WHOLE,
+    )?;
     if is_settled(curve, &last) {
         return Ok(last.at_own_weights(curve));
     }
@@ -151,7 +165,7 @@ fn settled(
             rate_hz,
             fit.within_its_basin(),
             MOST_ROUNDS,
-            Effort::WHOLE.within(),
+            SearchBudget::WHOLE.within(),
         )
         .map(|(_, fit)| fit)
     });
@@ -189,7 +203,7 @@ fn reweighted(
     rate_hz: f64,
     first: Fit,
     rounds: usize,
-    effort: Effort,
+    effort: SearchBudget,
 ) -> Result<(Vec<Fit>, Fit), CalibrationError> {
     let (mut before, mut last) = (Vec::new(), first);
     while before.len() < rounds && !is_settled(curve, &last) {
@@ -250,7 +264,14 @@ pub(crate) fn refit(
 ) -> Result<Fit, CalibrationError> {
     let first = |curve: &Curve, nu: Vec<f64>| {
         let weights = Weights { weighting, nu };
-        fit_near(curve, spec, rate_hz, weights, Effort::AGAIN, &like.minima)
+        fit_near(
+            curve,
+            spec,
+            rate_hz,
+            weights,
+            SearchBudget::AGAIN,
+            &like.minima,
+        )
     };
     if weighting == Weighting::Edof {
         return first(curve, curve.wv.clone());
@@ -266,7 +287,7 @@ pub(crate) fn refit(
         rate_hz,
         first,
         FEW_ROUNDS,
-        Effort::AGAIN.within(),
+        SearchBudget::AGAIN.within(),
     )?;
     Ok(Fit {
         lack_of_fit: like.lack_of_fit,
@@ -286,7 +307,7 @@ fn fit_near(
     spec: &ModelSpec,
     rate_hz: f64,
     weights: Weights,
-    effort: Effort,
+    effort: SearchBudget,
     known: &[Vec<f64>],
 ) -> Result<Fit, CalibrationError> {
     check(curve, spec)?;
@@ -355,11 +376,11 @@ pub(crate) fn correlated(curve: &Curve) -> Range {
 }
 
 /// A process with the widest range in which a curve can say anything of its shape.
-fn component(kind: Kind, curve: &Curve) -> Component {
+fn component(kind: ProcessKind, curve: &Curve) -> Component {
     let coordinate = match kind {
         // Correlation times in logarithms: equal steps of ln κ change the curve about equally.
         kind if kind.is_correlated() => Some(correlated(curve)),
-        Kind::Ma1 => Some(Range {
+        ProcessKind::Ma1 => Some(Range {
             low: -1.0,
             high: 1.0,
         }),
@@ -445,7 +466,7 @@ fn minima(found: &SearchResult) -> Vec<Vec<f64>> {
 
 /// One process of the result.
 struct FittedTerm {
-    kind: Kind,
+    kind: ProcessKind,
     amplitude: f64,
     coordinate: f64,
     at_end: bool,
@@ -485,8 +506,8 @@ impl FittedTerm {
             _ => self.amplitude.sqrt(),
         };
         let shape = match self.kind {
-            Kind::Ar1 => (-kappa).exp(),
-            Kind::GaussMarkov => kappa * rate_hz,
+            ProcessKind::Ar1 => (-kappa).exp(),
+            ProcessKind::GaussMarkov => kappa * rate_hz,
             _ => self.coordinate,
         };
         Process::new(self.kind, shape, amplitude, rate_hz)
@@ -567,7 +588,7 @@ pub(crate) fn score(ratio: f64, edof: f64) -> f64 {
 /// A fitted model. That the iterations did not converge is reported, not an error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
-    /// The model: processes in the order of [`Kind::ALL`](crate::noise::Kind::ALL), alike ones by ascending correlation time.
+    /// The model: processes in the order of [`ProcessKind::ALL`](crate::noise::Kind::ALL), alike ones by ascending correlation time.
     pub composite: Composite,
     /// Σ Omega_j (nu_j − nu_j(theta))² at theta.
     pub objective: f64,
@@ -632,7 +653,7 @@ mod tests {
     /// The exact curve of a process of each kind gives its parameters back.
     #[test]
     fn the_curve_of_each_kind_is_fitted_by_it() {
-        for kind in Kind::ALL {
+        for kind in ProcessKind::ALL {
             let shape = match kind.shape() {
                 Some(Parameter::Beta) => 1.0,
                 Some(Parameter::Phi) => 0.99,
@@ -659,7 +680,7 @@ mod tests {
         };
         let wandering = fitted(1e-4);
         let ar1 = wandering.composite.processes[1];
-        assert_eq!(ar1.kind(), Kind::Ar1);
+        assert_eq!(ar1.kind(), ProcessKind::Ar1);
         assert_relative_eq!(-1.0 / ar1.shape().ln(), 20.0 * 4096.0, max_relative = 1e-6);
         assert_eq!((wandering.at_end, wandering.zero), (vec![1], vec![]));
         let still = fitted(0.0);
@@ -688,7 +709,7 @@ mod tests {
             let is_converged = fit.termination == Termination::Converged;
             unsettled += u32::from(!is_converged);
             assert_eq!(is_converged, is_settled(&curve, &fit), "curve {k}");
-            let phi = |p: &Process| (p.kind() == Kind::Ar1).then(|| p.shape());
+            let phi = |p: &Process| (p.kind() == ProcessKind::Ar1).then(|| p.shape());
             assert!(
                 fit.composite.processes.iter().filter_map(phi).is_sorted(),
                 "curve {k}"

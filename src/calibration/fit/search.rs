@@ -7,8 +7,8 @@
 
 use super::least_squares::Weighting;
 use crate::curve::sampling::Response;
-use crate::minimise::{Bounded, Descent, MOST, Matrix, Vector, cholesky_solve};
-use crate::noise::Kind;
+use crate::minimise::{BoundedStep, Descent, MOST, Matrix, Vector, cholesky_solve};
+use crate::noise::ProcessKind;
 use crate::wavelet::{Curve, QuantizationResponse};
 use rayon::prelude::*;
 use std::cell::RefCell;
@@ -18,7 +18,7 @@ const POINTS: usize = 160;
 
 /// Effort of a search.
 #[derive(Clone, Copy)]
-pub(crate) struct Effort {
+pub(crate) struct SearchBudget {
     /// Limit of the number of combinations of the grid, where its dimensions are alike; 0: no grid where minima are known.
     combinations: usize,
     /// Largest number of local minima of the grid from which a descent starts.
@@ -27,7 +27,7 @@ pub(crate) struct Effort {
     is_exact: bool,
 }
 
-impl Effort {
+impl SearchBudget {
     /// For a curve of which nothing is known.
     pub(crate) const WHOLE: Self = Self {
         combinations: 6000,
@@ -58,7 +58,11 @@ pub(crate) struct SearchResult {
 }
 
 /// Searches all coordinates, on a grid and from the `known` minima of a similar curve.
-pub(crate) fn search(objective: &Objective, effort: Effort, known: &[Vec<f64>]) -> SearchResult {
+pub(crate) fn search(
+    objective: &Objective,
+    effort: SearchBudget,
+    known: &[Vec<f64>],
+) -> SearchResult {
     let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
     if dimensions.is_empty() {
         let cost = objective.solve(&[], None).cost();
@@ -194,7 +198,7 @@ impl<'a> Grid<'a> {
             shapes.sort_unstable_by_key(|shape| shape.component);
             return self.objective.cost_near(&shapes);
         }
-        let mut problem = Bounded::new(n);
+        let mut problem = BoundedStep::new(n);
         for a in 0..n {
             let i = selected[a];
             for b in 0..n {
@@ -321,7 +325,7 @@ pub(crate) struct Range {
 /// for AR1 and GM, theta for MA1.
 #[derive(PartialEq)]
 pub(crate) struct Component {
-    pub(crate) kind: Kind,
+    pub(crate) kind: ProcessKind,
     pub(crate) coordinate: Option<Range>,
 }
 
@@ -329,7 +333,7 @@ impl Component {
     /// Wavelet variance per unit of amplitude and its derivative with respect to the coordinate.
     fn shape(&self, u: f64, level: u32) -> (f64, f64) {
         match self.kind {
-            Kind::Ar1 | Kind::GaussMarkov => {
+            ProcessKind::Ar1 | ProcessKind::GaussMarkov => {
                 let kappa = u.exp();
                 let (value, derivative) = self.kind.haar_shape_of_kappa(kappa, level);
                 (value, kappa * derivative)
@@ -369,14 +373,14 @@ struct LinearBest {
 
 /// Tolerance of the shares of quantization noise.
 #[derive(Clone, Copy)]
-struct Settling {
+struct FixedPointTolerance {
     /// Rounds at most; each takes off two digits or so.
     rounds: usize,
     /// Largest change of a response that is left: the cost errs by its square.
     change: f64,
 }
 
-impl Settling {
+impl FixedPointTolerance {
     /// To rounding.
     const WHOLE: Self = Self {
         rounds: 16,
@@ -458,7 +462,9 @@ impl Objective {
         // The unit of the objective depends on the weighting; at unit length every tolerance is relative.
         let length = dot(&target, &target).sqrt();
         let target = target.iter().map(|b| b / length).collect();
-        let has_quantization = components.iter().any(|c| c.kind == Kind::Quantization);
+        let has_quantization = components
+            .iter()
+            .any(|c| c.kind == ProcessKind::Quantization);
         let responses = || {
             curve
                 .levels
@@ -519,7 +525,7 @@ impl Objective {
     fn read(&self, component: usize, levels: &[f64], responses: &[Response]) -> Vec<f64> {
         let pairs = levels.iter().zip(responses);
         match self.components[component].kind {
-            Kind::Quantization => pairs.map(|(x, r)| x * r.quantization).collect(),
+            ProcessKind::Quantization => pairs.map(|(x, r)| x * r.quantization).collect(),
             _ => pairs.map(|(x, r)| x * r.others).collect(),
         }
     }
@@ -540,7 +546,7 @@ impl Objective {
             for (shape, amplitude) in shapes.iter().zip(amplitudes) {
                 let nu = amplitude * shape.values[level];
                 all += nu;
-                if self.components[shape.component].kind == Kind::Quantization {
+                if self.components[shape.component].kind == ProcessKind::Quantization {
                     own += nu;
                 }
             }
@@ -559,13 +565,13 @@ impl Objective {
         coordinates: &[f64],
         near: Option<&LinearSolution>,
     ) -> LinearSolution {
-        self.solve_to(Settling::WHOLE, coordinates, near)
+        self.solve_to(FixedPointTolerance::WHOLE, coordinates, near)
     }
 
     /// `near`: a solution nearby, from which the shares of quantization noise settle sooner.
     fn solve_to(
         &self,
-        settling: Settling,
+        settling: FixedPointTolerance,
         coordinates: &[f64],
         near: Option<&LinearSolution>,
     ) -> LinearSolution {
@@ -601,7 +607,7 @@ impl Objective {
     /// Σ residual² for shapes of all components, in their order; the shares of quantization noise are nearly settled.
     fn cost_near(&self, shapes: &[&UnitVariance]) -> f64 {
         let residuals = self
-            .best_amplitudes(shapes, Settling::NEARLY, None)
+            .best_amplitudes(shapes, FixedPointTolerance::NEARLY, None)
             .residuals;
         dot(&residuals, &residuals)
     }
@@ -610,7 +616,7 @@ impl Objective {
     fn best_amplitudes(
         &self,
         shapes: &[&UnitVariance],
-        settling: Settling,
+        settling: FixedPointTolerance,
         near: Option<&LinearSolution>,
     ) -> LinearBest {
         let (responses, is_free) = match near {
@@ -703,8 +709,8 @@ impl Objective {
             .collect()
     }
 
-    fn linear_problem(&self, columns: &[DesignColumn]) -> Bounded {
-        let mut problem = Bounded::new(columns.len());
+    fn linear_problem(&self, columns: &[DesignColumn]) -> BoundedStep {
+        let mut problem = BoundedStep::new(columns.len());
         for (i, a) in columns.iter().enumerate() {
             for (j, b) in columns.iter().enumerate().take(i + 1) {
                 problem.gram[i][j] = dot(&a.values, &b.values);
@@ -795,7 +801,7 @@ pub(crate) struct LocalMinimum {
 struct Precision {
     /// Gain of the last step, in parts of the cost.
     enough: fn(f64) -> f64,
-    settling: Settling,
+    settling: FixedPointTolerance,
     /// True if the curvature is the difference of gradients.
     is_newton: bool,
 }
@@ -804,7 +810,7 @@ impl Precision {
     /// Within a tenth of a standard deviation of most curves.
     const ROUGH: Self = Self {
         enough: |cost| 1e-3 * cost,
-        settling: Settling::OF_COST,
+        settling: FixedPointTolerance::OF_COST,
         is_newton: false,
     };
     /// Within 1e-4 of a standard deviation.
@@ -815,7 +821,7 @@ impl Precision {
     /// To rounding.
     const EXACT: Self = Self {
         enough: |cost| 1e-15 * cost,
-        settling: Settling::WHOLE,
+        settling: FixedPointTolerance::WHOLE,
         is_newton: true,
     };
 }
@@ -887,7 +893,7 @@ mod tests {
     use super::*;
     use crate::Weighting;
     use crate::curve::implied;
-    use crate::noise::{Composite, Kind, Process};
+    use crate::noise::{Composite, Process, ProcessKind};
     use crate::tests::exact;
     use crate::wavelet::{Curve, Tuning};
 
@@ -905,7 +911,7 @@ mod tests {
         }
         let component = |process: &Process| Component {
             kind: process.kind(),
-            coordinate: (process.kind() == Kind::Ar1).then_some(Range {
+            coordinate: (process.kind() == ProcessKind::Ar1).then_some(Range {
                 low: -10.0,
                 high: 1.0,
             }),

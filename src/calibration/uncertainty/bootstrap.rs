@@ -13,22 +13,22 @@
 use super::intervals::{intervals, practical_intervals};
 use super::spread::{LEVEL as ALIKE_LEVEL, ReplicateSpread, alike_p_value};
 use super::varying::{parameter_spreads, simpler};
-use crate::curve::sampling::{SamplingLaw, implied};
+use crate::curve::sampling::{SamplingDistribution, implied};
 use crate::curve::{Estimator, Group, LARGEST_BIAS, Replicate, average, median, p_value};
 use crate::fit::Fit;
 use crate::outcome::{
-    Advance, Bootstrap, Goodness, IndistinctProcesses, Inference, LevelSpread, Outcome, Settings,
-    tau_s,
+    Advance, Bootstrap, CalibrationSettings, Goodness, IndistinctProcesses, Inference, LevelSpread,
+    Outcome, tau_s,
 };
 use crate::rng::{Generator, StreamKey};
-use crate::wavelet::{Curve, RobustVariance, Status};
+use crate::wavelet::{Curve, RobustVariance, RootStatus};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 use rayon::prelude::*;
 
 /// Sources of scatter in the draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scattering {
+pub enum ScatterSource {
     /// Recordings differ, and each scatters for its length.
     All,
     /// Recordings differ, each of them endless.
@@ -43,8 +43,8 @@ pub(crate) struct CurveSampler<'a> {
     estimator: Estimator,
     /// The curve that was fitted.
     curve: &'a Curve,
-    settings: &'a Settings,
-    pub(crate) law: SamplingLaw,
+    settings: &'a CalibrationSettings,
+    pub(crate) law: SamplingDistribution,
     /// Spread of the replicates; none for a curve from elsewhere.
     pub(crate) spread: Option<ReplicateSpread>,
     /// The curve that the model implies.
@@ -57,7 +57,7 @@ impl<'a> CurveSampler<'a> {
         group: &'a str,
         replicates: &'a [Replicate],
         outcome: &'a Outcome,
-        settings: &'a Settings,
+        settings: &'a CalibrationSettings,
     ) -> Self {
         let (estimator, curve) = (outcome.estimator, &outcome.curve);
         Self::of_fit(group, replicates, estimator, curve, &outcome.fit, settings)
@@ -69,10 +69,10 @@ impl<'a> CurveSampler<'a> {
         estimator: Estimator,
         curve: &'a Curve,
         fit: &Fit,
-        settings: &'a Settings,
+        settings: &'a CalibrationSettings,
     ) -> Self {
         let levels = curve.levels.iter().copied().max().unwrap_or(1) as usize;
-        let law = SamplingLaw::new(&fit.composite, levels);
+        let law = SamplingDistribution::new(&fit.composite, levels);
         let spread = (!replicates.is_empty())
             .then(|| ReplicateSpread::new(replicates, estimator, &law, &settings.tuning));
         Self {
@@ -114,7 +114,7 @@ impl<'a> CurveSampler<'a> {
         };
         let mut between = spread.draw_between(&mut generator);
         between.iter_mut().flatten().for_each(|b| *b = b.exp());
-        self.draw_with(generator, &between, Scattering::All)
+        self.draw_with(generator, &between, ScatterSource::All)
     }
 
     /// A new curve of the same estimator, of replicates that differ by `between` (`[replicate][level]`, over the model)
@@ -123,9 +123,9 @@ impl<'a> CurveSampler<'a> {
         &self,
         mut generator: Generator,
         between: &[Vec<f64>],
-        scattering: Scattering,
+        scattering: ScatterSource,
     ) -> Option<Curve> {
-        if scattering == Scattering::BetweenRecordings {
+        if scattering == ScatterSource::BetweenRecordings {
             let log_bias = Vec::new();
             let curve = self.curve(between.to_vec());
             return curve.map(|curve| Curve { log_bias, ..curve });
@@ -196,8 +196,8 @@ impl<'a> CurveSampler<'a> {
 /// A replicate of the same length with other variances, classical where that replicate's are.
 pub(crate) fn with_variances(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
     let status = |j: usize| match replicate.robust.get(j).map(|robust| robust.status) {
-        Some(Status::Coarse) => Status::Coarse,
-        _ => Status::Ok,
+        Some(RootStatus::Coarse) => RootStatus::Coarse,
+        _ => RootStatus::Ok,
     };
     let robust = nu
         .iter()
@@ -246,7 +246,7 @@ fn goodness(outcome: &Outcome, draws: &[Fit]) -> Goodness {
 pub(crate) fn inference(
     group: &Group,
     outcome: &Outcome,
-    settings: &Settings,
+    settings: &CalibrationSettings,
     bootstrap: Bootstrap,
     advance: Advance<'_>,
 ) -> Inference {
@@ -271,7 +271,7 @@ pub(crate) fn inference(
 pub(crate) fn by_bootstrap(
     group: &Group,
     outcome: &Outcome,
-    settings: &Settings,
+    settings: &CalibrationSettings,
     bootstrap: Bootstrap,
     advance: Advance<'_>,
 ) -> Inference {
@@ -349,7 +349,7 @@ mod goodness_tests;
 mod inference_tests {
     use super::*;
     use crate::imu::{Axis, Channel, Sensor};
-    use crate::noise::{Composite, Kind, Model, Process};
+    use crate::noise::{Composite, Model, Process, ProcessKind};
     use crate::tests::{generator, imu, inferred, measured, normal, plain_settings, recorded};
     use crate::{ParameterInterval, Pool, grouped};
     use approx::assert_abs_diff_eq;
@@ -441,8 +441,9 @@ mod inference_tests {
     #[test]
     fn flicker_noise_is_fitted_and_covered() {
         const SETS: u64 = 100;
-        let process =
-            |code, value| Process::of_values(Kind::named(code).unwrap(), &[value], 1.0).unwrap();
+        let process = |code, value| {
+            Process::of_values(ProcessKind::named(code).unwrap(), &[value], 1.0).unwrap()
+        };
         let axis = Composite::new(vec![
             process("WN", 1.0),
             process("FN", 0.05),

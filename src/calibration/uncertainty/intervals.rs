@@ -1,8 +1,8 @@
 //! Intervals of parameters from draws around their estimates.
 
 use crate::fit::{Fit, Range, correlated};
-use crate::noise::practical::{AllanCurve, AllanMinimum, Bias, Horizon, Policy};
-use crate::noise::{Composite, Kind, Parameter, ParameterRef, Process};
+use crate::noise::practical::{AllanCurve, AllanMinimum, BiasModel, Horizon, Policy};
+use crate::noise::{Composite, Parameter, ParameterRef, Process, ProcessKind};
 use crate::outcome::{Outcome, ParameterInterval, Practical, PracticalIntervals, Undetermined};
 
 impl ParameterInterval {
@@ -14,7 +14,7 @@ impl ParameterInterval {
 
     /// Puts the interval of another fit, of the same parameter, in place of this one, if it holds the estimate.
     pub(crate) fn replace(&mut self, other: &Self, value: f64) {
-        [self.low, self.high] = holding(value, [other.low, other.high]);
+        [self.low, self.high] = unless_one_sided(value, [other.low, other.high]);
         self.lost = other.lost;
         let one_sided = self.low.is_nan().then_some(Undetermined::OneSided);
         self.absent = other.absent.clone().or(one_sided);
@@ -54,7 +54,7 @@ pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<Pa
             let [low, high] = match vanished {
                 // The quantile is that of what has vanished.
                 Some(_) => [f64::NAN; 2],
-                None => holding(value, draws.around(value)).map(at_least),
+                None => unless_one_sided(value, draws.around(value)).map(at_least),
             };
             let one_sided = low.is_nan().then_some(Undetermined::OneSided);
             let interval = ParameterInterval {
@@ -80,7 +80,7 @@ pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<Pa
         let open = |i: &ParameterInterval| {
             !i.of.parameter.is_shape()
                 && i.absent.is_none()
-                && i.high > i.low * WIDEST.powf(stretch.min(2.0))
+                && i.high > i.low * UNDETERMINED_RATIO.powf(stretch.min(2.0))
         };
         if own.iter().any(open) {
             own.iter_mut().for_each(|i| i.refuse(Undetermined::Open));
@@ -99,7 +99,7 @@ pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<Pa
 
 /// Ratio of the 95 % quantiles of an amplitude above which it counts as undetermined (squared for its interval, which
 /// few recordings widen).
-pub const WIDEST: f64 = 100.0;
+pub const UNDETERMINED_RATIO: f64 = 100.0;
 
 /// Returns true if the interval of a correlation time reaches the end of the searched range: the
 /// time is then unbounded on that side.
@@ -118,7 +118,7 @@ fn leaves_search(searched: Range, process: &Process, interval: &ParameterInterva
 }
 
 /// The interval, or NaN if it excludes its own estimate (all but 2.5 % of the draws on one side: a biased estimator).
-fn holding(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
+fn unless_one_sided(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
     let rounding = 1e-9 * value.abs();
     if low <= value + rounding && value - rounding <= high {
         [low, high]
@@ -132,7 +132,7 @@ fn holding(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
 /// them are paired as can be, the nearest.
 pub(super) fn matched<'a>(estimate: &Fit, fit: &'a Fit) -> Vec<Option<&'a Process>> {
     let (drawn, model) = (&fit.composite.processes, &estimate.composite.processes);
-    let kinds: Vec<Kind> = model.iter().map(Process::kind).collect();
+    let kinds: Vec<ProcessKind> = model.iter().map(Process::kind).collect();
     let cost = |i: usize, d: usize| (log_time(&model[i]) - log_time(&drawn[d])).powi(2);
     let mut matched = vec![None; drawn.len()];
     for (first, kind) in kinds
@@ -275,7 +275,7 @@ fn scale_interval(estimate: f64, drawn: Vec<f64>, draws: usize, stretch: f64) ->
         return None;
     }
     let draws = ParameterDraws::new(Parameter::Sigma2, drawn, stretch);
-    let ends = holding(estimate, draws.around(estimate));
+    let ends = unless_one_sided(estimate, draws.around(estimate));
     ends.iter()
         .all(|end| end.is_finite())
         .then(|| hull(ends, draws.stretched()))
@@ -322,7 +322,7 @@ impl Practical {
     /// The parameters of a model, without intervals.
     fn of(model: &Composite, rate_hz: f64, range_s: f64) -> Option<Self> {
         let curve = AllanCurve::largest(&[model], rate_hz, Horizon::default()).ok()?;
-        let walk = curve.pair(Policy::Matched, Bias::Walk);
+        let walk = curve.pair(Policy::Matched, BiasModel::Walk);
         Some(Self {
             walk,
             minimum: AllanMinimum::of(&[model], rate_hz, range_s),
@@ -365,7 +365,7 @@ pub fn figures_with_intervals(
 ) -> [(Option<f64>, Option<[f64; 2]>); 3] {
     let read = |model: &Composite| -> Option<[Option<f64>; 3]> {
         let curve = AllanCurve::largest(&[model], rate_hz, Horizon::default()).ok()?;
-        let pair = curve.pair(Policy::Matched, Bias::Walk);
+        let pair = curve.pair(Policy::Matched, BiasModel::Walk);
         let minimum = AllanMinimum::of(&[model], rate_hz, range_s);
         let instability = minimum.map(|m| m.deviation);
         Some([Some(pair.density), Some(pair.walk), instability])
@@ -447,8 +447,12 @@ mod tests {
 
     #[test]
     fn an_interval_holds_its_estimate_or_is_none() {
-        assert_eq!(holding(1.0, [0.5, 2.0]), [0.5, 2.0]);
-        assert!(holding(3.0, [0.5, 2.0]).iter().all(|end| end.is_nan()));
+        assert_eq!(unless_one_sided(1.0, [0.5, 2.0]), [0.5, 2.0]);
+        assert!(
+            unless_one_sided(3.0, [0.5, 2.0])
+                .iter()
+                .all(|end| end.is_nan())
+        );
     }
 
     /// A variance known to be a chi-square of ν = 8 degrees of freedom over ν: 4000 draws around an estimate of 3 give the

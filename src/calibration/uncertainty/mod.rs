@@ -5,6 +5,6 @@ pub(crate) mod intervals;
 pub(crate) mod spread;
 mod varying;
 
-pub use bootstrap::Scattering;
-pub use intervals::{WIDEST, derived_interval, figures_with_intervals};
+pub use bootstrap::ScatterSource;
+pub use intervals::{UNDETERMINED_RATIO, derived_interval, figures_with_intervals};
 pub use spread::LEVEL as ALIKE_LEVEL;

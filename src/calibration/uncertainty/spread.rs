@@ -1,7 +1,7 @@
 //! Spread of replicates: their own scatter, and their differences beyond it.
 //!
 //! Their ln nu scatter as their variance from replicate to replicate shows. Of that the part `within` follows from the
-//! model and the length ([`SamplingLaw`]); `between` is what is there in excess, if anything (moments of a
+//! model and the length ([`SamplingDistribution`]); `between` is what is there in excess, if anything (moments of a
 //! random-effects model, level by level: ln nu_ij = centre_j + between_ij + within_ij).
 //!
 //! The axes of a recording may share what recordings differ by (temperature, a mounting), and their own noise never: so
@@ -9,7 +9,7 @@
 //! one and the same other. That is right whatever they share, from nothing to all, and says what it knows: as many degrees of
 //! freedom as there are recordings, less one, where `between` rules, and as there are signals, less one, where it does not.
 
-use crate::curve::sampling::{SamplingLaw, VarianceLaw, variance_of_log};
+use crate::curve::sampling::{SamplingDistribution, VarianceDistribution, variance_of_log};
 use crate::curve::{Estimator, MAD_TO_DEVIATION, Replicate, falling_root, median, p_value};
 use crate::imu::Axis;
 use crate::outcome::{AxesDiffer, LevelSpread, Outcome};
@@ -37,7 +37,7 @@ pub(crate) struct ReplicateSpread {
     /// more for the shorter and less for the longer of them.
     total: Vec<Vec<f64>>,
     /// Shape of the law at each level.
-    shapes: Vec<VarianceLaw>,
+    shapes: Vec<VarianceDistribution>,
     /// Residuals of each replicate over their standard deviation, 0 where it has none, so that Σ over replicates of their
     /// squares is K − 1: their combinations with normal weights over √(K − 1) have unit variance and the replicates'
     /// correlations between levels.
@@ -84,7 +84,7 @@ impl ReplicateSpread {
     pub(crate) fn new(
         replicates: &[Replicate],
         estimator: Estimator,
-        law: &SamplingLaw,
+        law: &SamplingDistribution,
         tuning: &Tuning,
     ) -> Self {
         let levels = law.correlation.nrows();
@@ -141,8 +141,9 @@ impl ReplicateSpread {
     pub(crate) fn draw(&self, generator: &mut Generator) -> Vec<Vec<f64>> {
         let of_replicate = |(scores, total): (Vec<f64>, &Vec<f64>)| {
             // The law whose logarithm has the observed variance: the skew of few degrees of freedom comes with it.
-            let ratio =
-                |((score, total), shape): ((f64, &f64), &VarianceLaw)| shape.ratio(score, *total);
+            let ratio = |((score, total), shape): ((f64, &f64), &VarianceDistribution)| {
+                shape.ratio(score, *total)
+            };
             scores
                 .into_iter()
                 .zip(total)
@@ -302,7 +303,7 @@ impl ReplicateSpread {
 fn edof(
     replicate: &Replicate,
     estimator: Estimator,
-    law: &SamplingLaw,
+    law: &SamplingDistribution,
     tuning: &Tuning,
 ) -> Vec<f64> {
     let (robust, classical) = (
@@ -472,7 +473,7 @@ fn weighted_median(values: &[f64], weights: &[f64]) -> f64 {
 //
 // At each scale the mean square of the residuals of ln nu, each over the deviation that noise alone gives it; of all
 // scales together the largest. What that is for replicates of one noise is drawn from the large-sample law of the fitted
-// model ([`SamplingLaw`]), the correlations between scales included, so that looking at many scales costs nothing.
+// model ([`SamplingDistribution`]), the correlations between scales included, so that looking at many scales costs nothing.
 // Axes that are pooled may differ from one another in every recording alike: recordings are compared axis by axis.
 
 /// Probability with which replicates of one noise are said to differ.
@@ -490,7 +491,7 @@ pub(crate) fn alike_p_value(
     replicates: &[Replicate],
     estimator: Estimator,
     spread: &ReplicateSpread,
-    law: &SamplingLaw,
+    law: &SamplingDistribution,
     group: &str,
 ) -> Option<f64> {
     let scales: Vec<Scale> = law
@@ -563,7 +564,7 @@ impl Scale {
         j: usize,
         replicates: &[Replicate],
         spread: &ReplicateSpread,
-        shape: &VarianceLaw,
+        shape: &VarianceDistribution,
     ) -> Option<Self> {
         let is_long_enough = |i: &usize| replicates[*i].levels() > j && spread.edof[*i][j] >= LEAST;
         let members: Vec<(usize, Option<Axis>)> = (0..replicates.len())
@@ -772,7 +773,7 @@ mod alike_tests {
         estimator: Estimator,
         replicates: impl Fn(u64) -> Vec<Replicate> + Sync,
     ) -> u32 {
-        let law = SamplingLaw::new(&white_and_walk(1.0, GAMMA2), 10);
+        let law = SamplingDistribution::new(&white_and_walk(1.0, GAMMA2), 10);
         let differs = |seed: u64| {
             let replicates = replicates(seed);
             let own =
@@ -826,7 +827,8 @@ mod alike_tests {
 
     #[test]
     fn one_signal_cannot_differ() {
-        let law = SamplingLaw::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 10);
+        let law =
+            SamplingDistribution::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 10);
         let one = set(1, 1, 0.0);
         let own = ReplicateSpread::new(&one, Estimator::Awv, &law, &Tuning::new(0.6).unwrap());
         assert_eq!(
@@ -839,7 +841,7 @@ mod alike_tests {
 #[cfg(test)]
 mod axes_tests {
     use super::*;
-    use crate::wavelet::both;
+    use crate::wavelet::classical_and_robust;
     use rand::RngExt;
     use rand_distr::StandardNormal;
 
@@ -851,7 +853,7 @@ mod axes_tests {
             let sigma = if axis == Axis::Y { factor.sqrt() } else { 1.0 };
             let mut normal = || sigma * generator.sample::<f64, _>(StandardNormal);
             let signal: Vec<f64> = (0..2048).map(|_| normal()).collect();
-            let (classical, robust) = both(&signal, 8, &Tuning::default()).unwrap();
+            let (classical, robust) = classical_and_robust(&signal, 8, &Tuning::default()).unwrap();
             let (name, trend) = (format!("run{}", k / 3), f64::NAN);
             Replicate {
                 name,

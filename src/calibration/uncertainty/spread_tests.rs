@@ -73,7 +73,7 @@ fn coverage(between: f64, is_shared: bool) -> f64 {
     const SETS: u32 = 1000;
     const SAMPLES: usize = 1 << 14;
     let tuning = Tuning::default();
-    let law = SamplingLaw::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 1);
+    let law = SamplingDistribution::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 1);
     let mut generator = Generator::seed_from_u64(7);
     let mut held = 0;
     for _ in 0..SETS {
@@ -125,7 +125,7 @@ fn intervals_hold_the_truth_whatever_axes_share() {
 fn a_level_that_a_short_recording_lacks_scatters_as_the_others_show() {
     use crate::noise::{Composite, Process};
     use rand::SeedableRng;
-    let law = SamplingLaw::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 2);
+    let law = SamplingDistribution::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 2);
     let replicate = |(name, logs): (usize, &[f64])| Replicate {
         name: name.to_string(),
         samples: 1 << 40,

@@ -19,10 +19,10 @@ use super::spread::{kept, origins, residuals, share_of_freedom, small_sample, we
 use crate::curve::{Estimator, Group, Replicate, average, falling_root, p_value};
 use crate::fit::{Fit, refit};
 use crate::model::ModelSpec;
-use crate::noise::{Kind, Parameter, ParameterRef, Process};
+use crate::noise::{Parameter, ParameterRef, Process, ProcessKind};
 use crate::outcome::{
-    Bootstrap, IndistinctProcesses, Outcome, ParameterInterval, ParameterSpread, Settings,
-    Undetermined,
+    Bootstrap, CalibrationSettings, IndistinctProcesses, Outcome, ParameterInterval,
+    ParameterSpread, Undetermined,
 };
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
@@ -36,7 +36,7 @@ pub(crate) fn parameter_spreads(
     group: &Group,
     outcome: &Outcome,
     intervals: &[ParameterInterval],
-    settings: &Settings,
+    settings: &CalibrationSettings,
     bootstrap: Bootstrap,
 ) -> Vec<ParameterSpread> {
     if group.recordings() < LEAST {
@@ -82,7 +82,7 @@ pub(crate) fn parameter_spreads(
 /// Fits to one replicate at a time.
 struct SingleFits<'a> {
     outcome: &'a Outcome,
-    settings: &'a Settings,
+    settings: &'a CalibrationSettings,
     bootstrap: Bootstrap,
     group: &'a str,
 }
@@ -319,19 +319,19 @@ const SEED: u64 = 1;
 pub(crate) fn simpler(
     group: &Group,
     outcome: &Outcome,
-    settings: &Settings,
+    settings: &CalibrationSettings,
 ) -> Option<(Outcome, Vec<usize>, f64)> {
     if outcome.estimator == Estimator::Avlr {
         return None;
     }
     let spec = &outcome.spec;
-    let of_kind = |kind: Kind| {
+    let of_kind = |kind: ProcessKind| {
         let own: Vec<usize> = (0..spec.kinds().len())
             .filter(|i| spec.kinds()[*i] == kind)
             .collect();
         (own.len() > 1).then_some(own)
     };
-    [Kind::Ar1, Kind::GaussMarkov]
+    [ProcessKind::Ar1, ProcessKind::GaussMarkov]
         .into_iter()
         .filter_map(of_kind)
         .find_map(|own| {
@@ -352,7 +352,7 @@ fn again(
     outcome: &Outcome,
     spec: &ModelSpec,
     curve: &crate::wavelet::Curve,
-    settings: &Settings,
+    settings: &CalibrationSettings,
     like: Option<&Fit>,
 ) -> Option<Fit> {
     let minima = like.map_or(Vec::new(), |fit| fit.minima.clone());
@@ -364,7 +364,12 @@ fn again(
 }
 
 /// Probability of so large a gain in the objective if the simpler model is true, from as many draws as make that clear.
-fn probability(group: &Group, outcome: &Outcome, simple: &Outcome, settings: &Settings) -> f64 {
+fn probability(
+    group: &Group,
+    outcome: &Outcome,
+    simple: &Outcome,
+    settings: &CalibrationSettings,
+) -> f64 {
     let observed = simple.fit.objective - outcome.fit.objective;
     let name = group.scope.name();
     let sampler = CurveSampler::new(&name, &group.replicates, simple, settings);

@@ -3,7 +3,7 @@
 use super::*;
 use crate::Estimator;
 use crate::imu::Channel;
-use crate::noise::{Law, Model, Spread, Variation};
+use crate::noise::{Model, ParameterDistribution, Spread, Variation};
 use crate::tests::{imu, inferred, recorded, settings, white_and_walk};
 
 const SAMPLES: usize = 4096;
@@ -18,7 +18,7 @@ fn laboratory(
     estimator: Estimator,
 ) -> Outcome {
     let noise = white_and_walk(1.0, 1e-3);
-    let law = Law::Lognormal {
+    let law = ParameterDistribution::Lognormal {
         median: 1.0,
         sd,
         median_ci95: None,
@@ -30,7 +30,7 @@ fn laboratory(
     };
     let model = Model::pooled(1.0, &noise, &noise);
     let imu = imu(&model, Some(&spread), seed);
-    let settings = Settings {
+    let settings = CalibrationSettings {
         estimators: vec![estimator],
         ..settings("WN+RW")
     };

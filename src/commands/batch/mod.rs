@@ -9,10 +9,10 @@ pub use results::StudyAnswer;
 
 use crate::app::inputs::merge;
 use crate::app::{
-    Answer, Command, Context, Failure, Input, Invocation, Manifest, Refuse, Reporter, Result,
+    Answer, Command, Context, Failure, Input, IntoFailure, Invocation, Manifest, Reporter, Result,
     argument, is_path, is_repeated, refused,
 };
-use crate::commands::run::{PreparedRun, Run, Shared, block_of, columns};
+use crate::commands::run::{PreparedRun, Run, TrackCache, block_of, columns};
 use crate::io::file_kind::{self, FileKind};
 use crate::io::toml_file::TomlSource;
 use crate::io::{atomic, input, source};
@@ -176,7 +176,7 @@ impl BatchRequest {
                 0 => String::new(),
                 n => format!(" (and {} more)", counted(n, "cell")),
             };
-            return Err(Failure::could_not(format!("cell {name}: {failure}{more}"))
+            return Err(Failure::failed(format!("cell {name}: {failure}{more}"))
                 .or_hint_if(failure.advice()));
         }
         let left = left();
@@ -302,7 +302,7 @@ fn estimate(
     if let Some(unit) = left.first() {
         let cell = unit.cells[0];
         let quiet = Context::new(&(), Some(cell.seed));
-        let prepared = cell.asked.request.prepare(&Shared::default(), &quiet)?;
+        let prepared = cell.asked.request.prepare(&TrackCache::default(), &quiet)?;
         let runs = unit.runs.min(8);
         quiet.begin("runs", runs);
         columns(&[&prepared], 0, runs, &quiet)?;
@@ -333,7 +333,7 @@ impl BatchOutcome {
             ),
             // the same command would end the same way: no code for "to be resumed"
             Self::Stopped { left, .. } => Some(
-                Failure::could_not(format!("stopped; {} left", counted(*left, "unit")))
+                Failure::failed(format!("stopped; {} left", counted(*left, "unit")))
                     .hint("a longer --time-limit"),
             ),
         }
@@ -467,7 +467,7 @@ impl Study {
                     ["out", "plot"].contains(&path.as_str())
                         || value.is_table()
                         || !is_finite(value)
-                        || !door.takes(path, value)
+                        || !door.accepts(path, value)
                 };
                 let refused = leaves.into_iter().find(is_refused);
                 let e = e.within(&format!("cell {name}"));
@@ -559,8 +559,8 @@ impl RunValidator {
         let Some((path, list)) = leaves.find_map(|(path, value)| {
             let list = value.as_array()?;
             let is_axis = is_new(&path)
-                && !self.takes(&path, value)
-                && list.iter().any(|one| self.takes(&path, one));
+                && !self.accepts(&path, value)
+                && list.iter().any(|one| self.accepts(&path, one));
             is_axis.then(|| (path, list.clone()))
         }) else {
             all.push((labels, run));
@@ -576,7 +576,7 @@ impl RunValidator {
     }
 
     /// Returns true if a single run accepts this value of a key: then a list is one value, not an axis of the grid.
-    fn takes(&mut self, path: &str, value: &Value) -> bool {
+    fn accepts(&mut self, path: &str, value: &Value) -> bool {
         let memory = format!("{path}={value}");
         if let Some(known) = self.taken.get(&memory) {
             return *known;
@@ -967,7 +967,7 @@ fn work(
     context: &Context<'_>,
 ) -> Result<Failures> {
     let (mut failures, front) = (Failures::new(), CellReporter(context, Mutex::default()));
-    let shared = Shared::default();
+    let shared = TrackCache::default();
     let todo: Vec<&&RunBlock<'_>> = own.iter().filter(|unit| !place.has_unit(unit)).collect();
     context.begin("runs", todo.iter().map(|unit| unit.cost()).sum());
     let at_once = |unit: &RunBlock<'_>| (128 * context.threads() as u64 / unit.runs.max(8)).max(1);
@@ -989,7 +989,7 @@ fn work(
 fn compute(
     place: &StudyDirectory<'_>,
     unit: &RunBlock<'_>,
-    shared: &Shared,
+    shared: &TrackCache,
     context: &Context<'_>,
     front: &CellReporter<'_>,
 ) -> Result<Failures> {
@@ -1105,7 +1105,10 @@ fn assemble(
     }
     let front = CellReporter(context, Mutex::default());
     let context = context_of(cell, &front);
-    let run = cell.asked.request.prepare(&Shared::default(), &context)?;
+    let run = cell
+        .asked
+        .request
+        .prepare(&TrackCache::default(), &context)?;
     write_cell(place, cell, run, whole, &context)?;
     if let Some(parts) = place.part(cell, 0).parent() {
         drop(fs::remove_dir_all(parts));
@@ -1117,7 +1120,7 @@ fn assemble(
 
 /// The runs of a part: postcard of the result, BLAKE3 of that.
 fn write_part(path: &Path, result: &RunResult) -> Result<()> {
-    let mut bytes = postcard::to_allocvec(result).map_err(Failure::could_not)?;
+    let mut bytes = postcard::to_allocvec(result).map_err(Failure::failed)?;
     bytes.extend(blake3::hash(&bytes).as_bytes());
     match atomic::write(path, bytes) {
         Err(_) if read_part(path).is_some() => Ok(()),

@@ -8,9 +8,10 @@ use crate::report::csv::merged;
 use crate::report::curves::{FittedCurve, band, curve, recording_names, sensor_name};
 use crate::report::{first_names, in_order};
 use nav_sim_calibration::{
-    CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, ModelCandidate, ModelRanking, Outcome,
-    ParameterInterval, ParameterSpread, RecordingVerdict, RecordingWarmUp, ScaleMisfit, Settings,
-    TurnOnFinding, TurnOnSpread, Undetermined, WIDEST, duration, percent, tau_s,
+    CalibrationSettings, CommonCause, Diagnosis, Estimator, FEWEST_TO_COMPARE, ModelCandidate,
+    ModelRanking, Outcome, ParameterInterval, ParameterSpread, RecordingVerdict, RecordingWarmUp,
+    ScaleMisfit, TurnOnFinding, TurnOnSpread, UNDETERMINED_RATIO, Undetermined, duration, percent,
+    tau_s,
 };
 use nav_sim_document::{
     Cell, Chart, ChartAxis, Colour, Document, Importance, Mark, Panel, Series, Stroke, Table, Tone,
@@ -18,7 +19,9 @@ use nav_sim_document::{
 };
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::practical::Horizon;
-use nav_sim_signal::noise::{Kind, Law, Parameter, ParameterRef, Process, Spread, Variation};
+use nav_sim_signal::noise::{
+    Parameter, ParameterDistribution, ParameterRef, Process, ProcessKind, Spread, Variation,
+};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -435,7 +438,7 @@ const FACTOR: f64 = 3.0;
 const PEAK: f64 = 3.78;
 
 /// Remarks on a fit, the most important first.
-fn fit_notes(outcome: &Outcome, settings: &Settings) -> Vec<String> {
+fn fit_notes(outcome: &Outcome, settings: &CalibrationSettings) -> Vec<String> {
     let (fit, curve, rate_hz) = (&outcome.fit, &outcome.curve, settings.rate_hz);
     let (model, labels) = (&fit.composite, fit.composite.labels());
     let seconds = |level: &u32| tau_s(*level, rate_hz);
@@ -544,7 +547,7 @@ fn undetermined(interval: &ParameterInterval, why: &Undetermined, labels: &[Stri
         ),
         Undetermined::OneSided => "the draws lie on one side of the estimate".to_owned(),
         Undetermined::BeyondSearch => "any longer correlation time fits".to_owned(),
-        Undetermined::Open => format!("the draws differ by over a factor of {WIDEST}"),
+        Undetermined::Open => format!("the draws differ by over a factor of {UNDETERMINED_RATIO}"),
         Undetermined::Indistinct(alike) => {
             let alike: Vec<&str> = alike.iter().map(|i| labels[*i].as_str()).collect();
             format!("the data do not need both {}", alike.join(" and "))
@@ -559,7 +562,7 @@ fn recording_notes(
     sensor: Sensor,
     outcomes: &[Outcome],
     diagnoses: &[Diagnosis],
-    settings: &Settings,
+    settings: &CalibrationSettings,
 ) -> Vec<String> {
     let own: Vec<&Diagnosis> = diagnoses.iter().filter(|d| d.sensor == sensor).collect();
     let abnormal = own
@@ -603,7 +606,7 @@ fn trim_note(
     sensor: Sensor,
     abnormal: usize,
     outcomes: &[Outcome],
-    settings: &Settings,
+    settings: &CalibrationSettings,
 ) -> Option<String> {
     if !settings.estimators.contains(&Estimator::DrAwv) {
         return Some(
@@ -669,7 +672,7 @@ fn reasons(ranking: &ModelRanking) -> Vec<String> {
 // A calibration as JSON: fits with their figures, recordings, turn-on biases.
 
 /// The facts of a fit that stand in the provenance of its model too; null where there are none.
-fn fit_record(outcome: &Outcome, settings: &Settings) -> Value {
+fn fit_record(outcome: &Outcome, settings: &CalibrationSettings) -> Value {
     let (fit, goodness) = (&outcome.fit, outcome.goodness());
     let worst = outcome.departure().misfit;
     let notes = fit_notes(outcome, settings).into_iter();
@@ -701,7 +704,7 @@ fn fit_record(outcome: &Outcome, settings: &Settings) -> Value {
 /// replicates of one noise differ as much at some scale; `parameter_spread` are laws of model files; `missed` are the
 /// scales at which curve and model differ by more than four standard deviations; `zero` are the processes whose amplitude
 /// is zero.
-fn fit_json(outcome: &Outcome, all: &[Outcome], settings: &Settings) -> Value {
+fn fit_json(outcome: &Outcome, all: &[Outcome], settings: &CalibrationSettings) -> Value {
     let (fit, rate_hz) = (&outcome.fit, settings.rate_hz);
     let (inference, ranking) = (outcome.inference.as_ref(), outcome.ranking.as_ref());
     let labels = fit.composite.labels();
@@ -916,17 +919,17 @@ pub(crate) fn figure_of(process: &Process, label: &str, sensor: Sensor) -> Optio
     };
     let time = || (format!("T_{label}"), "correlation time T", "s");
     Some(match process.kind() {
-        Kind::Ar1 if process.shape() > 0.0 => (time(), Parameter::Phi, |phi, rate_hz| {
+        ProcessKind::Ar1 if process.shape() > 0.0 => (time(), Parameter::Phi, |phi, rate_hz| {
             -1.0 / (phi.ln() * rate_hz)
         }),
-        Kind::GaussMarkov => (time(), Parameter::Beta, |beta, _| 1.0 / beta),
+        ProcessKind::GaussMarkov => (time(), Parameter::Beta, |beta, _| 1.0 / beta),
         // Of the increments over a sample, as IEEE 952 has it.
-        Kind::Quantization => (
+        ProcessKind::Quantization => (
             ("Q".to_owned(), "quantization Q", increment),
             Parameter::Q2,
             |q2, rate_hz| q2.sqrt() / rate_hz,
         ),
-        Kind::Drift => (
+        ProcessKind::Drift => (
             ("R".to_owned(), "ramp", ramp),
             Parameter::Slope,
             |slope, rate_hz| slope * rate_hz,
@@ -973,7 +976,7 @@ impl Calibration {
             let varying = outcome.inference.iter().flat_map(|i| &i.varying);
             let laws: Vec<Variation> = varying
                 .filter_map(|found| {
-                    let law = Law::Lognormal {
+                    let law = ParameterDistribution::Lognormal {
                         median: found.median,
                         median_ci95: Some(found.median_ci95),
                         sd: found.sd,

@@ -7,9 +7,9 @@ use crate::io::recordings::{FileReport, ReadOptions, Report};
 use crate::io::{curve_file, recordings};
 use crate::report::CurvesFile;
 use nav_sim_calibration::{
-    self, Advance, Bootstrap, CalibrationError, Diagnosis, Estimator, Group, Outcome,
-    RecordingWarmUp, Replicate, Scope, Settings, TurnOnSpread, WarmUp, diagnose, fit_curve,
-    infer_with_progress, replicates, turn_on, warm_up,
+    self, Advance, Bootstrap, CalibrationError, CalibrationSettings, Diagnosis, Estimator, Group,
+    Outcome, RecordingWarmUp, Replicate, Scope, TurnOnSpread, WarmUp, add_intervals_with_progress,
+    diagnose, fit_curve, replicates, turn_on, warm_up,
 };
 use nav_sim_signal::imu::{Channel, Recording, Sensor};
 use nav_sim_signal::names::UnknownName;
@@ -77,7 +77,7 @@ pub(crate) struct MeasuredRecordings {
     pub report: Report,
     pub replicates: Vec<(Channel, Replicate)>,
     pub warm_ups: Vec<RecordingWarmUp>,
-    pub settings: Settings,
+    pub settings: CalibrationSettings,
 }
 
 /// A calibration: the fitted models and the wavelet variances behind them.
@@ -89,7 +89,7 @@ pub struct Calibration {
     /// The fitted models: for each group, one per estimator.
     pub outcomes: Vec<Outcome>,
     /// Settings of the fit.
-    pub settings: Settings,
+    pub settings: CalibrationSettings,
     /// The recordings that do not begin as they go on.
     pub warm_ups: Vec<RecordingWarmUp>,
     /// Turn-on bias from the recordings' means, for each estimator and sensor.
@@ -106,7 +106,7 @@ pub(crate) fn measure(
     mut reading: ReadOptions,
     scales: Option<u32>,
     estimators: EstimatorChoice,
-    settings: &Settings,
+    settings: &CalibrationSettings,
     context: &Context<'_>,
 ) -> Result<MeasuredRecordings, Failure> {
     // As many scales as parameters, and one that the default leaves out.
@@ -123,7 +123,7 @@ pub(crate) fn measure(
         looks.iter().filter(has).count()
     };
     let estimators = estimators.estimators(Channel::ALL.iter().map(of).max().unwrap_or(0))?;
-    let settings = Settings {
+    let settings = CalibrationSettings {
         estimators,
         rate_hz,
         ..settings.clone()
@@ -143,12 +143,12 @@ impl Calibration {
     pub(crate) fn new(
         groups: Vec<Group>,
         mut outcomes: Vec<Outcome>,
-        settings: Settings,
+        settings: CalibrationSettings,
         bootstrap: Option<Bootstrap>,
         advance: Advance<'_>,
     ) -> Self {
         if let Some(bootstrap) = bootstrap {
-            infer_with_progress(&groups, &mut outcomes, &settings, bootstrap, advance);
+            add_intervals_with_progress(&groups, &mut outcomes, &settings, bootstrap, advance);
         }
         let of_estimator = |e: &Estimator| {
             let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == *e).collect();
@@ -295,8 +295,8 @@ pub(crate) fn read_curves(
     path: &Path,
     rate_hz: Option<f64>,
     sensor: Option<Sensor>,
-    settings: &Settings,
-) -> Result<(Curves, Settings, bool), Failure> {
+    settings: &CalibrationSettings,
+) -> Result<(Curves, CalibrationSettings, bool), Failure> {
     let named = curve_file::read(path)?;
     let path = || path.display().to_string();
     let rate_hz = match (named[0].rate_hz, rate_hz) {
@@ -314,14 +314,14 @@ pub(crate) fn read_curves(
                 .hint("give the rate with --rate-hz")
         })?,
     };
-    let mut is_unsaid = false;
+    let mut is_sensor_assumed = false;
     let mut curves = Curves::new();
     for named in named {
         let estimator = named
             .estimator
             .and_then(|name| name.parse().ok())
             .unwrap_or(Estimator::Given);
-        is_unsaid |= named.sensor.or(sensor).is_none();
+        is_sensor_assumed |= named.sensor.or(sensor).is_none();
         let sensor = named.sensor.or(sensor).unwrap_or(Sensor::Accel);
         let scope = Scope {
             sensor,
@@ -344,12 +344,12 @@ pub(crate) fn read_curves(
         .collect();
     Ok((
         curves,
-        Settings {
+        CalibrationSettings {
             estimators,
             rate_hz,
             ..settings.clone()
         },
-        is_unsaid,
+        is_sensor_assumed,
     ))
 }
 
@@ -359,7 +359,7 @@ pub(crate) fn read_curves(
 /// When a curve is too short for the model.
 pub(crate) fn calibrate_curves(
     curves: Curves,
-    settings: Settings,
+    settings: CalibrationSettings,
     bootstrap: Option<Bootstrap>,
 ) -> Result<Calibration, Failure> {
     let (mut groups, mut outcomes) = (Vec::new(), Vec::new());

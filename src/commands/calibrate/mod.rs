@@ -29,7 +29,7 @@ pub use measure::{Calibration, EstimatorChoice};
 pub(crate) use measure::{MeasuredRecordings, measure, visit};
 
 use crate::app::reading::{RecordingRequest, VarianceRequest, unknown_model};
-use crate::app::{Answer, Command, Context, Out, OutputFile, Result, refused};
+use crate::app::{Answer, Command, Context, OutputFile, OutputKind, Result, refused};
 use crate::commands::wv;
 use crate::io::draws_file::DrawsFile;
 use crate::io::input;
@@ -39,8 +39,8 @@ use crate::report;
 use crate::report::curves::SignalCurves;
 use measure::{Curves, calibrate_curves, read_curves};
 use nav_sim_calibration::{
-    Bootstrap, Estimator, ModelChoice, ModelSpec, Pool, Replicate, Settings, Trim, Weighting,
-    calibrate_with_progress, grouped,
+    Bootstrap, CalibrationSettings, Estimator, ModelChoice, ModelSpec, Pool, Replicate, Trim,
+    Weighting, calibrate_with_progress, grouped,
 };
 use nav_sim_document::Document;
 use nav_sim_signal::imu::Channel;
@@ -110,7 +110,7 @@ pub(crate) const ESTIMATORS: [&str; 7] =
 impl Command for Calibrate {
     type Answer = Calibration;
     const NAME: &'static str = "calibrate";
-    const OUT: Out = Out::File {
+    const OUT: OutputKind = OutputKind::File {
         name: "model.toml",
         help: "Model file (default: model.toml; none for --curve)",
     };
@@ -133,8 +133,8 @@ impl Command for Calibrate {
         let Some(path) = &self.curve else {
             return Ok(());
         };
-        let (.., is_unsaid) = self.curves(path, &self.settings()?)?;
-        if is_unsaid {
+        let (.., is_sensor_assumed) = self.curves(path, &self.settings()?)?;
+        if is_sensor_assumed {
             refused(
                 format!("{}: the curve names no sensor", path.display()),
                 "--axes accel or --axes gyro",
@@ -148,8 +148,8 @@ impl Command for Calibrate {
         let settings = self.settings()?;
         let mut calibration = match &self.curve {
             Some(path) => {
-                let (curves, settings, is_unsaid) = self.curves(path, &settings)?;
-                if is_unsaid {
+                let (curves, settings, is_sensor_assumed) = self.curves(path, &settings)?;
+                if is_sensor_assumed {
                     context.remark(format!(
                         "{}: taken as an accelerometer (--axes gyro: gyroscope)",
                         path.display()
@@ -207,7 +207,10 @@ impl Command for Calibrate {
 }
 
 /// The curves of signals as `wv` has them.
-fn curves_of(signals: &[(Channel, Replicate)], settings: &Settings) -> Vec<SignalCurves> {
+fn curves_of(
+    signals: &[(Channel, Replicate)],
+    settings: &CalibrationSettings,
+) -> Vec<SignalCurves> {
     let curves = |(channel, replicate): &(Channel, Replicate)| {
         let levels = 1..=replicate.classical.len() as u32;
         let edof = levels.map(|level| replicate.edof_eta3(level)).collect();
@@ -240,19 +243,23 @@ impl Answer for Calibration {
 
 impl Calibrate {
     /// Settings of the fit, validated before any file is read.
-    fn settings(&self) -> Result<Settings> {
-        Ok(Settings {
+    fn settings(&self) -> Result<CalibrationSettings> {
+        Ok(CalibrationSettings {
             model: self.structure()?,
             trim: self.trim,
             tuning: self.tuning.tuning()?,
             weighting: self.weighting,
             fit_range: self.tuning.fitted(),
-            ..Settings::default()
+            ..CalibrationSettings::default()
         })
     }
 
     /// The curves in the place of recordings, and whether they do not say of which sensor: then as of an accelerometer.
-    fn curves(&self, path: &Path, settings: &Settings) -> Result<(Curves, Settings, bool)> {
+    fn curves(
+        &self,
+        path: &Path,
+        settings: &CalibrationSettings,
+    ) -> Result<(Curves, CalibrationSettings, bool)> {
         read_curves(
             path,
             self.recordings.reading.rate_hz,
@@ -270,7 +277,7 @@ impl Calibrate {
     }
 
     /// Reading and grouping of the recordings; empty for a curve.
-    fn reading(&self, settings: &Settings) -> toml::Table {
+    fn reading(&self, settings: &CalibrationSettings) -> toml::Table {
         if self.curve.is_some() {
             return toml::Table::new();
         }

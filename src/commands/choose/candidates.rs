@@ -2,12 +2,12 @@
 
 use super::FEWEST;
 use super::ranking::Score;
-use crate::app::{Failure, Refuse};
+use crate::app::{Failure, IntoFailure};
 use nav_sim_calibration::{
-    CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, RecordingVerdict,
-    Replicate, Settings, calibrate, diagnose, grouped, model_of,
+    CalibrationError, CalibrationSettings, Estimator, Group, ModelChoice, ModelSpec, Outcome,
+    RecordingVerdict, Replicate, calibrate, diagnose, grouped, model_of,
 };
-use nav_sim_navigation::ekf::{Belief, FilterStates};
+use nav_sim_navigation::ekf::{FilterModel, FilterStates};
 use nav_sim_navigation::monte_carlo;
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::imu::Truth;
@@ -211,11 +211,11 @@ pub struct CalibrationSet {
     /// The recordings.
     pub units: Vec<Unit>,
     /// Settings of the fits.
-    pub settings: Settings,
+    pub settings: CalibrationSettings,
 }
 
 /// The groups of recordings that were calibrated, their fits, and how these were made.
-type Calibrated = (Vec<Group>, Vec<Outcome>, Settings);
+type Calibrated = (Vec<Group>, Vec<Outcome>, CalibrationSettings);
 
 impl CalibrationSet {
     /// Calibrates a candidate on all recordings but one, before any inflation. An estimator of single recordings takes
@@ -268,7 +268,7 @@ impl CalibrationSet {
         estimator: Estimator,
         model: &ModelChoice,
     ) -> Result<Calibrated, CalibrationError> {
-        let settings = Settings {
+        let settings = CalibrationSettings {
             estimators: vec![estimator],
             model: model.clone(),
             ..self.settings.clone()
@@ -357,28 +357,28 @@ impl Drive {
         runs: u64,
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<Vec<Score>, Failure> {
-        let beliefs = self.beliefs(laboratory, k, candidates)?;
+        let filter_models = self.filter_models(laboratory, k, candidates)?;
         let lasts_s = self.trajectory.end_s() - self.trajectory.start_s();
         if recordings.len() > 1 {
             recordings.retain(|r| r.len() as f64 >= lasts_s * self.scenario.imu.rate_hz);
         }
         let truth = Truth::Static(&recordings);
         let (trajectory, outages) = (&self.trajectory, &self.outages);
-        let experiment = self
-            .scenario
-            .experiment(trajectory, truth, &beliefs, outages, self.seed);
+        let experiment =
+            self.scenario
+                .experiment(trajectory, truth, &filter_models, outages, self.seed);
         let results = monte_carlo::run(&experiment, runs, progress)?;
         let score = |r: &RunResult| Score::of(&r.runs, outages.len());
         Ok(results.iter().map(score).collect())
     }
 
     /// Noise model in each candidate's filter, calibrated from all recordings but one.
-    fn beliefs(
+    fn filter_models(
         &self,
         laboratory: &CalibrationSet,
         without: usize,
         candidates: &[Candidate],
-    ) -> Result<Vec<Belief>, Failure> {
+    ) -> Result<Vec<FilterModel>, Failure> {
         let mut made: Vec<(&Candidate, Model)> = Vec::new();
         for candidate in candidates {
             let mut others = made.iter();
@@ -396,13 +396,13 @@ impl Drive {
             };
             made.push((candidate, model));
         }
-        let belief = |(candidate, model): &(&Candidate, Model)| {
+        let filter_model = |(candidate, model): &(&Candidate, Model)| {
             let mut scenario = self.scenario.clone();
             scenario.filter.states = candidate.filter;
             scenario
-                .belief(&candidate.inflated(model), &self.outages, &self.track)
+                .filter_model(&candidate.inflated(model), &self.outages, &self.track)
                 .refuse_within(candidate)
         };
-        made.par_iter().map(belief).collect()
+        made.par_iter().map(filter_model).collect()
     }
 }

@@ -9,7 +9,7 @@
 
 use crate::app::inputs::{self, SettingsArgs};
 use crate::app::reading::{ReadingRequest, WHOLE, unknown_model};
-use crate::app::{Command, Context, Inputs, Out, PlainAnswer, Result, refused};
+use crate::app::{Command, Context, Inputs, OutputKind, PlainAnswer, Result, refused};
 use crate::commands::calibrate::{
     Calibration, CalibrationNote, ESTIMATORS, EstimatorChoice, MeasuredRecordings, measure,
 };
@@ -18,7 +18,7 @@ use crate::parse;
 use crate::report::csv::merged;
 use crate::report::{self, first_names, six_digits};
 use candidates::{CalibrationSet, Candidate, Drive, Fold, Inflation, Unit};
-use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Settings, Trim, model_of};
+use nav_sim_calibration::{Bootstrap, CalibrationSettings, Estimator, ModelChoice, Trim, model_of};
 use nav_sim_document::{Document, Importance, Table, Tone, readable, window};
 use nav_sim_navigation::ekf::FilterStates;
 use ranking::Ranking;
@@ -80,7 +80,7 @@ const EACH: &[&str] = ESTIMATORS.split_at(6).0;
 impl Command for Choose {
     type Answer = PlainAnswer;
     const NAME: &'static str = "choose";
-    const OUT: Out = Out::Directory {
+    const OUT: OutputKind = OutputKind::Directory {
         path: "out/choice",
         files: &[
             "model.toml",
@@ -111,9 +111,9 @@ impl Command for Choose {
             );
         }
         // the candidates have estimators and models of their own
-        let settings = Settings {
+        let settings = CalibrationSettings {
             trim: self.trim,
-            ..Settings::default()
+            ..CalibrationSettings::default()
         };
         let (reading, estimator) = (
             self.recordings.options(self.gaps),

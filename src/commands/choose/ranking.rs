@@ -7,9 +7,9 @@ use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 /// Fewest recordings for a useful interval: with three, its half-width is 2.5 times their standard deviation.
-const FEWEST: usize = 4;
+const MIN_RECORDINGS: usize = 4;
 /// A recording whose errors are this many times as large in NEES as any filter assumes is described by no candidate.
-const FAILS: f64 = 2.0 * 9.0;
+const UNDESCRIBED_NEES: f64 = 2.0 * 9.0;
 
 /// A mean over recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -109,9 +109,9 @@ impl Ranking {
                 .cmp(&a.eligible)
                 .then(b.log_score.value.total_cmp(&a.log_score.value))
         });
-        let fails = |f: &&Fold| !f.scores.iter().any(|s| s.all.nees <= FAILS);
+        let fails = |f: &&Fold| !f.scores.iter().any(|s| s.all.nees <= UNDESCRIBED_NEES);
         let undescribed = folds.iter().filter(fails).map(|f| f.recording.clone());
-        let tells = folds.len() >= FEWEST && placed.iter().any(|p| p.eligible && !p.tied);
+        let tells = folds.len() >= MIN_RECORDINGS && placed.iter().any(|p| p.eligible && !p.tied);
         let tied = placed.iter().skip(1).filter(|p| p.place == "tied");
         Self {
             winner: placed[0].candidate.clone(),
@@ -138,8 +138,8 @@ fn place(
         .map(|s| (s[c].all.log_score, s[winner].all.log_score));
     let density: Vec<f64> = log_scores.map(|(own, best)| own - best).collect();
     let (log_score, joint95) = (
-        interval(&density, 0.05),
-        interval(&density, 0.05 / rivals as f64).ci95,
+        mean_with_interval(&density, 0.05),
+        mean_with_interval(&density, 0.05 / rivals as f64).ci95,
     );
     let root_mean_square =
         |values: Vec<f64>| (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
@@ -162,10 +162,10 @@ fn place(
         index: c,
         eligible,
         tied,
-        log_score: interval(&per_recording(&|s| s.all.log_score), 0.05),
+        log_score: mean_with_interval(&per_recording(&|s| s.all.log_score), 0.05),
         rmse_m: root_mean_square(per_recording(&|s| s.all.rmse_m)),
         believed_m: root_mean_square(per_recording(&|s| s.all.believed_m)),
-        nees: positive(interval(&per_recording(&|s| s.all.nees), 0.05)),
+        nees: log_interval(mean_with_interval(&per_recording(&|s| s.all.nees), 0.05)),
         coverage: mean(scores().map(|s| s.coverage)),
         difference: Difference { log_score, joint95 },
         folds: folds.iter().map(fold).collect(),
@@ -173,7 +173,7 @@ fn place(
 }
 
 /// Interval of a positive quantity: symmetric in its logarithm, of the same half-width to first order.
-fn positive(RecordingMean { value, ci95 }: RecordingMean) -> RecordingMean {
+fn log_interval(RecordingMean { value, ci95 }: RecordingMean) -> RecordingMean {
     let factor = ((ci95.1 - value) / value).exp();
     RecordingMean {
         value,
@@ -185,7 +185,7 @@ fn positive(RecordingMean { value, ci95 }: RecordingMean) -> RecordingMean {
 /// recordings, so their scores are correlated: the variance of the mean is (1/K + 1/(K − 1)) of that of a score
 /// ([Nadeau and Bengio 2003](https://doi.org/10.1023/A:1024068626366), one recording tested for K − 1 calibrated on).
 /// In simulations the interval without 1/(K − 1) covered 87 % instead of 95 %.
-fn interval(values: &[f64], alpha: f64) -> RecordingMean {
+fn mean_with_interval(values: &[f64], alpha: f64) -> RecordingMean {
     let n = values.len() as f64;
     let value = values.iter().sum::<f64>() / n;
     let variance = values.iter().map(|x| (x - value).powi(2)).sum::<f64>() / (n - 1.0);
@@ -224,7 +224,7 @@ mod ranking_tests {
 
     #[test]
     fn the_interval_of_what_is_positive_is_positive() {
-        let nees = positive(RecordingMean {
+        let nees = log_interval(RecordingMean {
             value: 30.0,
             ci95: (-20.0, 80.0),
         });
@@ -248,7 +248,7 @@ mod ranking_tests {
     /// Student's t with three degrees of freedom: 3.182446 at 0.975; variance 5/3 of a score, 1/4 + 1/3 of it of the mean.
     #[test]
     fn intervals_are_those_of_student_with_shared_recordings() {
-        let found = interval(&[1.0, 2.0, 3.0, 4.0], 0.05);
+        let found = mean_with_interval(&[1.0, 2.0, 3.0, 4.0], 0.05);
         let half = 3.182_446_305_284_263 * (5.0_f64 / 3.0 * 7.0 / 12.0).sqrt();
         assert!((found.value - 2.5).abs() < 1e-15);
         assert!((found.ci95.1 - 2.5 - half).abs() < 1e-9, "{found:?}");

@@ -3,7 +3,9 @@
 //! [`Export::new`] fits the pair that the target knows ([`noise::practical`](nav_sim_signal::noise::practical)) to the model's
 //! noisiest axis, states by how much the two differ, and [`Export::text`] writes it in the target's own syntax (`targets.rs`).
 
-use crate::app::{Command, Context, Failure, Out, PlainAnswer, Refuse, Result, refused};
+use crate::app::{
+    Command, Context, Failure, IntoFailure, OutputKind, PlainAnswer, Result, refused,
+};
 use crate::io::model_file::{self, ModelFile};
 use crate::io::recordings::facts;
 use crate::parse::{one_of, seconds_range};
@@ -11,9 +13,9 @@ use nav_sim_calibration::percent;
 use nav_sim_document::{Document, Importance, Tone, readable};
 use nav_sim_signal::imu::{Axis, Sensor};
 use nav_sim_signal::noise::practical::{
-    AllanCurve, AxisParameters, Bias, Horizon, Pair, PairClosure, Policy, Ratio,
+    AllanCurve, AxisParameters, BiasModel, Horizon, NoiseDensities, PairClosure, Policy, Ratio,
 };
-use nav_sim_signal::noise::{Composite, Kind};
+use nav_sim_signal::noise::{Composite, ProcessKind};
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 use serde::Serialize;
 use serde_json::json;
@@ -55,7 +57,7 @@ fn horizon(text: &str) -> Result<Horizon, String> {
 impl Command for ExportArgs {
     type Answer = PlainAnswer;
     const NAME: &'static str = "export";
-    const OUT: Out = Out::File {
+    const OUT: OutputKind = OutputKind::File {
         name: "parameters.txt",
         help: "File to write (default: stdout)",
     };
@@ -120,7 +122,7 @@ struct SensorExport {
     /// Parameters of the largest axis at each averaging time: what is exported.
     largest: AxisParameters,
     /// The pair that the target is given.
-    exported: Pair,
+    exported: NoiseDensities,
     /// Ratio of that pair to the model over the horizon.
     closure: PairClosure,
     /// Standard deviation of the bias at the start (units): of the turn-on bias where the model states one, else of the
@@ -190,7 +192,7 @@ impl Export {
             curves.push(AllanCurve::largest(&noise, rate_hz, horizon).refuse_within(sensor)?);
         }
         let bias = if target.has_one_time && policy != Policy::Strict {
-            Bias::MarkovOf(curves[0].shared_correlation_time_s(&curves[1], policy))
+            BiasModel::MarkovOf(curves[0].shared_correlation_time_s(&curves[1], policy))
         } else {
             target.bias
         };
@@ -270,9 +272,9 @@ fn check(
         axes.iter()
             .any(|a| a.processes.iter().any(|p| p.kind() == kind))
     };
-    let walks = has(Kind::RandomWalk);
+    let walks = has(ProcessKind::RandomWalk);
     let lacking = match target.bias {
-        Bias::Walk => (!walks && has(Kind::GaussMarkov)).then_some("Gauss-Markov bias"),
+        BiasModel::Walk => (!walks && has(ProcessKind::GaussMarkov)).then_some("Gauss-Markov bias"),
         _ => walks.then_some("random walk"),
     };
     match lacking {
@@ -374,7 +376,7 @@ impl Export {
 impl SensorExport {
     fn doubts(&self, policy: Policy) -> Vec<String> {
         let mut doubts = Vec::new();
-        let Pair {
+        let NoiseDensities {
             density,
             walk,
             markov,

@@ -9,7 +9,7 @@ use super::{Export, ExportEntry, SensorExport};
 use nav_sim_document::one_line;
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_signal::names::UnknownName;
-use nav_sim_signal::noise::practical::{Bias, Markov};
+use nav_sim_signal::noise::practical::{BiasModel, Markov};
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR};
 use std::str::FromStr;
 
@@ -19,7 +19,7 @@ pub struct Target {
     /// Its name on the command line.
     pub name: &'static str,
     /// Role of the bias in the target's filter.
-    pub(super) bias: Bias,
+    pub(super) bias: BiasModel,
     /// True if both sensors share one correlation time.
     pub(super) has_one_time: bool,
     /// True if it flies a vehicle, whose vibration no static recording holds.
@@ -29,13 +29,13 @@ pub struct Target {
 
 const WALK: Target = Target {
     name: "",
-    bias: Bias::Walk,
+    bias: BiasModel::Walk,
     has_one_time: false,
     vibrates: false,
     template: "",
 };
 const MARKOV: Target = Target {
-    bias: Bias::Markov,
+    bias: BiasModel::Markov,
     ..WALK
 };
 

@@ -252,7 +252,7 @@ fn kf_gins_has_one_correlation_time() {
         let of_sensor = |processes: &Vec<Process>| -> f64 {
             let model = Composite::new(processes.clone());
             let curve = AllanCurve::largest(&[&model], RATE, Horizon::default()).unwrap();
-            let pair = curve.pair(Policy::Matched, Bias::MarkovOf(t_corr_s));
+            let pair = curve.pair(Policy::Matched, BiasModel::MarkovOf(t_corr_s));
             let samples =
                 (0..=106).map(|k| (RATE * 2.0_f64.powf(f64::from(k) / 16.0)).round() as u32);
             let log = |m| 0.5 * (pair.allan_variance(m, RATE) / model.allan_variance(m)).ln();
@@ -427,7 +427,7 @@ fn ros_messages_have_the_variance_of_a_sample() {
 #[test]
 fn names_of_models_forge_nothing() {
     for target in Target::ALL {
-        let export = if target.bias == Bias::Walk {
+        let export = if target.bias == BiasModel::Walk {
             walks
         } else {
             markovs

@@ -13,7 +13,8 @@ use nav_sim_document::{
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::frames::NavState;
 use nav_sim_navigation::fusion::{
-    ClocksApart, Finding, FixRecord, Outliers, OwnNoise, Row, Solution, Withheld,
+    ClocksApart, ExcessWhiteNoise, Finding, FixRecord, Outliers, Solution, SolutionRow,
+    WithheldWindows,
 };
 use nav_sim_navigation::metrics::VerdictKind;
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
@@ -250,7 +251,7 @@ impl FuseAnswer {
 }
 
 /// `errors 1.02 ± 0.08 times sigma at the ends of 12 withheld windows of 20 s`
-fn at_windows(found: &Withheld) -> String {
+fn at_windows(found: &WithheldWindows) -> String {
     if found.windows == 0 {
         return "too short for windows without fixes".to_owned();
     }
@@ -360,8 +361,8 @@ fn rejected(outliers: &Outliers) -> String {
 }
 
 /// Noise that is used instead of the model's, and the line to paste there.
-fn own_noise(noise: &OwnNoise) -> String {
-    let OwnNoise {
+fn own_noise(noise: &ExcessWhiteNoise) -> String {
+    let ExcessWhiteNoise {
         sensor,
         times_model,
         sigma2,
@@ -422,7 +423,7 @@ const FIXES: &str = "A consistent filter has 95 % of the used fixes in the band.
 const SMOOTHED: Colour = Colour::Hue(2);
 
 fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
-    let place = |row: &Row| {
+    let place = |row: &SolutionRow| {
         let NavState { lat, lon, h, .. } = row.state;
         let moved = ned_difference(solution.rows[0].state.place(), [lat, lon, h]);
         [moved.y, moved.x]
@@ -433,7 +434,7 @@ fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
 
 /// Rows of the filter, and smoothed ones: names of what is stated and of the error, colours. A panel has room for three
 /// names in its legend.
-fn solutions(solution: &Solution) -> Vec<(&[Row], [&'static str; 2], [Colour; 2])> {
+fn solutions(solution: &Solution) -> Vec<(&[SolutionRow], [&'static str; 2], [Colour; 2])> {
     let rows = solution.rows.as_slice();
     match solution.smoothed.as_deref() {
         None => vec![(rows, ["stated", "error"], [Colour::BELIEVED, Colour::REAL])],
@@ -470,7 +471,7 @@ fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
 }
 
 fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
-    let row = |row: &Row| {
+    let row = |row: &SolutionRow| {
         let mut values = row.error.map_or([f64::NAN; REPORTED], |e| e.values);
         if row.error.is_some_and(|e| e.velocity_sigma >= UNEVEN) {
             values[3..6].fill(f64::NAN);

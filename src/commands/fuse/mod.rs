@@ -3,7 +3,8 @@
 mod document;
 
 use crate::app::{
-    Answer, Command, Context, Failure, Inputs, Out, OutputFile, Refuse, Result, inputs, refused,
+    Answer, Command, Context, Failure, Inputs, IntoFailure, OutputFile, OutputKind, Result, inputs,
+    refused,
 };
 use crate::commands::run::reduction_of;
 use crate::io::fusion_files::{WEEK_S, read_gnss, read_imu, read_initial, read_wheel};
@@ -15,17 +16,18 @@ use glam::{DMat3, DQuat, DVec3};
 use nalgebra::SMatrix;
 use nav_sim_document::{Document, shortest, window};
 use nav_sim_navigation::earth::{GravityModel, radii};
-use nav_sim_navigation::ekf::{Belief, FilterStates, InitialSettings};
+use nav_sim_navigation::ekf::{FilterModel, FilterStates, InitialSettings};
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
 use nav_sim_navigation::fusion::alignment::{Alignment, coarse, towards};
 use nav_sim_navigation::fusion::judge::{ReferenceOffset, SetupFault, StatedRow, judge};
 use nav_sim_navigation::fusion::mounting::{self, Mounting};
 use nav_sim_navigation::fusion::{
-    AlignmentSummary, ClocksApart, Correlation, Displaced, Finding, FixRecord, FusionAssessment,
-    FusionError, FusionFigures, Heading, Levelling, OwnNoise, Recorded, Row, Settings, Solution,
-    Start, WeightedSolution, WheelSpeed, Withheld, aid_innovations, assess, check_clocks,
-    clocks_apart, displaced, earlier, fuse, fuse_correlated, interval_s, outcome, own_noise,
-    predicts_as_well, rest_of_origin, rough_origin, vehicle_velocities, wheel_ratio, withheld,
+    AlignmentSummary, AntennaOffset, ClocksApart, Correlation, DriveData, ExcessWhiteNoise,
+    Finding, FixRecord, FusionAssessment, FusionError, FusionFigures, FusionSettings, Heading,
+    Levelling, Solution, SolutionRow, Start, WeightedSolution, WheelSpeed, WithheldWindows,
+    aid_innovations, antenna_offset, assess, check_clocks, clocks_apart, earlier, fuse,
+    fuse_correlated, interval_s, outcome, own_noise, predicts_as_well, refine_clock_offset,
+    rough_origin, vehicle_velocities, wheel_ratio, withheld,
 };
 use nav_sim_navigation::gnss::{FixSigma, GnssFix};
 use nav_sim_navigation::linalg::median;
@@ -40,7 +42,7 @@ use nav_sim_navigation::simulation::lincov::weak_heading;
 use nav_sim_navigation::simulation::{BIAS_NAMES, REPORTED_NAMES, lincov};
 use nav_sim_navigation::trajectory::reference::Reference;
 use nav_sim_signal::imu::ImuIncrement;
-use nav_sim_signal::noise::{Composite, Kind, Model, continuous, reduction};
+use nav_sim_signal::noise::{Composite, Model, ProcessKind, continuous, reduction};
 use nav_sim_signal::units::{DEG, Refused};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -53,7 +55,7 @@ use std::str::FromStr;
 impl Command for Fuse {
     type Answer = FuseAnswer;
     const NAME: &'static str = "fuse";
-    const OUT: Out = Out::Directory {
+    const OUT: OutputKind = OutputKind::Directory {
         path: "out/fuse",
         files: &FILES,
     };
@@ -215,12 +217,12 @@ impl Fuse {
     }
 
     /// Settings of the filter's run.
-    fn settings(&self) -> Settings {
+    fn settings(&self) -> FusionSettings {
         let (q_s_b, mounting_sigma_b) = match self.mounting {
             Some(MountingChoice::Given(q_s_b, sigma_b)) => (q_s_b, sigma_b),
             _ => (DQuat::IDENTITY, DVec3::ZERO),
         };
-        Settings {
+        FusionSettings {
             q_s_b,
             mounting_sigma_b,
             lever_arm_b: self.lever_arm_m.into(),
@@ -390,7 +392,7 @@ impl From<FusionError> for Failure {
                 Some("use a smaller filter, or fuse the drive in parts".to_owned())
             }
             FusionError::Diverged { .. } => {
-                return Self::could_not(&e).hint("check axes, units and the initial state");
+                return Self::failed(&e).hint("check axes, units and the initial state");
             }
             _ => None,
         };
@@ -521,7 +523,7 @@ impl<'a> RecordedDrive<'a> {
     /// Data and settings that do not fit together, or a filter that diverges.
     fn fuse(mut self, context: &Context<'_>) -> Result<FuseAnswer> {
         let origin_s = self.common_origin()?;
-        let mut recorded = Recorded {
+        let mut recorded = DriveData {
             imu: &self.imu,
             gnss: &self.gnss,
             aids: &[],
@@ -547,11 +549,11 @@ impl<'a> RecordedDrive<'a> {
             .iter()
             .map(|o| o.end_s - o.start_s)
             .collect();
-        let belief = |model: &Model| {
+        let filter_model = |model: &Model| {
             let filter = (model, self.request.filter, &self.expected);
-            belief(filter, self.imu_rate_hz, &self.gnss, &lengths)
+            filter_model(filter, self.imu_rate_hz, &self.gnss, &lengths)
         };
-        let (mut believed, mut reduction) = belief(&own)?;
+        let (mut believed, mut reduction) = filter_model(&own)?;
         let plan = OutagePlan {
             fixed: settings.outages,
             ..OutagePlan::default()
@@ -570,7 +572,9 @@ impl<'a> RecordedDrive<'a> {
         if let Some(Mounting { q_s_b, sigma_b, .. }) = mounting {
             (settings.q_s_b, settings.mounting_sigma_b) = (q_s_b, sigma_b);
         }
-        let rest_s = origin_s.map_or(0.0, |_| rest_of_origin(&recorded, &believed, &settings));
+        let rest_s = origin_s.map_or(0.0, |_| {
+            refine_clock_offset(&recorded, &believed, &settings)
+        });
         let gnss = earlier(recorded.gnss, rest_s);
         recorded.gnss = &gnss;
         let delay_s = self.request.gnss_delay_s + origin_s.unwrap_or(0.0) + rest_s;
@@ -608,16 +612,16 @@ impl<'a> RecordedDrive<'a> {
         let aids = vehicle_velocities(&recorded, &self.wheel, &aiding, &settings.outages);
         recorded.aids = &aids;
         if !noise.is_empty() {
-            let as_stated = belief(stated)?;
+            let as_stated = filter_model(stated)?;
             let both = [&believed, &as_stated.0];
             if !predicts_as_well(&recorded, both, &start, &settings) {
                 (believed, reduction) = as_stated;
                 noise.clear();
             }
         }
-        let belief = believed.with_vehicle(aiding.state_sigmas());
+        let filter_model = believed.with_vehicle(aiding.state_sigmas());
         let asked = (self.reference.as_ref(), self.request.gnss_correlation);
-        let weighed = fuse_correlated(&recorded, &belief, &start, &settings, asked)?;
+        let weighed = fuse_correlated(&recorded, &filter_model, &start, &settings, asked)?;
         if self.reference.is_some() && weighed.solution.rows.iter().all(|row| row.error.is_none()) {
             return refused(
                 "reference and solution have no time in common",
@@ -628,7 +632,7 @@ impl<'a> RecordedDrive<'a> {
         let outcome = outcome(&weighed.solution, &settings.outages);
         let withholds = settings.outages.is_empty() && self.request.withhold == "auto";
         let withheld = match withholds {
-            true => withheld(&recorded, &belief, &start, &settings, &weighed)?,
+            true => withheld(&recorded, &filter_model, &start, &settings, &weighed)?,
             false => None,
         };
         let FusionAssessment { verdict, findings } = assess(&weighed, &outcome, &doubts, withheld);
@@ -636,7 +640,7 @@ impl<'a> RecordedDrive<'a> {
         let is_unexplained =
             verdict >= VerdictKind::Doubtful || verdict == VerdictKind::Undecided && is_correlated;
         let scene = CauseSearch {
-            belief: &belief,
+            filter_model: &filter_model,
             start: &start,
             settings: &settings,
             is_given: self.initial.is_some(),
@@ -651,7 +655,7 @@ impl<'a> RecordedDrive<'a> {
             .into_iter()
             .filter(|(verdict, _)| *verdict > VerdictKind::Consistent);
         let evidence = grave.map(|(_, finding)| finding).collect();
-        let constants = belief
+        let constants = filter_model
             .groups
             .iter()
             .flatten()
@@ -673,7 +677,7 @@ impl<'a> RecordedDrive<'a> {
             imu_rate_hz: self.imu_rate_hz,
             start_s: start.t_s,
             end_s: rows.last().map_or(start.t_s, |row| row.t_s),
-            filter_states: belief.states,
+            filter_states: filter_model.states,
             turn_on_states: 3 * constants,
             initial: Initial::new(&start, self.request.initial_file()),
             mounting: mounting.as_ref().map(Into::into),
@@ -700,7 +704,7 @@ impl<'a> RecordedDrive<'a> {
 
 /// Faults of axes, units or heights between a solution and a reference. Its clock and point are for `judge`.
 fn reference_faults(solution: &Solution, reference: &Reference) -> Vec<SetupFault> {
-    let row = |row: &Row| StatedRow {
+    let row = |row: &SolutionRow| StatedRow {
         t_s: row.t_s,
         state: row.state,
         has: [true; 2],
@@ -720,7 +724,7 @@ const NOT_MOUNTED: &str = "give --mounting ROLL,PITCH,YAW, or minutes of driving
 impl RecordedDrive<'_> {
     /// Brings fixes to the clock of the IMU where the two have nothing in common and no delay is given; by how much (s).
     fn common_origin(&mut self) -> Result<Option<f64>> {
-        let recorded = Recorded {
+        let recorded = DriveData {
             imu: &self.imu,
             gnss: &self.gnss,
             aids: &[],
@@ -744,7 +748,7 @@ impl RecordedDrive<'_> {
     }
 
     /// Refuses a wheel of another time or unit.
-    fn check_wheel(&self, recorded: &Recorded<'_>, outages: &[Outage]) -> Result<()> {
+    fn check_wheel(&self, recorded: &DriveData<'_>, outages: &[Outage]) -> Result<()> {
         /// Tyres and speeds by noisy positions differ by less, units by more.
         const RATIO: Range<f64> = 0.6..1.55;
         let span = self.imu.first().zip(self.imu.last());
@@ -768,18 +772,18 @@ impl RecordedDrive<'_> {
 
 /// Input of the search for the cause of large innovations.
 struct CauseSearch<'a> {
-    belief: &'a Belief,
+    filter_model: &'a FilterModel,
     start: &'a Start,
-    settings: &'a Settings,
+    settings: &'a FusionSettings,
     /// True if the start was given.
     is_given: bool,
 }
 
 impl CauseSearch<'_> {
     /// Cause of innovations that are large or last: the clocks, else the antenna or a small delay.
-    fn cause(&self, recorded: &Recorded<'_>) -> Option<InnovationCause> {
+    fn cause(&self, recorded: &DriveData<'_>) -> Option<InnovationCause> {
         let small = || {
-            displaced(recorded, self.belief, self.start, self.settings)
+            antenna_offset(recorded, self.filter_model, self.start, self.settings)
                 .map(InnovationCause::Displaced)
         };
         self.clocks(recorded)
@@ -789,13 +793,13 @@ impl CauseSearch<'_> {
 
     /// Clocks that are apart, where the innovations are smaller when they are not: the course of what walks or slips has
     /// other turns than its body.
-    fn clocks(&self, recorded: &Recorded<'_>) -> Option<ClocksApart> {
+    fn clocks(&self, recorded: &DriveData<'_>) -> Option<ClocksApart> {
         // turns of the course tell it to tenths of a second, the innovations tell the rest
         let clocks = clocks_apart(recorded, |there| {
-            displaced(there, self.belief, &self.start(there)?, self.settings)?.delay_s
+            antenna_offset(there, self.filter_model, &self.start(there)?, self.settings)?.delay_s
         })?;
         let gnss = earlier(recorded.gnss, clocks.delay_s);
-        let without = self.nis(&Recorded {
+        let without = self.nis(&DriveData {
             gnss: &gnss,
             ..*recorded
         })?;
@@ -805,12 +809,12 @@ impl CauseSearch<'_> {
     }
 
     /// Mean NIS per component with a start of its own.
-    fn nis(&self, recorded: &Recorded<'_>) -> Option<f64> {
+    fn nis(&self, recorded: &DriveData<'_>) -> Option<f64> {
         Some(
             outcome(
                 &fuse(
                     recorded,
-                    self.belief,
+                    self.filter_model,
                     &self.start(recorded)?,
                     self.settings,
                     None,
@@ -823,11 +827,11 @@ impl CauseSearch<'_> {
         .filter(|nis| nis.is_finite())
     }
 
-    fn start(&self, recorded: &Recorded<'_>) -> Option<Start> {
+    fn start(&self, recorded: &DriveData<'_>) -> Option<Start> {
         if self.is_given {
             Some(self.start.clone())
         } else {
-            coarse(recorded, self.settings, self.belief)
+            coarse(recorded, self.settings, self.filter_model)
                 .ok()
                 .map(|a| a.start)
         }
@@ -849,7 +853,7 @@ impl InnovationCause {
 }
 
 /// A start that states the attitude of the vehicle: that of the IMU is known no better than the mounting.
-fn beside_mounting(mut start: Start, settings: &Settings) -> Start {
+fn beside_mounting(mut start: Start, settings: &FusionSettings) -> Start {
     for (sigma, mounting) in start
         .sigma
         .att_sigma_deg
@@ -880,16 +884,17 @@ fn doubt_heading(solution: &Solution, outages: &[Outage]) -> Option<String> {
 ///
 /// # Errors
 /// When the model cannot be converted to the rate, or has no such filter.
-fn belief(
+fn filter_model(
     (model, states, initial): (&Model, FilterStates, &InitialSettings),
     rate_hz: f64,
     gnss: &[GnssFix],
     lengths: &[f64],
-) -> Result<(Belief, Option<ReductionQuality>)> {
+) -> Result<(FilterModel, Option<ReductionQuality>)> {
     let model = at_rate(model, rate_hz).refuse_within("the model")?;
     let interval_s = interval_s(gnss).unwrap_or(1.0);
     let window_s = reduction::window_s(lengths.iter().copied().fold(0.0, f64::max));
-    let belief = Belief::new(&model, states, interval_s, window_s).refuse_within("the model")?;
+    let filter_model =
+        FilterModel::new(&model, states, interval_s, window_s).refuse_within("the model")?;
     let drive = || {
         lincov::drive(
             &model,
@@ -899,21 +904,22 @@ fn belief(
         )
     };
     let Some(track) = states.is_reduced().then(drive).flatten() else {
-        return Ok((belief.with_initial(initial), None));
+        return Ok((filter_model.with_initial(initial), None));
     };
-    let belief = lincov::reduced_belief(&model, belief, &track, lincov::AxisGrouping::All)
-        .with_initial(initial);
-    let full = Belief::new(&model, FilterStates::Full, interval_s, window_s);
+    let filter_model =
+        lincov::reduced_belief(&model, filter_model, &track, lincov::AxisGrouping::All)
+            .with_initial(initial);
+    let full = FilterModel::new(&model, FilterStates::Full, interval_s, window_s);
     let full = full
         .ok()
         .map(|full| full.with_initial(&beside(states, initial)));
-    let made = (&model, &belief, full.as_ref());
+    let made = (&model, &filter_model, full.as_ref());
     let quality = reduction_of(
         made,
         &lincov::FilterPass::new(&track, made.1),
         &Context::default(),
     );
-    Ok((belief, quality))
+    Ok((filter_model, quality))
 }
 
 /// Uncertainties that the filter expects beside the model, including the scale factors of its
@@ -953,7 +959,7 @@ fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, Refused> {
         Composite::new(
             axis.processes
                 .iter()
-                .filter(|p| p.kind() != Kind::Quantization)
+                .filter(|p| p.kind() != ProcessKind::Quantization)
                 .copied()
                 .collect(),
         )
@@ -1018,10 +1024,10 @@ pub struct FuseSummary {
     pub vehicle: Option<Value>,
     /// White noise of the recording that is used instead of the model's.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub imu_noise: Vec<OwnNoise>,
+    pub imu_noise: Vec<ExcessWhiteNoise>,
     /// Errors at the ends of windows that were withheld in a second run; none where outages were requested.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub withheld: Option<Withheld>,
+    pub withheld: Option<WithheldWindows>,
     /// Fixes, NIS, errors at the ends of outages and against the reference.
     #[serde(flatten)]
     pub outcome: FusionFigures,
@@ -1046,7 +1052,7 @@ pub enum InnovationCause {
     /// The clocks of IMU and GNSS differ.
     Clocks(ClocksApart),
     /// The antenna is elsewhere, or the fixes are a little late.
-    Displaced(Displaced),
+    Displaced(AntennaOffset),
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -1279,7 +1285,7 @@ pub(super) fn table(columns: &[Columns], rows: impl Iterator<Item = Vec<f64>>) -
 
 /// `solution.csv` and `smoothed.csv`: states, their standard deviations (those of latitude and longitude in degrees), bias
 /// estimates, the horizontal standard deviations in metres, and those of the biases.
-fn solution_csv(rows: &[Row]) -> String {
+fn solution_csv(rows: &[SolutionRow]) -> String {
     const COLUMNS: [Columns; 10] = [
         TIME,
         ("", STATE.split_at(2).0, Some(10)),
@@ -1292,7 +1298,7 @@ fn solution_csv(rows: &[Row]) -> String {
         ("sd_", &["n_m", "e_m"], Some(6)),
         ("sd_", &BIAS_NAMES, Some(9)),
     ];
-    let row = |row: &Row| {
+    let row = |row: &SolutionRow| {
         let (NavState { lat, h, .. }, sd) = (row.state, &row.sigma);
         let r = radii(lat.sin());
         let sd_lat = sd[0] / (r.meridian + h) / DEG;
@@ -1334,18 +1340,19 @@ fn innovations_csv(solution: &Solution) -> String {
     table(&COLUMNS, solution.fixes.iter().map(row))
 }
 
-fn errors_csv(rows: &[Row]) -> String {
+fn errors_csv(rows: &[SolutionRow]) -> String {
     const COLUMNS: [Columns; 3] = [
         TIME,
         ("err_", &REPORTED_NAMES, Some(6)),
         ("", &["nees"], Some(4)),
     ];
-    let row = |row: &Row| Some([&[row.t_s], &row.error?.values[..], &[row.error?.nees]].concat());
+    let row =
+        |row: &SolutionRow| Some([&[row.t_s], &row.error?.values[..], &[row.error?.nees]].concat());
     table(&COLUMNS, rows.iter().filter_map(row))
 }
 
 /// The way as a line on the map, a point a second at most.
-fn kml(rows: &[Row], name: &str) -> String {
+fn kml(rows: &[SolutionRow], name: &str) -> String {
     let mut line = String::new();
     let mut last = f64::NEG_INFINITY;
     for (k, row) in rows.iter().enumerate() {

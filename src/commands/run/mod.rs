@@ -2,7 +2,7 @@
 
 use crate::app::inputs::{self, FilterArgs, SettingsArgs};
 use crate::app::{
-    Answer, Command, Context, Failure, Input, Out, OutputFile, Refuse, Result, refused,
+    Answer, Command, Context, Failure, Input, IntoFailure, OutputFile, OutputKind, Result, refused,
 };
 use crate::io::draws_file::{self, Draws};
 use crate::io::model_file::ModelFile;
@@ -13,9 +13,9 @@ use crate::report::verdict::requirement_line;
 use crate::report::{integration_line, json, reduction_doubt, reduction_line, trajectory};
 use nav_sim_calibration::derived_interval;
 use nav_sim_document::Document;
-use nav_sim_navigation::ekf::{Belief, FilterStates};
+use nav_sim_navigation::ekf::{FilterModel, FilterStates};
 use nav_sim_navigation::metrics::{
-    Budget, EpochMetrics, Expected, OutageSummary, PerState, ReductionQuality, Requirement,
+    Budget, EpochMetrics, ExpectedRun, OutageSummary, PerState, ReductionQuality, Requirement,
     Summary, epochs, horizontal_quantiles,
 };
 use nav_sim_navigation::monte_carlo;
@@ -23,7 +23,7 @@ use nav_sim_navigation::scenario::{FilterSettings, Method, RunSettings, Scenario
 use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
-    FilterPass, Instant, Track, TruthSide, assess, strapdown_over_sigma, weak_heading,
+    FilterPass, Instant, Track, TruthModel, assess, strapdown_over_sigma, weak_heading,
 };
 use nav_sim_navigation::simulation::{Experiment, Gains, Plan, REPORTED, RunResult};
 use nav_sim_navigation::trajectory::Trajectory;
@@ -124,14 +124,14 @@ pub(crate) const RUN_FILES: [&str; 3] = ["epochs.csv", "runs.csv", "summary.json
 impl Command for Run {
     type Answer = RunAnswer;
     const NAME: &'static str = "run";
-    const OUT: Out = Out::Directory {
+    const OUT: OutputKind = OutputKind::Directory {
         path: "out/run",
         files: &RUN_FILES,
     };
     const JUDGES: &'static [&'static str] = &["require"];
 
     fn run(&self, context: &Context<'_>) -> Result<RunAnswer> {
-        self.prepare(&Shared::default(), context)?
+        self.prepare(&TrackCache::default(), context)?
             .navigate(None, context)
     }
 }
@@ -151,7 +151,7 @@ pub(crate) struct PreparedRun<'a> {
 struct FilterTracks {
     track: Track,
     merged: Track,
-    belief: Belief,
+    filter_model: FilterModel,
 }
 
 /// A track without outages, and the same with one step from mark to mark; made where it is needed first.
@@ -159,7 +159,7 @@ type SharedTrack = Arc<OnceLock<[Track; 2]>>;
 
 /// Trajectories and tracks without outages, made once for many runs.
 #[derive(Default)]
-pub(crate) struct Shared {
+pub(crate) struct TrackCache {
     trajectories: Mutex<HashMap<PathBuf, Trajectory>>,
     tracks: Mutex<Vec<(PathBuf, Scenario, SharedTrack)>>,
 }
@@ -167,7 +167,7 @@ pub(crate) struct Shared {
 /// Tracks that are kept at most: a study may vary what they depend on.
 const TRACKS: usize = 4;
 
-impl Shared {
+impl TrackCache {
     fn trajectory(&self, path: &Path, context: &Context<'_>) -> Result<Trajectory> {
         let mut known = lock(&self.trajectories);
         if let Some(trajectory) = known.get(path) {
@@ -213,7 +213,7 @@ impl Run {
     /// Reads the files and places the outages.
     pub(crate) fn prepare(
         &self,
-        shared: &Shared,
+        shared: &TrackCache,
         context: &Context<'_>,
     ) -> Result<PreparedRun<'_>> {
         let mut scenario = self.scenario()?;
@@ -299,7 +299,7 @@ impl Run {
     fn read(
         &self,
         scenario: &mut Scenario,
-        shared: &Shared,
+        shared: &TrackCache,
         context: &Context<'_>,
     ) -> Result<(NavigateInputs, ModelFile, ModelFile)> {
         let imu_hz = scenario.imu.rate_hz;
@@ -381,13 +381,15 @@ pub(crate) fn columns(
         context.advance(count * runs.len() as u64);
         return Ok(Some(runs.iter().map(|_| None).collect()));
     };
-    let beliefs = runs.iter().map(|run| Ok(run.filter()?.belief.clone()));
-    let (beliefs, outages) = (beliefs.collect::<Result<Vec<_>>>()?, one.outages());
+    let filter_models = runs
+        .iter()
+        .map(|run| Ok(run.filter()?.filter_model.clone()));
+    let (filter_models, outages) = (filter_models.collect::<Result<Vec<_>>>()?, one.outages());
     let inputs = &one.inputs;
     let experiment = one.origin.configuration.experiment(
         &inputs.trajectory,
         inputs.truth(),
-        &beliefs,
+        &filter_models,
         &outages,
         one.seed,
     );
@@ -438,18 +440,20 @@ impl PreparedRun<'_> {
         }
         let [track, merged] = self.track.get().expect("exists");
         let track = track.with_outages(&outages);
-        let belief = scenario.belief(model, &outages, &track).map_err(|e| {
-            inputs::no_filter(
-                &e,
-                &request.model,
-                file.gnss.as_deref().or(file.scenario.as_deref()),
-                "raise it, or use --filter full, which reduces nothing",
-            )
-        })?;
+        let filter_model = scenario
+            .filter_model(model, &outages, &track)
+            .map_err(|e| {
+                inputs::no_filter(
+                    &e,
+                    &request.model,
+                    file.gnss.as_deref().or(file.scenario.as_deref()),
+                    "raise it, or use --filter full, which reduces nothing",
+                )
+            })?;
         Ok(FilterTracks {
             track,
             merged: merged.with_outages(&outages),
-            belief,
+            filter_model,
         })
     }
 
@@ -526,7 +530,7 @@ impl Answer for RunAnswer {
         } = summary;
         if *diverged > 0 && diverged == runs {
             return Some(
-                Failure::could_not(format!("all {runs} runs diverged"))
+                Failure::failed(format!("all {runs} runs diverged"))
                     .hint("do the models fit the IMU, are [imu] and [initial] plausible?"),
             );
         }
@@ -610,7 +614,9 @@ pub fn navigate(
 ) -> Result<Navigation> {
     let track = scenario.track(&inputs.trajectory, &inputs.model, outages)?;
     let filter = FilterTracks {
-        belief: scenario.belief(&inputs.model, outages, &track).refuse()?,
+        filter_model: scenario
+            .filter_model(&inputs.model, outages, &track)
+            .refuse()?,
         merged: track.merged(),
         track,
     };
@@ -625,7 +631,7 @@ fn with_runs(
     FilterTracks {
         track,
         merged,
-        belief,
+        filter_model,
     }: &FilterTracks,
     seed: u64,
     runs: Option<RunResult>,
@@ -638,47 +644,47 @@ fn with_runs(
     }
     doubt(inputs, scenario, context);
     // Within 1e-3 the same in a quarter of the time: for what stands beside the figures.
-    let beside = FilterPass::new(merged, belief);
+    let beside = FilterPass::new(merged, filter_model);
     let full = |model: &Model| {
         scenario
             .with_full_noise()
-            .belief(model, outages, track)
+            .filter_model(model, outages, track)
             .ok()
     };
     let reduction = scenario.filter.states.is_reduced().then(|| {
         reduction_of(
-            (&inputs.model, belief, full(&inputs.model).as_ref()),
+            (&inputs.model, filter_model, full(&inputs.model).as_ref()),
             &beside,
             context,
         )
     });
     // Where the motion hardly shows the heading, no filter of this kind is to be believed.
-    context.warn_each(weak_heading(beside.yaw_while_measured().into_iter()));
+    context.warn_each(weak_heading(beside.yaw_sigma_at_updates().into_iter()));
     let experiment = scenario.experiment(
         &inputs.trajectory,
         inputs.truth(),
-        std::slice::from_ref(belief),
+        std::slice::from_ref(filter_model),
         outages,
         seed,
     );
     let analysis = Analysis {
         experiment: &experiment,
         track,
-        belief,
+        filter_model,
         model: inputs.truth_model(),
     };
     // beside runs that were requested alone it may be impossible
     let expected = possible.ok().and_then(|()| analysis.expected());
     if method != Method::MonteCarlo && expected.is_none() {
         return Err(
-            Failure::could_not("the covariance did not stay finite and positive definite")
+            Failure::failed("the covariance did not stay finite and positive definite")
                 .hint("do the models fit the IMU, are [imu] and [initial] plausible?"),
         );
     }
     let mut navigation = match (method, expected) {
         (
             Method::Lincov,
-            Some(Expected {
+            Some(ExpectedRun {
                 epochs, summary, ..
             }),
         ) => Navigation {
@@ -707,7 +713,7 @@ fn with_runs(
         }
     };
     navigation.summary.reduction = reduction.flatten();
-    let over_sigma = strapdown_over_sigma(track, belief);
+    let over_sigma = strapdown_over_sigma(track, filter_model);
     navigation.summary.strapdown_over_sigma = over_sigma;
     context.warn_each(integration_line(scenario.imu.rate_hz, over_sigma));
     analysis.add_budgets(&beside, &mut navigation.summary.outages);
@@ -797,15 +803,15 @@ fn sampled(
 struct Analysis<'a> {
     experiment: &'a Experiment<'a>,
     track: &'a Track,
-    belief: &'a Belief,
+    filter_model: &'a FilterModel,
     /// None: what makes the errors has no model.
     model: Option<&'a Model>,
 }
 
 impl Analysis<'_> {
     /// The expected figures; none where the covariance runs away or nothing models the errors.
-    fn expected(&self) -> Option<Expected> {
-        Expected::along(self.track, self.experiment, self.belief, self.model?)
+    fn expected(&self) -> Option<ExpectedRun> {
+        ExpectedRun::along(self.track, self.experiment, self.filter_model, self.model?)
     }
 
     /// Adds the uncertainty due to the calibrations to the figures at the ends of outages.
@@ -813,7 +819,7 @@ impl Analysis<'_> {
         &self,
         outages: &mut [OutageSummary],
         inputs: &NavigateInputs,
-        full: &(dyn Fn(&Model) -> Option<Belief> + Sync),
+        full: &(dyn Fn(&Model) -> Option<FilterModel> + Sync),
     ) {
         let truth_draws = match inputs.truth {
             TrueImu::AsBelieved => inputs.model_draws.as_ref(),
@@ -823,14 +829,14 @@ impl Analysis<'_> {
             self.errors(truth, draws, outages);
         }
         if let Some(draws) = &inputs.model_draws {
-            self.beliefs(&inputs.model, draws, full, outages);
+            self.filter_models(&inputs.model, draws, full, outages);
         }
     }
 
     /// Adds the error budget at the ends of outages.
     fn add_budgets(&self, filter: &FilterPass<'_>, outages: &mut [OutageSummary]) {
         let Some(model) = self.model else { return };
-        let sources = TruthSide::sources(self.experiment, model);
+        let sources = TruthModel::sources(self.experiment, model);
         let budgets = Budget::at_outage_ends(filter, &sources);
         for (outage, budget) in outages.iter_mut().zip(budgets) {
             outage.budget = Some(budget);
@@ -885,7 +891,7 @@ impl NavigateInputs {
 /// The quality of a filter of 15 states to which a model was reduced, the model taken for the truth: one covariance analysis of the
 /// reduced and of the full filter, if the model has one. None where nothing was lost.
 pub(crate) fn reduction_of(
-    (model, belief, full): (&Model, &Belief, Option<&Belief>),
+    (model, filter_model, full): (&Model, &FilterModel, Option<&FilterModel>),
     filter: &FilterPass<'_>,
     context: &Context<'_>,
 ) -> Option<ReductionQuality> {
@@ -893,7 +899,7 @@ pub(crate) fn reduction_of(
         return None;
     }
     let quality = ReductionQuality::of(
-        &filter.assess(belief, model),
+        &filter.assess(filter_model, model),
         full.map(|full| assess(filter.track(), full, model))
             .as_ref(),
     );
@@ -922,9 +928,9 @@ impl Analysis<'_> {
     /// Puts the intervals of RMSE and of the quantiles of the horizontal error into the outages.
     fn errors(&self, truth: &Model, draws: &Draws, outages: &mut [OutageSummary]) {
         let track = self.track.coarse();
-        let filter = FilterPass::new(&track, self.belief);
+        let filter = FilterPass::new(&track, self.filter_model);
         let figures = |model: &Model| -> Figures {
-            let truth = TruthSide::together(&TruthSide::sources(self.experiment, model));
+            let truth = TruthModel::together(&TruthModel::sources(self.experiment, model));
             let ends = filter.errors_at_ends(&truth);
             let figures =
                 |end: &Instant| [&end.rmse()[..], &horizontal_quantiles(end, QUANTILES)].concat();
@@ -946,19 +952,19 @@ impl Analysis<'_> {
 
     /// Puts the intervals of the ASEE into the outages; `full` makes the filter that knows a model. None are put where a
     /// model has no such filter.
-    fn beliefs(
+    fn filter_models(
         &self,
         model: &Model,
         draws: &Draws,
-        full: &(dyn Fn(&Model) -> Option<Belief> + Sync),
+        full: &(dyn Fn(&Model) -> Option<FilterModel> + Sync),
         outages: &mut [OutageSummary],
     ) {
         let track = self.track.merged();
         let figures = |model: &Model| -> Figures {
-            let Some(belief) = full(model) else {
+            let Some(filter_model) = full(model) else {
                 return Vec::new();
             };
-            let filter = FilterPass::new(&track, &belief);
+            let filter = FilterPass::new(&track, &filter_model);
             filter
                 .sigma_at_ends()
                 .iter()

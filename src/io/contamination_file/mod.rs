@@ -97,7 +97,7 @@ fn parse(source: &TomlSource, rate_hz: f64) -> Result<Contamination, Failure> {
                 // what replaces samples may have no spread
                 let is_size = match name.as_str() {
                     "amplitude" | "share" | "sigma2" => true,
-                    "sigma" => matches!(table.operation, Described::HeavyTails { .. }),
+                    "sigma" => matches!(table.operation, OperationTable::HeavyTails { .. }),
                     _ => false,
                 };
                 let is_zero = |value: &toml::Value| {
@@ -140,13 +140,13 @@ fn parse(source: &TomlSource, rate_hz: f64) -> Result<Contamination, Failure> {
 fn operation(
     source: &TomlSource,
     key: &str,
-    described: &Described,
+    described: &OperationTable,
     i: usize,
     rate_hz: f64,
 ) -> Result<Operation, Failure> {
     let refused = |name: &str, reason: String| source.refused(&format!("{key}.{name}"), reason);
     Ok(match described {
-        Described::Step {
+        OperationTable::Step {
             amplitude,
             at_share,
             at_s,
@@ -161,10 +161,10 @@ fn operation(
                 amplitude: amplitude.of(i),
             }
         }
-        Described::Drift { amplitude } => Operation::Drift {
+        OperationTable::Drift { amplitude } => Operation::Drift {
             amplitude: amplitude.of(i),
         },
-        Described::Replace {
+        OperationTable::Replace {
             share,
             length_samples,
             sigma,
@@ -175,7 +175,7 @@ fn operation(
             mean: mean.as_ref().map(|mean| mean.of(i)),
             sigma: sigma.of(i),
         },
-        Described::Bursts {
+        OperationTable::Bursts {
             count,
             length_samples,
             spacing_samples,
@@ -195,15 +195,15 @@ fn operation(
                 frequency_hz: frequency_hz.as_ref().map_or(5.0, |hz| hz.of(i)),
             }
         }
-        Described::Ar1 { phi, sigma2 } => {
+        OperationTable::Ar1 { phi, sigma2 } => {
             let made = Process::ar1(phi.of(i), sigma2.of(i));
             Operation::Ar1(made.map_err(|e| refused(e.parameter, format!("is not {}", e.domain)))?)
         }
-        Described::HeavyTails { freedom, sigma } => Operation::HeavyTails {
+        OperationTable::HeavyTails { freedom, sigma } => Operation::HeavyTails {
             freedom: freedom.of(i),
             sigma: sigma.of(i),
         },
-        Described::Scale {
+        OperationTable::Scale {
             process,
             parameter,
             factor,
@@ -394,13 +394,13 @@ struct RuleTable {
     #[schemars(length(min = 1))]
     replicates: Option<Vec<NonZero<u64>>>,
     #[serde(flatten)]
-    operation: Described,
+    operation: OperationTable,
 }
 
 /// The operations of files, each with its keys.
 #[derive(Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", tag = "operation")]
-enum Described {
+enum OperationTable {
     /// A jump of the mean
     Step {
         /// Height of the step (units of the signal)

@@ -564,12 +564,12 @@ const GRADES: [(&str, &str, &str); 4] = [
 
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct File {
+struct DatasheetFile {
     unit: FigureUnit,
     #[serde(default)]
-    accel: BTreeMap<String, Given>,
+    accel: BTreeMap<String, StatedFigure>,
     #[serde(default)]
-    gyro: BTreeMap<String, Given>,
+    gyro: BTreeMap<String, StatedFigure>,
 }
 
 #[derive(Deserialize, JsonSchema)]
@@ -584,7 +584,7 @@ struct FigureUnit {
 
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Given {
+struct StatedFigure {
     value: String,
     source: String,
     quote: Option<String>,
@@ -608,7 +608,7 @@ pub fn catalogued(name: &str) -> Option<Result<Datasheet, Failure>> {
 }
 
 pub(super) fn parse(source: &TomlSource) -> Result<Datasheet, Failure> {
-    let file: File = source.get()?;
+    let file: DatasheetFile = source.get()?;
     let mut entries = Vec::new();
     for (sensor, table) in [(Sensor::Accel, file.accel), (Sensor::Gyro, file.gyro)] {
         for (key, given) in table {
@@ -648,7 +648,7 @@ fn entry(
     source: &TomlSource,
     sensor: Sensor,
     key: &str,
-    given: Given,
+    given: StatedFigure,
 ) -> Result<DatasheetEntry, Failure> {
     let path = format!("{}.{key}", sensor.name());
     let Ok(figure) = key.parse::<Figure>() else {

@@ -249,7 +249,7 @@ fn figures_of_imu_utils_are_those_of_a_sample_and_the_lowest() {
     assert_eq!(sheet.value(Sensor::Gyro, Figure::Noise), Some(2e-3 / 20.0));
     let model = sheet.model_file(400.0).unwrap().file.model;
     assert_eq!(
-        model.axes[3].amplitude_of(nav_sim_signal::noise::Kind::White),
+        model.axes[3].amplitude_of(nav_sim_signal::noise::ProcessKind::White),
         2e-3 * 2e-3
     );
     for (axis, floor, density) in [(0, 4e-4, 1e-3), (3, 3e-5, 1e-4)] {

@@ -6,7 +6,7 @@ use super::logs::LogOptions;
 use super::recordings::timing::{UNITS, median_step, unit_of_step};
 use super::recordings::{OF_CLOCK, OF_RECEIVER, ReadOptions, STAMP, check_gravity, gravity_factor};
 use super::table::{
-    Column, DefaultUnit, Dictionary, LATITUDE, LONGITUDE, NONE, Quantity, SPEED, Table,
+    Column, DefaultUnit, Dictionary, InputTable, LATITUDE, LONGITUDE, NONE, Quantity, SPEED,
 };
 use super::toml_file::TomlSource;
 use super::{Failure, Failure as Error, Place, help, logs, recordings, source, table};
@@ -65,7 +65,7 @@ pub(super) fn bare_row(text: &str) -> Option<(Vec<f64>, u8)> {
 }
 
 /// Refuses fixes whose times are seconds by their name and thousandths or less by their steps, over as long as the IMU has.
-fn check_unit(table: &Table, imu_s: Option<(f64, f64)>) -> Result<(), Failure> {
+fn check_unit(table: &InputTable, imu_s: Option<(f64, f64)>) -> Result<(), Failure> {
     /// A step between fixes (s) that is no longer one.
     const LONG_S: f64 = 20.0;
     let (Some(time), Some((from_s, to_s))) = (table.get("t_s"), imu_s) else {
@@ -87,7 +87,7 @@ fn check_unit(table: &Table, imu_s: Option<(f64, f64)>) -> Result<(), Failure> {
 }
 
 /// The refusal of times in another unit than their name says.
-fn no_seconds(table: &Table, time: &Column, step: f64, unit: &str) -> Failure {
+fn no_seconds(table: &InputTable, time: &Column, step: f64, unit: &str) -> Failure {
     let name = &time.name;
     let text = format!("column \"{name}\" has steps of {step} s: they are {unit}");
     let ending = unit.replace('µ', "u");
@@ -212,7 +212,7 @@ type Fixes = (Vec<Stated>, Vec<Note>);
 /// The fixes of the rows of a table. Position and its deviations are needed; velocity and its deviations come together or not
 /// at all. `unsaid` are the standard deviations where the file states none.
 fn of_rows(
-    table: &Table,
+    table: &InputTable,
     unsaid: Option<&FixSigma>,
     mut remarks: Vec<Note>,
 ) -> Result<Fixes, Error> {
@@ -605,7 +605,7 @@ const ZONES: [(&str, Option<f64>); 3] =
     [("GPST", None), ("UTC", Some(0.0)), ("JST", Some(32_400.0))];
 
 /// The rows of a solution, their times in seconds since GPS weeks are counted.
-fn rtklib(path: &str, text: &str, (at, names): (usize, &str)) -> Result<Table, Error> {
+fn rtklib(path: &str, text: &str, (at, names): (usize, &str)) -> Result<InputTable, Error> {
     let refuse = |line: usize, message: &str, advice: &'static str| {
         Error::contents(path, line + 1, message).or_hint(advice)
     };

@@ -54,8 +54,8 @@ pub(crate) fn is_nmea(text: &str) -> bool {
 
 impl NmeaLog {
     /// A sentence, whatever a logger wrote before it in its line.
-    fn sentence(&mut self, line: u64, text: &str, is_summed: bool) -> Result<(), &'static str> {
-        let fields = fields(text, is_summed)?;
+    fn sentence(&mut self, line: u64, text: &str, has_checksums: bool) -> Result<(), &'static str> {
+        let fields = fields(text, has_checksums)?;
         let field = |i: usize| fields.get(i).copied().unwrap_or_default();
         let number = |i: usize| field(i).parse::<f64>().ok();
         let kind = field(0).get(2..).unwrap_or_default();
@@ -122,7 +122,7 @@ impl NmeaLog {
     }
 }
 
-/// Fixes of a log, and its notes. `unsaid`: standard deviations where `GST` states none; `imu_s` is when the IMU
+/// Fixes of a log, and its notes. `default_sigma`: standard deviations where `GST` states none; `imu_s` is when the IMU
 /// begins and ends.
 ///
 /// # Errors
@@ -130,17 +130,17 @@ impl NmeaLog {
 pub(super) fn fixes(
     path: &str,
     text: &str,
-    unsaid: Option<&FixSigma>,
+    default_sigma: Option<&FixSigma>,
     imu_s: Option<(f64, f64)>,
 ) -> Result<Fixes, Error> {
     let mut log = NmeaLog::default();
     let lines = (1..).zip(text.lines().map(str::trim));
     let lines: Vec<(u64, &str)> = lines.filter(|(_, line)| !line.is_empty()).collect();
-    let is_summed = lines.iter().any(|(_, line)| line.contains('*'));
+    let has_checksums = lines.iter().any(|(_, line)| line.contains('*'));
     let ends = [lines.first(), lines.last()].map(|end| end.map(|(i, _)| *i));
     for (i, line) in lines {
         // cut at its ends by whatever logged it
-        if let Err(message) = log.sentence(i, line, is_summed)
+        if let Err(message) = log.sentence(i, line, has_checksums)
             && !ends.contains(&Some(i))
         {
             let found: String = line.chars().take(60).collect();
@@ -150,7 +150,7 @@ pub(super) fn fixes(
     }
     let day = || (0.0, "seconds of the day (UTC)".to_owned());
     let (origin_s, clock) = log.clock(imu_s).unwrap_or_else(day);
-    let vel_sigma = unsaid.and_then(|s| s.vel_m_s);
+    let vel_sigma = default_sigma.and_then(|s| s.vel_m_s);
     let fix = |epoch: &Epoch| {
         let (v, sigma) = epoch
             .velocity
@@ -172,7 +172,7 @@ pub(super) fn fixes(
     }
     let text = format!("NMEA sentences: {count} fixes, times are {clock}");
     let mut remarks = vec![remark(text)];
-    if !is_summed {
+    if !has_checksums {
         let text = "no sentence has a checksum: damaged digits are undetected";
         remarks.push(doubt(text));
     }
@@ -198,8 +198,8 @@ fn body(line: &str) -> Result<&str, &'static str> {
 }
 
 /// Fields of a sentence after checking its checksum (XOR of the bytes between `$` and `*`), unless the log has none.
-fn fields(line: &str, is_summed: bool) -> Result<Vec<&str>, &'static str> {
-    if !is_summed {
+fn fields(line: &str, has_checksums: bool) -> Result<Vec<&str>, &'static str> {
+    if !has_checksums {
         return Ok(body(line)?.split(',').collect());
     }
     let whole = body(line)?.rsplit_once('*');

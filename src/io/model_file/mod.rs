@@ -26,7 +26,9 @@ use crate::report::readable;
 use nav_sim_calibration::duration;
 use nav_sim_navigation::sensors::defects::{MAX_BIAS_M_S2, MAX_BIAS_RAD_S};
 use nav_sim_signal::imu::{Axis, Channel, MAX_RATE_HZ, Sensor};
-use nav_sim_signal::noise::{Composite, Kind, Law, Model, Parameter, Process, Spread, Variation};
+use nav_sim_signal::noise::{
+    Composite, Model, Parameter, ParameterDistribution, Process, ProcessKind, Spread, Variation,
+};
 use nav_sim_signal::units::{Between, NonNegative, Positive, Stationary};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
@@ -69,8 +71,9 @@ fn unusual_times(model: &Model) -> impl Iterator<Item = String> {
     let rate_hz = model.rate_hz;
     let rate = (!USUAL_RATES_HZ.contains(&rate_hz))
         .then(|| format!("rate_hz = {rate_hz} is an unusual IMU rate"));
-    let is_short =
-        |process: &&Process| process.kind() == Kind::GaussMarkov && process.shape() > rate_hz;
+    let is_short = |process: &&Process| {
+        process.kind() == ProcessKind::GaussMarkov && process.shape() > rate_hz
+    };
     let mut processes = model.axes.iter().flat_map(|axis| &axis.processes);
     let short = processes.find(is_short).map(|process| {
         let beta = process.shape();
@@ -284,7 +287,7 @@ impl JsonSchema for ProcessTable {
     }
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let mut kind = |kind: Kind| {
+        let mut kind = |kind: ProcessKind| {
             let mut properties = Map::new();
             let code = json!({ "type": "string", "const": kind.code() });
             properties.insert("type".to_owned(), code);
@@ -330,7 +333,7 @@ impl JsonSchema for ProcessTable {
                 "additionalProperties": false,
             })
         };
-        json_schema!({ "oneOf": Kind::ALL.map(&mut kind) })
+        json_schema!({ "oneOf": ProcessKind::ALL.map(&mut kind) })
     }
 }
 
@@ -371,7 +374,7 @@ struct LawTable {
     process: String,
     parameter: String,
     #[serde(flatten)]
-    distribution: Law,
+    distribution: ParameterDistribution,
 }
 
 /// The JSON schema of a model file, for editors and checkers.
@@ -638,7 +641,7 @@ fn read_process(
     rate_hz: f64,
 ) -> Result<Process, Failure> {
     let code = values["type"].as_str().unwrap_or_default();
-    let kind = Kind::named(code).expect("codes");
+    let kind = ProcessKind::named(code).expect("codes");
     let names = kind.parameters().iter().map(|p| p.name());
     let values: Vec<f64> = names.clone().map(|name| number(&values[name])).collect();
     if let Some((name, _)) = names.zip(&values).find(|(_, value)| value.abs() > LARGEST) {

@@ -4,7 +4,7 @@ use crate::io::tests::{answers, told};
 use crate::io::toml_file::TomlSource;
 use approx::assert_abs_diff_eq;
 use nav_sim_signal::imu::{Axis, Sensor};
-use nav_sim_signal::noise::{Composite, Law, Process, Variation};
+use nav_sim_signal::noise::{Composite, ParameterDistribution, Process, Variation};
 
 const ACCEL_X: Channel = Channel {
     sensor: Sensor::Accel,
@@ -25,7 +25,7 @@ fn turn_on_text(turn_on: &str) -> String {
 }
 
 fn process(code: &str, values: &[f64]) -> Process {
-    Process::of_values(Kind::named(code).unwrap(), values, 100.0).unwrap()
+    Process::of_values(ProcessKind::named(code).unwrap(), values, 100.0).unwrap()
 }
 
 fn n2() -> Composite {
@@ -60,23 +60,29 @@ fn what_is_written_reads_back_to_the_same_bits() {
         low: 0.999,
         high: 1.0,
     });
-    let beta = Law::Beta {
+    let beta = ParameterDistribution::Beta {
         a: 6.0,
         b: 2.0,
         low: 0.98,
         width: 1e-3,
     };
     let pooled = Variation::new(&n2(), "AR1_1", "phi", beta).unwrap();
-    let normal = Variation::new(&n2(), "WN", "sigma2", Law::Normal { sd: 1e-7 }).unwrap();
+    let normal = Variation::new(
+        &n2(),
+        "WN",
+        "sigma2",
+        ParameterDistribution::Normal { sd: 1e-7 },
+    )
+    .unwrap();
     let mut spread = Spread::default();
-    let lognormal = Law::Lognormal {
+    let lognormal = ParameterDistribution::Lognormal {
         median: 0.9999,
         sd: 0.45,
         median_ci95: Some([0.9998, 0.99995]),
         sd_ci95: Some([0.1 + 0.2, 0.7]),
     };
     let lognormal = Variation::new(&n2(), "AR1_2", "phi", lognormal).unwrap();
-    let plain = Law::Lognormal {
+    let plain = ParameterDistribution::Lognormal {
         median: 2e-11,
         sd: 0.0,
         median_ci95: None,

@@ -2,14 +2,14 @@
 //! where it makes a noise model worthless. The tests are those of [`nav_sim_signal::facts`].
 
 use super::{Channel, DICTIONARY, FileReport, Gaps, ReadOptions, SIX, channel_of, timing};
-use crate::io::table::{Column, Table, find, normalised};
+use crate::io::table::{Column, InputTable, find, normalised};
 use crate::io::{Failure, Place, help};
 use crate::report::{readable, six_digits};
 use nav_sim_calibration::percent;
 use nav_sim_document::counted;
-use nav_sim_signal::facts::{self, Marks, RepeatedRows};
+use nav_sim_signal::facts::{self, RepeatedRows, SampleFingerprint};
 use nav_sim_signal::imu::{Recording, Sensor, Signal};
-use nav_sim_signal::noise::{Composite, Kind, Model, Process};
+use nav_sim_signal::noise::{Composite, Model, Process, ProcessKind};
 use nav_sim_signal::units::{DEG, STANDARD_GRAVITY};
 use std::fmt::Display;
 use std::ops::Range;
@@ -19,7 +19,7 @@ const MOST_REPEATED: f64 = 0.1;
 /// Seconds in motion from which on a recording is not static.
 const MOST_MOVING: f64 = 0.5;
 
-fn axes(table: &Table, is: impl Fn(Channel) -> bool) -> Vec<&[f64]> {
+fn axes(table: &InputTable, is: impl Fn(Channel) -> bool) -> Vec<&[f64]> {
     let own = |c: &&Column| channel_of(c).is_some_and(&is);
     table
         .columns
@@ -45,7 +45,7 @@ pub(super) struct Repair {
 }
 
 /// Leaves out rows that are copies.
-pub(crate) fn drop_copies(table: &mut Table) -> Option<String> {
+pub(crate) fn drop_copies(table: &mut InputTable) -> Option<String> {
     let stamps = table.get("t_s").or_else(|| table.get("counter"))?;
     let copies = facts::copies(&stamps.values, &axes(table, |_| true));
     leave_out(table, &copies);
@@ -54,7 +54,7 @@ pub(crate) fn drop_copies(table: &mut Table) -> Option<String> {
     (count > 0).then(|| format!("{rows} left out: copies of the row before, stamp and values"))
 }
 
-fn leave_out(table: &mut Table, rows: &[usize]) {
+fn leave_out(table: &mut InputTable, rows: &[usize]) {
     if !rows.is_empty() {
         let mut out = rows.iter().peekable();
         let kept = (0..table.rows()).filter(|row| out.next_if_eq(&row).is_none());
@@ -64,7 +64,7 @@ fn leave_out(table: &mut Table, rows: &[usize]) {
 }
 
 /// Rows that are zero for lost samples, and a warning of them.
-fn lost(table: &Table) -> (Vec<usize>, Option<String>) {
+fn lost(table: &InputTable) -> (Vec<usize>, Option<String>) {
     let accel = axes(table, |channel| channel.sensor == Sensor::Accel);
     let rows = facts::zero_rows(&axes(table, |_| true), &accel);
     let (count, share) = (rows.len(), percent(rows.len() as f64 / table.rows() as f64));
@@ -122,12 +122,12 @@ pub fn doubts(name: &str, signal: &[f64]) -> Vec<String> {
 }
 
 /// The signals of a table, by channel.
-fn signals(table: &Table) -> impl Iterator<Item = (Channel, &[f64])> {
+fn signals(table: &InputTable) -> impl Iterator<Item = (Channel, &[f64])> {
     let columns = table.columns.iter();
     columns.filter_map(|column| Some((channel_of(column)?, &column.values[..])))
 }
 
-fn repeats_of(table: &Table) -> Vec<(Sensor, Option<RepeatedRows>)> {
+fn repeats_of(table: &InputTable) -> Vec<(Sensor, Option<RepeatedRows>)> {
     let of = |sensor| {
         let own = axes(table, |channel| channel.sensor == sensor);
         (!own.is_empty()).then(|| (sensor, facts::repeats(&own)))
@@ -153,7 +153,7 @@ fn repeated(name: impl Display, repeats: &RepeatedRows, rate_hz: f64) -> String 
 /// # Errors
 /// When the rows make a noise model worthless.
 pub(super) fn repair(
-    table: &mut Table,
+    table: &mut InputTable,
     options: &ReadOptions,
     report: &mut FileReport,
 ) -> Result<Repair, Failure> {
@@ -173,7 +173,7 @@ pub(super) fn repair(
         .missing
         .extend(zero.iter().map(|row| (None, *row..row + 1)));
     repair.apply(table, options.gaps);
-    repair.own_rate(table, options, report)?;
+    repair.resample_held_rows(table, options, report)?;
     for (channel, values) in signals(table) {
         for rows in facts::frozen(values) {
             repair.missing.push((Some(channel), rows.clone()));
@@ -195,7 +195,7 @@ pub(super) fn repair(
     Ok(repair)
 }
 
-fn missing(table: &Table, row: usize, text: &str) -> Failure {
+fn missing(table: &InputTable, row: usize, text: &str) -> Failure {
     Failure::contents(&table.path, table.line(row), text)
         .or_option(help::GAPS)
         .or_hint_without(help::GAPS_ELSEWHERE)
@@ -203,7 +203,7 @@ fn missing(table: &Table, row: usize, text: &str) -> Failure {
 
 impl Repair {
     /// Removes missing samples: NaN with `Gaps::Keep`, else the whole row.
-    fn apply(&mut self, table: &mut Table, gaps: Gaps) {
+    fn apply(&mut self, table: &mut InputTable, gaps: Gaps) {
         let missing = std::mem::take(&mut self.missing);
         if gaps != Gaps::Keep {
             let mut rows: Vec<usize> = missing.into_iter().flat_map(|(_, rows)| rows).collect();
@@ -225,9 +225,9 @@ impl Repair {
 
     /// Keeps one row per sample if the sensors are slower than the file. Isolated repeated rows become missing
     /// samples.
-    fn own_rate(
+    fn resample_held_rows(
         &mut self,
-        table: &mut Table,
+        table: &mut InputTable,
         options: &ReadOptions,
         report: &mut FileReport,
     ) -> Result<(), Failure> {
@@ -295,7 +295,7 @@ impl Repair {
 }
 
 /// Rate of the rows (Hz), by their stamps or as it is given.
-fn rate_of_rows(table: &Table, options: &ReadOptions) -> Option<f64> {
+fn rate_of_rows(table: &InputTable, options: &ReadOptions) -> Option<f64> {
     let Some(time) = table.get("t_s") else {
         return options
             .rate_hz
@@ -506,7 +506,7 @@ pub(crate) fn out_of_range(model: &Model) -> Vec<String> {
             ));
         }
         let walks = |noise: &Composite| {
-            let is_walk = |process: &Process| process.kind() == Kind::RandomWalk;
+            let is_walk = |process: &Process| process.kind() == ProcessKind::RandomWalk;
             let (walk, rest) = noise
                 .processes
                 .iter()
@@ -534,7 +534,7 @@ pub(super) fn dead(column: &Column) -> Option<String> {
 }
 
 /// A warning of an axis that is another one once more.
-fn copied(table: &Table) -> Option<String> {
+fn copied(table: &InputTable) -> Option<String> {
     let all: Vec<(Channel, &[f64])> = signals(table).collect();
     let axes: Vec<&[f64]> = all.iter().map(|(_, values)| *values).collect();
     let (first, later) = facts::copied(&axes)?;
@@ -545,7 +545,7 @@ fn copied(table: &Table) -> Option<String> {
 }
 
 /// Leaves copies and lost samples out of a recording under way; warnings of it.
-pub(crate) fn repair_drive(table: &mut Table) -> Vec<String> {
+pub(crate) fn repair_drive(table: &mut InputTable) -> Vec<String> {
     let mut warnings: Vec<String> = drop_copies(table).into_iter().collect();
     let (zero, text) = lost(table);
     leave_out(table, &zero);
@@ -591,7 +591,7 @@ fn holds(channel: Channel, stretches: &[(f64, Range<usize>)], rate_hz: f64) -> O
 }
 
 /// Marks of the samples of each sensor.
-pub(super) fn marks(table: &Table) -> Vec<Marks> {
+pub(super) fn marks(table: &InputTable) -> Vec<SampleFingerprint> {
     let of = |sensor| facts::marks(&axes(table, |channel| channel.sensor == sensor));
     Sensor::ALL.map(of).into()
 }
@@ -632,7 +632,7 @@ pub(super) fn compare(files: &[FileReport]) -> Result<Vec<String>, Failure> {
 }
 
 /// Columns that nearly have the name of a channel that is missing.
-pub(crate) fn misspelt(table: &Table, is_wanted: impl Fn(Channel) -> bool) -> Vec<String> {
+pub(crate) fn misspelt(table: &InputTable, is_wanted: impl Fn(Channel) -> bool) -> Vec<String> {
     let has = |channel| table.columns.iter().any(|c| channel_of(c) == Some(channel));
     let missing = Channel::ALL
         .into_iter()
@@ -654,7 +654,7 @@ pub(crate) fn misspelt(table: &Table, is_wanted: impl Fn(Channel) -> bool) -> Ve
 }
 
 /// Names that a column of a channel may have beside the others of a table: theirs with its axis, and our own.
-fn names_of(table: &Table, channel: Channel) -> Vec<String> {
+fn names_of(table: &InputTable, channel: Channel) -> Vec<String> {
     let is_name = |name: &String| {
         find(DICTIONARY.quantities, name).is_some_and(|(q, _)| q.name == channel.to_string())
     };

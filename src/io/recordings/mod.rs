@@ -8,12 +8,12 @@ use super::file_kind::{self, FileKind};
 use super::input::listed;
 use super::logs::LogOptions;
 use super::table::{
-    ACCELERATION, ANGLE, ANGULAR_RATE, Column, DefaultUnit, Dictionary, INSTANCE, NO_COLUMN,
-    Quantity, SENSOR_LOGGER, TICKS, TIME, Table, Units, is_oxts, unreadable,
+    ACCELERATION, ANGLE, ANGULAR_RATE, Column, DefaultUnit, Dictionary, INSTANCE, InputTable,
+    NO_COLUMN, Quantity, SENSOR_LOGGER, TICKS, TIME, Units, is_oxts, unreadable,
 };
 use super::{Failure, Place, help, table};
 use crate::report::six_digits;
-use nav_sim_signal::facts::Marks;
+use nav_sim_signal::facts::SampleFingerprint;
 use nav_sim_signal::imu::{Channel, Recording, Sensor, Signal};
 use nav_sim_signal::units::STANDARD_GRAVITY;
 use rayon::prelude::*;
@@ -170,7 +170,7 @@ pub(crate) fn load(
     path: &Path,
     options: &ReadOptions,
     dictionary: &Dictionary<'_>,
-) -> Result<Table, Failure> {
+) -> Result<InputTable, Failure> {
     use FileKind as K;
     load_signals(path, options, dictionary)
         .map_err(|e| file_kind::or_wrong_kind(&[K::Recording, K::Imu, K::Log], path, e))
@@ -180,7 +180,7 @@ fn load_signals(
     path: &Path,
     options: &ReadOptions,
     dictionary: &Dictionary<'_>,
-) -> Result<Table, Failure> {
+) -> Result<InputTable, Failure> {
     let wanted = options.channels.as_ref();
     let is_unwanted = |q: &Quantity| {
         let own = Channel::named(q.name);
@@ -489,7 +489,7 @@ pub struct FileReport {
     /// Doubts, in words.
     pub warnings: Vec<String>,
     /// Fingerprints that detect samples shared with other files.
-    marks: Vec<Marks>,
+    marks: Vec<SampleFingerprint>,
 }
 
 /// The name of one of the recordings of a file.
@@ -502,7 +502,7 @@ fn name_of(file: &str, index: usize, count: usize) -> String {
 }
 
 impl FileReport {
-    pub(super) fn new(raw: &Table) -> Self {
+    pub(super) fn new(raw: &InputTable) -> Self {
         let mut assumptions = raw.assumptions.clone();
         if raw.columns.iter().any(|c| c.quantity.per_sample) {
             assumptions.push("increments divided by the sample interval".into());
@@ -569,7 +569,7 @@ impl fmt::Display for FileReport {
 
 /// The recordings of a file, and what was found in it.
 pub(super) fn recordings(
-    mut raw: Table,
+    mut raw: InputTable,
     options: &ReadOptions,
 ) -> Result<(Vec<Recording>, FileReport), Failure> {
     let mut report = FileReport::new(&raw);
@@ -689,7 +689,7 @@ const NO_GRAVITY: f64 = 0.3;
 const SMALLEST: f64 = 1e-45;
 
 /// Factors that bring each column to SI units; refuses dead axes.
-fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
+fn factors(raw: &InputTable, rate_hz: f64) -> Result<Vec<f64>, Failure> {
     let from_gravity = gravity_factor(raw)?;
     let factor = |column: &Column| {
         if let Some(message) = facts::dead(column) {
@@ -721,7 +721,7 @@ fn factors(raw: &Table, rate_hz: f64) -> Result<Vec<f64>, Failure> {
 }
 
 /// The unit of accelerometer columns that do not say it, from the length of their mean.
-pub(crate) fn gravity_factor(raw: &Table) -> Result<f64, Failure> {
+pub(crate) fn gravity_factor(raw: &InputTable) -> Result<f64, Failure> {
     let is_unnamed = |c: &&Column| c.factor.is_none() && channel_of(c).is_some();
     let unnamed: Vec<&Column> = raw.columns.iter().filter(is_unnamed).collect();
     let Some(first) = unnamed.first() else {

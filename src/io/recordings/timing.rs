@@ -1,7 +1,7 @@
 //! Sample rate, unit of time, gaps and duplicates, from the time column or the packet counter.
 
 use super::{FileReport, Gaps, ReadOptions, too_short};
-use crate::io::table::{Column, TICKS, Table};
+use crate::io::table::{Column, InputTable, TICKS};
 use crate::io::{Failure, Place, help};
 use crate::report::six_digits;
 
@@ -17,7 +17,7 @@ pub(super) struct Timing {
 
 /// Finds the rate and checks the steps; frees the time column.
 pub(super) fn timing(
-    raw: &mut Table,
+    raw: &mut InputTable,
     options: &ReadOptions,
     report: &mut FileReport,
 ) -> Result<Timing, Failure> {
@@ -164,7 +164,7 @@ impl SampleClock {
 
     fn check(
         self,
-        raw: &Table,
+        raw: &InputTable,
         options: &ReadOptions,
         report: &mut FileReport,
     ) -> Result<Timing, Failure> {

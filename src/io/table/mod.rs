@@ -63,7 +63,7 @@ impl Dictionary<'_> {
 
 /// Columns of a file, before anything is decided about time and units.
 #[derive(Debug, Default)]
-pub(crate) struct Table {
+pub(crate) struct InputTable {
     pub(crate) path: String,
     /// Line of the header, from 1; 0 where there is none.
     header_line: u64,
@@ -111,7 +111,7 @@ impl Column {
 ///
 /// # Errors
 /// When the file cannot be read, names no column that is known, or has a cell that is no number.
-pub(crate) fn read(path: &Path, dictionary: &Dictionary<'_>) -> Result<Table, Failure> {
+pub(crate) fn read(path: &Path, dictionary: &Dictionary<'_>) -> Result<InputTable, Failure> {
     let ends_in = |ending: &str| {
         path.extension()
             .is_some_and(|e| e.eq_ignore_ascii_case(ending))
@@ -123,7 +123,7 @@ pub(crate) fn read(path: &Path, dictionary: &Dictionary<'_>) -> Result<Table, Fa
         #[cfg(feature = "npz")]
         Some(LogFormat::Npz) => {
             let (columns, rate_hz) = npz(path)?;
-            Ok(Table {
+            Ok(InputTable {
                 rate_hz: rate_hz.map(|hz| (hz, RATE)),
                 ..of(columns)?
             })
@@ -140,7 +140,7 @@ pub(crate) fn read(path: &Path, dictionary: &Dictionary<'_>) -> Result<Table, Fa
         }
         None if is_oxts(path) => {
             let assumptions = vec!["KITTI oxts, axes front, left, up".to_owned()];
-            Ok(Table {
+            Ok(InputTable {
                 assumptions,
                 ..of(oxts(path)?)?
             })
@@ -157,7 +157,11 @@ pub(crate) fn read(path: &Path, dictionary: &Dictionary<'_>) -> Result<Table, Fa
 ///
 /// # Errors
 /// Those of [`read`].
-pub(crate) fn parse(name: &str, text: &str, dictionary: &Dictionary<'_>) -> Result<Table, Failure> {
+pub(crate) fn parse(
+    name: &str,
+    text: &str,
+    dictionary: &Dictionary<'_>,
+) -> Result<InputTable, Failure> {
     let reader = Box::new(Cursor::new(text.to_owned()));
     read_text(name, reader, dictionary)?.filled()
 }
@@ -236,7 +240,7 @@ const MOST_MISSED: f64 = 100.0;
 /// Rows from one look at the memory to the next.
 const BETWEEN: usize = 1 << 16;
 
-impl Table {
+impl InputTable {
     /// A table of columns by their names, without rows yet.
     fn new(
         path: &str,
@@ -425,12 +429,12 @@ impl Table {
         if self.columns.first().is_some_and(|c| c.values.is_empty()) {
             return Err(empty(&self.path));
         }
-        self.count_on();
+        self.unwrap_counter();
         Ok(self)
     }
 
     /// Counts the time on where its counter starts again.
-    fn count_on(&mut self) {
+    fn unwrap_counter(&mut self) {
         let is_in_week = self.has("week");
         let mut time = self.columns.iter_mut().find(|c| c.quantity.name == "t_s");
         let Some(time) = time.as_mut().filter(|_| !is_in_week) else {
@@ -639,10 +643,10 @@ fn read_text(
     path: &str,
     reader: Box<dyn BufRead>,
     dictionary: &Dictionary<'_>,
-) -> Result<Table, Failure> {
+) -> Result<InputTable, Failure> {
     let mut lines = Lines::new(path, reader);
     let head = HeaderLines::read(&mut lines, dictionary)?;
-    let mut table = Table::new(path, head.line, &head.names, dictionary, head.is_xsens)?;
+    let mut table = InputTable::new(path, head.line, &head.names, dictionary, head.is_xsens)?;
     table.rate_hz = head.rate_hz.map(|rate_hz| (rate_hz, "head of the file"));
     table.is_bare = head.is_bare;
     if head.is_latin_1 && dictionary.names.is_none() {
@@ -843,7 +847,7 @@ impl HeaderLines {
     /// Appends the rows; what is passed over becomes a note.
     fn rows(
         &self,
-        table: &mut Table,
+        table: &mut InputTable,
         mut lines: Lines<'_>,
         dictionary: &Dictionary<'_>,
     ) -> Result<(), Failure> {
@@ -1092,7 +1096,11 @@ pub(super) fn number(cell: &[u8], delimiter: u8) -> Option<f64> {
 type Columns = Vec<(String, Vec<f64>)>;
 
 /// The table of such columns.
-fn of_columns(path: &str, columns: Columns, dictionary: &Dictionary<'_>) -> Result<Table, Failure> {
+fn of_columns(
+    path: &str,
+    columns: Columns,
+    dictionary: &Dictionary<'_>,
+) -> Result<InputTable, Failure> {
     let names: Vec<String> = match dictionary.names {
         Some(names) if names.len() != columns.len() => {
             return Err(Failure::row_length(path, 1, columns.len(), names.len()));
@@ -1100,7 +1108,7 @@ fn of_columns(path: &str, columns: Columns, dictionary: &Dictionary<'_>) -> Resu
         Some(names) => names.to_vec(),
         None => columns.iter().map(|(name, _)| name.clone()).collect(),
     };
-    let mut table = Table::new(path, 0, &names, dictionary, false)?;
+    let mut table = InputTable::new(path, 0, &names, dictionary, false)?;
     table.fits(columns.first().map_or(0, |(_, values)| values.len() as u64))?;
     for column in 0..table.columns.len() {
         let (_, values) = &columns[table.columns[column].place];
@@ -1330,8 +1338,8 @@ fn oxts_times(path: &Path) -> Result<Vec<f64>, Failure> {
 fn log(
     path: &Path,
     options: Option<&logs::LogOptions>,
-    of: &dyn Fn(Columns) -> Result<Table, Failure>,
-) -> Result<Table, Failure> {
+    of: &dyn Fn(Columns) -> Result<InputTable, Failure>,
+) -> Result<InputTable, Failure> {
     let refused = |e| logs::refused(path, e);
     let log = logs::open(path)?;
     let channel = log.channel(

@@ -9,14 +9,14 @@ fn found(name: &str) -> Option<(&'static str, Option<f64>)> {
     quantity::find(DICTIONARY.quantities, name).map(|(quantity, factor)| (quantity.name, factor))
 }
 
-fn with_header(names: &[&str], unwanted: &[&str]) -> Result<Table, Failure> {
+fn with_header(names: &[&str], unwanted: &[&str]) -> Result<InputTable, Failure> {
     let names: Vec<String> = names.iter().map(|n| (*n).to_owned()).collect();
     let is_unwanted = |q: &Quantity| unwanted.contains(&q.name);
     let dictionary = Dictionary {
         unwanted: Some(&is_unwanted),
         ..DICTIONARY
     };
-    Table::new("a.csv", 1, &names, &dictionary, false)
+    InputTable::new("a.csv", 1, &names, &dictionary, false)
 }
 
 #[test]

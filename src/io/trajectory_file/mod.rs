@@ -6,7 +6,9 @@ use super::fusion_files::{
     is_rtklib, read_gnss,
 };
 use super::recordings::timing::median_step;
-use super::table::{self, Column, Dictionary, LATITUDE, LONGITUDE, Quantity, Table, normalised};
+use super::table::{
+    self, Column, Dictionary, InputTable, LATITUDE, LONGITUDE, Quantity, normalised,
+};
 use super::{Failure, Failure as Error, Place, source};
 use crate::parse;
 use chrono::{DateTime, Utc};
@@ -51,7 +53,7 @@ pub fn load(path: &Path, origin: Option<[f64; 3]>) -> Result<(Trajectory, Vec<St
         Ok(Some(rows)) => rows.trajectory(),
         Err(e) => Err(e),
     };
-    found.map_err(unless_other(path))
+    found.map_err(or_other_kind(path))
 }
 
 /// Reads a trajectory that is only compared with. Where its position or attitude jumps as no vehicle does, where
@@ -69,11 +71,11 @@ pub(crate) fn load_reference(
         Ok(Some(rows)) => rows.reference(),
         Err(e) => Err(e),
     };
-    found.map_err(unless_other(path))
+    found.map_err(or_other_kind(path))
 }
 
 /// The refusal of a file that may be no trajectory.
-fn unless_other(path: &Path) -> impl Fn(Failure) -> Failure {
+fn or_other_kind(path: &Path) -> impl Fn(Failure) -> Failure {
     move |e| file_kind::or_wrong_kind(&[FileKind::Trajectory, FileKind::Gnss], path, e)
 }
 
@@ -113,10 +115,10 @@ pub(crate) fn load_solution(
         let rows = fixes.iter().map(of_fix).collect();
         return Ok((rows, notes.into_iter().map(|note| note.text).collect()));
     }
-    let Some(mut rows) = read(path, origin, false).map_err(unless_other(path))? else {
+    let Some(mut rows) = read(path, origin, false).map_err(or_other_kind(path))? else {
         let message = "a .toml file is no solution";
         let refused = Error::contents(path.display().to_string(), Place::Within, message);
-        return Err(unless_other(path)(refused));
+        return Err(or_other_kind(path)(refused));
     };
     rows.check_heights()?;
     rows.check_steps()?;
@@ -606,14 +608,14 @@ fn rows(
 }
 
 /// The standard deviations of each row (m, m/s, rad); NaN where it has none.
-fn sigmas(table: &Table) -> Vec<[f64; 9]> {
+fn sigmas(table: &InputTable) -> Vec<[f64; 9]> {
     let columns = SIGMAS.map(|name| table.get(name));
     let of_row = |row| columns.map(|column| column.map_or(f64::NAN, |column| column.si(row)));
     (0..table.rows()).map(of_row).collect()
 }
 
 /// Refuses angles of the attitude without a unit in their names, of which none is too large for radians.
-fn check_units(table: &Table) -> Result<(), Error> {
+fn check_units(table: &InputTable) -> Result<(), Error> {
     let is_bare = |column: &&Column| {
         let name = normalised(&column.name);
         !name.ends_with("deg") && !name.ends_with("rad")
@@ -652,7 +654,7 @@ fn local(t_s: f64, [lat0, lon0, h0]: [f64; 3], r_n0: DVec3, q_b_n0: DQuat) -> Tr
 }
 
 /// The origin of local coordinates: the one given, or the file's `# origin: lat, lon, h` line.
-fn local_origin(table: &Table, given: Option<[f64; 3]>) -> Result<[f64; 3], Error> {
+fn local_origin(table: &InputTable, given: Option<[f64; 3]>) -> Result<[f64; 3], Error> {
     if let Some(origin) = given {
         return Ok(origin);
     }

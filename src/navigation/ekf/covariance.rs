@@ -7,8 +7,8 @@
 //! The lower triangle is the matrix. Inside the square of the navigation states and inside that of the
 //! biases the upper triangle repeats it, so that a column can be read as a row.
 
-use super::belief::{Belief, BiasGroup, MAX_BLOCKS};
 use super::filter::{Ekf, Regressor};
+use super::filter_model::{BiasGroup, FilterModel, MAX_BLOCKS};
 use crate::earth::{E2, OMEGA_IE, gravity_down, radii};
 use crate::imu::Sensor;
 use crate::lanes::{LANES, Lanes, Mat3, Real, Vec3, Wide};
@@ -48,7 +48,7 @@ const CONSTANT_BIASES: [BiasGroup; 2 * MAX_BLOCKS + 1] =
 
 /// States after the navigation block, biases and error coefficients, with the transition of each.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sources<'a> {
+pub(super) struct BiasBlocks<'a> {
     /// Transition of each block, in state order: accelerometer biases, gyroscope biases, coefficients of both, vehicle
     /// states (constant).
     steps: &'a [BiasGroup],
@@ -58,14 +58,14 @@ pub(super) struct Sources<'a> {
     pub regressors: [&'a [Regressor]; 2],
 }
 
-impl<'a> Sources<'a> {
+impl<'a> BiasBlocks<'a> {
     #[inline(always)]
     pub(super) fn new(
-        belief: &Belief,
+        filter_model: &FilterModel,
         steps: &'a [BiasGroup],
         regressors: &'a [Vec<Regressor>; 2],
     ) -> Self {
-        let [accel, gyro] = &belief.groups;
+        let [accel, gyro] = &filter_model.groups;
         Self {
             steps,
             biases: [accel.len(), gyro.len()],
@@ -85,7 +85,7 @@ impl<'a> Sources<'a> {
     }
 
     /// Blocks with transition 1 and no noise: for a map between samples, which moves no bias.
-    pub(super) fn still(self) -> Self {
+    pub(super) fn with_identity_transition(self) -> Self {
         Self {
             steps: &CONSTANT_BIASES[..self.steps.len()],
             ..self
@@ -172,7 +172,7 @@ impl Covariance {
     /// take their step first: `b_k = phi b_{k−1} + w`, and the map uses `b_k`. Q holds the
     /// innovations of the biases only; `Ekf::add_white_noise` adds the sensors' white noise.
     #[inline(always)]
-    pub(super) fn step<W: Wide>(&mut self, map: &impl ErrorMap<W>, sources: &Sources<'_>) {
+    pub(super) fn step<W: Wide>(&mut self, map: &impl ErrorMap<W>, sources: &BiasBlocks<'_>) {
         self.step_biases::<W>(sources.steps);
         let n = self.dim;
         // A P: navigation columns into scratch, since P is still read.
@@ -191,7 +191,7 @@ impl Covariance {
             store_error(nav, &map.apply(x, accel, gyro));
         }
         // (A P) Aᵀ: the same map on the rows of A P. Cross terms have taken their step by now: no second phi.
-        let still = sources.still();
+        let still = sources.with_identity_transition();
         for i in 0..NAV {
             let mut row = [Lanes::ZERO; NAV];
             for (element, column) in row.iter_mut().zip(&self.columns) {
@@ -208,7 +208,7 @@ impl Covariance {
 
     /// The errors of the sample of each sensor in column j of the navigation, every bias after its step.
     #[inline(always)]
-    fn column_errors<W: Wide>(&self, j: usize, sources: &Sources<'_>) -> [Vec3<W>; 2] {
+    fn column_errors<W: Wide>(&self, j: usize, sources: &BiasBlocks<'_>) -> [Vec3<W>; 2] {
         let [accel, gyro, accel_unknown, gyro_unknown] = sources.starts();
         let of_accel = self.bias_sum(accel..gyro, j, sources.steps);
         let of_gyro = self.bias_sum(gyro..accel_unknown, j, sources.steps);
@@ -420,7 +420,7 @@ fn sum_triples<W: Wide>(row: &[Lanes]) -> Vec3<W> {
 
 /// The errors of the sample of each sensor in the row of a state behind the navigation's.
 #[inline(always)]
-fn row_errors<W: Wide>(row: &[Lanes], sources: &Sources<'_>) -> [Vec3<W>; 2] {
+fn row_errors<W: Wide>(row: &[Lanes], sources: &BiasBlocks<'_>) -> [Vec3<W>; 2] {
     let (accel, rest) = row.split_at(3 * sources.biases[0]);
     let (gyro, rest) = rest.split_at(3 * sources.biases[1]);
     let [of_accel, of_gyro] = sources.regressors;
@@ -682,7 +682,7 @@ impl Transition {
 
     /// The map after those before: of every column as [`Covariance::step`](super::Covariance) has it of its own.
     #[inline(always)]
-    pub(super) fn step<W: Wide>(&mut self, map: &impl ErrorMap<W>, sources: &Sources<'_>) {
+    pub(super) fn step<W: Wide>(&mut self, map: &impl ErrorMap<W>, sources: &BiasBlocks<'_>) {
         for column in self.columns.chunks_exact_mut(self.dim) {
             let (nav, rest) = column.split_at_mut(NAV);
             for (i, state) in rest.iter_mut().enumerate() {
@@ -704,7 +704,7 @@ impl Transition {
 impl Ekf {
     /// From now on the transition is kept. All lanes must be the same run.
     pub(crate) fn keep_transition(&mut self) {
-        super::settle(self);
+        super::apply_pending_earth_step(self);
         self.transition = Some(Transition::identity(self.p.dim()));
     }
 
@@ -728,7 +728,9 @@ mod transition_tests {
     use super::*;
     use crate::earth::GravityModel;
     use crate::ekf::tests::{gauss_markov_model, manoeuvre, predict};
-    use crate::ekf::{Belief, FilterStates, InitialSettings, UnknownKind, settle};
+    use crate::ekf::{
+        CoefficientKind, FilterModel, FilterStates, InitialSettings, apply_pending_earth_step,
+    };
     use crate::imu::Sensor;
     use crate::strapdown::Strapdown;
     use crate::tests::state;
@@ -751,18 +753,19 @@ mod transition_tests {
             gyro_bias_sigma_rad_s: Some(1e-3),
             ..InitialSettings::default()
         };
-        let mut belief = Belief::new(&gauss_markov_model(), FilterStates::Reduced21, 1.0, 800.0)
-            .unwrap()
-            .with_initial(&turn_on);
-        belief.set_unknown(
+        let mut filter_model =
+            FilterModel::new(&gauss_markov_model(), FilterStates::Reduced21, 1.0, 800.0)
+                .unwrap()
+                .with_initial(&turn_on);
+        filter_model.set_unknown(
             Sensor::Accel,
-            UnknownKind::Drift,
+            CoefficientKind::Drift,
             DVec3::new(1e-6, 2e-6, 3e-6),
         );
         let start = state([150.0, -50.0, 0.5]);
         let nominal = Strapdown::new(&start, GravityModel::Wgs84);
         let mut filters =
-            [0, 1].map(|_| Ekf::new(nominal, &belief, &start, &InitialSettings::default()));
+            [0, 1].map(|_| Ekf::new(nominal, &filter_model, &start, &InitialSettings::default()));
         let correlated = correlated(&filters[0].p.lane(0));
         filters[0].p.set_lane(0, &correlated);
         filters.iter_mut().for_each(Ekf::keep_transition);
@@ -772,7 +775,7 @@ mod transition_tests {
                 let (omega, f) = manoeuvre(f64::from(k) * 0.01);
                 predict(filter, omega, f);
             }
-            settle(filter);
+            apply_pending_earth_step(filter);
         }
         let phi = filters.each_mut().map(Ekf::take_transition);
         assert_eq!(phi[0], phi[1]);

@@ -1,10 +1,10 @@
 //! The filter itself: nominal state, bias estimates and covariance of eight runs.
 
-use super::belief::{Belief, BiasGroup, InitialSettings, psi_of_angles};
 use super::covariance::{
-    BIAS, Covariance, EARTH_STEP_S, EarthStep, EarthTerms, PSI, R, Sample, Sources, Transition, V,
-    load_triple,
+    BIAS, BiasBlocks, Covariance, EARTH_STEP_S, EarthStep, EarthTerms, PSI, R, Sample, Transition,
+    V, load_triple,
 };
+use super::filter_model::{BiasGroup, FilterModel, InitialSettings, psi_of_angles};
 use super::update::{FixUpdate, GainSource};
 use crate::frames::NavState;
 use crate::imu::{ImuSample, Sensor};
@@ -26,7 +26,7 @@ pub struct Ekf {
     /// Covariance of the error state.
     pub p: Covariance,
     /// Noise model at the filter's own rate.
-    pub(super) belief: Belief,
+    pub(super) filter_model: FilterModel,
     /// The same of a sample of `dt` seconds: the step of each block behind the navigation's, white variances.
     pub(super) steps: Vec<BiasGroup>,
     white: [DVec3; 2],
@@ -69,20 +69,20 @@ impl Ekf {
     /// the attitude of `about`, the same in all lanes.
     pub fn new(
         nominal: Strapdown,
-        belief: &Belief,
+        filter_model: &FilterModel,
         about: &NavState,
         initial: &InitialSettings,
     ) -> Self {
-        let unknowns = belief.unknowns.iter().flatten();
+        let unknowns = filter_model.unknowns.iter().flatten();
         let constant = unknowns.map(|u| BiasGroup {
             initial: u.sigma * u.sigma,
             ..BiasGroup::constant(0.0)
         });
-        let vehicle = (belief.vehicle != DVec3::ZERO).then(|| BiasGroup {
-            initial: belief.vehicle * belief.vehicle,
+        let vehicle = (filter_model.vehicle != DVec3::ZERO).then(|| BiasGroup {
+            initial: filter_model.vehicle * filter_model.vehicle,
             ..BiasGroup::constant(0.0)
         });
-        let steps: Vec<BiasGroup> = belief
+        let steps: Vec<BiasGroup> = filter_model
             .groups
             .iter()
             .flatten()
@@ -90,7 +90,7 @@ impl Ekf {
             .chain(constant)
             .chain(vehicle)
             .collect();
-        let mut p = Covariance::zeros(3 * belief.blocks());
+        let mut p = Covariance::zeros(3 * filter_model.blocks());
         let square = |sigma: [f64; 3]| Matrix3::from_diagonal(&sigma.map(|s| s * s).into());
         add_block(&mut p, R, &square(initial.pos_sigma_m));
         add_block(&mut p, V, &square(initial.vel_sigma_m_s));
@@ -115,14 +115,14 @@ impl Ekf {
             estimates: vec![Vec3::ZERO; steps.len()],
             p,
             steps,
-            white: belief.white,
-            regressors: belief
+            white: filter_model.white,
+            regressors: filter_model
                 .unknowns
                 .each_ref()
                 .map(|u| u.iter().map(Regressor::of).collect()),
-            dt: 1.0 / belief.rate_hz,
+            dt: 1.0 / filter_model.rate_hz,
             age: 0.0,
-            belief: belief.clone(),
+            filter_model: filter_model.clone(),
             earth_age: 0.0,
             omega_ib_b: Vec3::ZERO,
             transition: None,
@@ -151,19 +151,19 @@ impl Ekf {
     /// biases their correlation time and variance. For recorded data, whose clock is not even and whose
     /// samples are split where a fix falls between them.
     pub(crate) fn set_interval(&mut self, dt: f64) {
-        let ratio = dt * self.belief.rate_hz;
+        let ratio = dt * self.filter_model.rate_hz;
         // The zip ends with the bias groups: the unknown constants behind them have no step that depends on
         // dt.
         for (step, believed) in self
             .steps
             .iter_mut()
-            .zip(self.belief.groups.iter().flatten())
+            .zip(self.filter_model.groups.iter().flatten())
         {
             *step = believed.over(ratio);
         }
         // A mean over `ratio` samples: the variance of white noise falls as the interval grows, its density
         // stays.
-        self.white = self.belief.white.map(|w| w / ratio);
+        self.white = self.filter_model.white.map(|w| w / ratio);
         self.dt = dt;
     }
 
@@ -177,8 +177,8 @@ impl Ekf {
 
     /// The blocks behind the navigation's.
     #[inline(always)]
-    pub(super) fn sources(&self) -> Sources<'_> {
-        Sources::new(&self.belief, &self.steps, &self.regressors)
+    pub(super) fn sources(&self) -> BiasBlocks<'_> {
+        BiasBlocks::new(&self.filter_model, &self.steps, &self.regressors)
     }
 
     /// A sample less its estimated errors; it becomes the regressor of its scale factor. The sensor reads
@@ -193,7 +193,7 @@ impl Ekf {
             .zip(&self.estimates[first..])
         {
             let estimate = estimate.load();
-            if regressor.kind == UnknownKind::Drift {
+            if regressor.kind == CoefficientKind::Drift {
                 sample = sample - estimate * W::from(age);
                 regressor.value = Vec3::splat(DVec3::splat(age));
             } else {
@@ -211,7 +211,7 @@ impl Ekf {
     /// The bias groups of a sensor among the blocks behind the navigation's.
     #[inline(always)]
     fn bias_blocks(&self, sensor: Sensor) -> Range<usize> {
-        let [accel, gyro] = self.belief.groups.each_ref().map(Vec::len);
+        let [accel, gyro] = self.filter_model.groups.each_ref().map(Vec::len);
         match sensor {
             Sensor::Accel => 0..accel,
             Sensor::Gyro => accel..accel + gyro,
@@ -239,7 +239,7 @@ impl Ekf {
             }
         }
         // the drift is that of the interval's middle, counted so that whole samples are 1, 2, 3, …
-        let samples = dt * self.belief.rate_hz;
+        let samples = dt * self.filter_model.rate_hz;
         let age = self.age + 0.5 * (samples + 1.0);
         self.age += samples;
         let omega_ib_b = self.corrected(Sensor::Gyro, omega_ib_b, age);
@@ -252,7 +252,7 @@ impl Ekf {
             return;
         }
         let sample = Sample::new(&passed, dt);
-        let sources = Sources::new(&self.belief, &self.steps, &self.regressors);
+        let sources = BiasBlocks::new(&self.filter_model, &self.steps, &self.regressors);
         self.p.step(&sample, &sources);
         if let Some(transition) = &mut self.transition {
             transition.step(&sample, &sources);
@@ -266,7 +266,7 @@ impl Ekf {
         if self.earth_age + 0.5 * dt > EARTH_STEP_S {
             // A kernel of its own, once in many samples: inlined here it takes the compiler long.
             self.nominal.store(ins);
-            settle(self);
+            apply_pending_earth_step(self);
         }
     }
 
@@ -312,13 +312,13 @@ fn attitude_covariance(state: &NavState, sigma_deg: [f64; 3]) -> Matrix3<f64> {
 
 /// Applies the Earth-rate terms not yet propagated (they lag by up to `EARTH_STEP_S`). Call before reading the
 /// covariance.
-pub fn settle(ekf: &mut Ekf) {
-    dispatch(ekf.level, Settle(ekf));
+pub fn apply_pending_earth_step(ekf: &mut Ekf) {
+    dispatch(ekf.level, ApplyEarthStep(ekf));
 }
 
-struct Settle<'a>(&'a mut Ekf);
+struct ApplyEarthStep<'a>(&'a mut Ekf);
 
-impl Kernel for Settle<'_> {
+impl Kernel for ApplyEarthStep<'_> {
     type Output = ();
     #[inline(always)]
     fn run<W: Wide>(self) {
@@ -329,7 +329,8 @@ impl Kernel for Settle<'_> {
                 dt: ekf.earth_age,
             };
             ekf.earth_age = 0.0;
-            let sources = Sources::new(&ekf.belief, &ekf.steps, &ekf.regressors).still();
+            let sources = BiasBlocks::new(&ekf.filter_model, &ekf.steps, &ekf.regressors)
+                .with_identity_transition();
             ekf.p.step(&step, &sources);
             if let Some(transition) = &mut ekf.transition {
                 transition.step(&step, &sources);
@@ -438,7 +439,7 @@ impl Ekf {
 
 /// Kind of an unknown constant, which determines its factor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum UnknownKind {
+pub enum CoefficientKind {
     /// The slope of a drift (units per sample of the model), times the samples since the filter's start: a
     /// known magnitude of unknown sign has the same second moments as a normal slope of that deviation.
     Drift,
@@ -448,9 +449,9 @@ pub enum UnknownKind {
 
 /// An unknown constant on each axis of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Unknown {
+pub struct ErrorCoefficient {
     /// Its kind.
-    pub kind: UnknownKind,
+    pub kind: CoefficientKind,
     /// Its standard deviations on the three axes (units per sample, or 1).
     pub sigma: DVec3,
 }
@@ -458,13 +459,13 @@ pub struct Unknown {
 /// Factor on an unknown constant in the last sample.
 #[derive(Debug, Clone)]
 pub(super) struct Regressor {
-    kind: UnknownKind,
+    kind: CoefficientKind,
     pub value: Vec3,
 }
 
 impl Regressor {
     /// The regressor of an unknown before the first sample: zero.
-    const fn of(unknown: &Unknown) -> Self {
+    const fn of(unknown: &ErrorCoefficient) -> Self {
         Self {
             kind: unknown.kind,
             value: Vec3::ZERO,
@@ -515,7 +516,7 @@ impl Ekf {
         let sources = self.sources();
         // in the order of their kinds: a drift is the first
         let first = sources.regressors[sensor as usize].first()?;
-        let is_drift = first.kind == UnknownKind::Drift;
+        let is_drift = first.kind == CoefficientKind::Drift;
         is_drift.then(|| (BIAS + sources.unknowns(sensor), first.value))
     }
 }

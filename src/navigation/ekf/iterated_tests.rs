@@ -3,7 +3,7 @@
 use super::*;
 use crate::earth::GravityModel;
 use crate::ekf::tests::{error_of, fix_at_nominal, generator, random_case};
-use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings, advance, update};
+use crate::ekf::{FilterModel, FilterStates, FixUpdate, InitialSettings, advance, update};
 use crate::frames::NavState;
 use crate::imu::ImuSample;
 use crate::lanes::Vec3;
@@ -85,9 +85,9 @@ fn filter(state: &NavState, fix_update: FixUpdate) -> Ekf {
         rate_hz: 100.0,
         axes: Default::default(),
     };
-    let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
+    let filter_model = FilterModel::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
     let start = Strapdown::new(state, GravityModel::Wgs84);
-    Ekf::new(start, &belief, state, &InitialSettings::default()).with_update(fix_update)
+    Ekf::new(start, &filter_model, state, &InitialSettings::default()).with_update(fix_update)
 }
 
 /// A fix moves both estimates alike to first order in the innovation; their difference is of second: half of the innovation

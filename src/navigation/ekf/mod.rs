@@ -5,15 +5,15 @@
 //!
 //! The filter never sees truth: it is given increments, fixes, and what it believes of the noise.
 
-pub mod belief;
 pub mod covariance;
 pub mod filter;
+pub mod filter_model;
 pub mod update;
 
-pub use belief::{Belief, BeliefError, FilterStates, InitialSettings};
 pub use covariance::Covariance;
 pub(crate) use filter::Snapshot;
-pub use filter::{Ekf, Unknown, UnknownKind, advance, settle};
+pub use filter::{CoefficientKind, Ekf, ErrorCoefficient, advance, apply_pending_earth_step};
+pub use filter_model::{FilterModel, FilterModelError, FilterStates, InitialSettings};
 pub(crate) use update::{
     BodyVelocity, GainSource, SharedUpdate, body_velocity_rows, fix_rows, update_body_velocity,
     update_height, update_yaw, yaw_row,

@@ -5,7 +5,9 @@ mod measurements;
 
 use super::covariance::{EarthStep, EarthTerms, ErrorMap, PSI, R, Sample, V};
 use super::update::dense;
-use super::{Belief, Ekf, FilterStates, Fix, InitialSettings, advance, settle, update};
+use super::{
+    Ekf, FilterModel, FilterStates, Fix, InitialSettings, advance, apply_pending_earth_step, update,
+};
 use crate::earth::{self, GravityModel};
 use crate::frames::NavState;
 use crate::imu::ImuSample;
@@ -192,10 +194,10 @@ pub(super) fn manoeuvre(t: f64) -> (DVec3, DVec3) {
     (omega, f)
 }
 
-pub(super) fn ekf(belief: &Belief, state: &NavState, initial: &InitialSettings) -> Ekf {
+pub(super) fn ekf(filter_model: &FilterModel, state: &NavState, initial: &InitialSettings) -> Ekf {
     Ekf::new(
         Strapdown::new(state, GravityModel::Wgs84),
-        belief,
+        filter_model,
         state,
         initial,
     )
@@ -216,8 +218,8 @@ pub(super) fn certain_start() -> InitialSettings {
 }
 
 fn filter(model: &Model, states: FilterStates) -> Ekf {
-    let belief = Belief::new(model, states, 1.0, 800.0).unwrap();
-    ekf(&belief, &start(), &InitialSettings::default())
+    let filter_model = FilterModel::new(model, states, 1.0, 800.0).unwrap();
+    ekf(&filter_model, &start(), &InitialSettings::default())
 }
 
 /// The filter after so many samples of the manoeuvre with such a fix a second.
@@ -230,7 +232,7 @@ fn driven(mut filter: Ekf, samples: u32, fix: impl Fn(&Ekf) -> Fix) -> Ekf {
             update(&mut filter, &fix);
         }
     }
-    settle(&mut filter);
+    apply_pending_earth_step(&mut filter);
     filter
 }
 

@@ -1,13 +1,16 @@
 //! Scale factors and drifts in the filter, against central differences of the strapdown and of the antenna, and
 //! against dense matrices.
 
-use super::belief::BiasGroup;
 use super::covariance::{EarthTerms, PSI, V};
+use super::filter_model::BiasGroup;
 use super::tests::{
     Matrix15, T_CORR_S, certain_start, continuous_f, continuous_q, ekf, error_of, fix_at_nominal,
     gauss_markov_model, generator, manoeuvre, measurement_rows, predict, random_case, start,
 };
-use super::{Belief, Ekf, FilterStates, InitialSettings, UnknownKind, settle, update};
+use super::{
+    CoefficientKind, Ekf, FilterModel, FilterStates, InitialSettings, apply_pending_earth_step,
+    update,
+};
 use crate::earth::{self, GravityModel};
 use crate::frames::NavState;
 use crate::imu::Sensor;
@@ -23,16 +26,16 @@ const UNKNOWNS: usize = 15;
 const DIM: usize = 27;
 
 /// The 15-state filter with drifts and scale factors of both sensors, each axis with its own.
-fn belief() -> Belief {
-    let mut belief =
-        Belief::new(&gauss_markov_model(), FilterStates::Reduced15, 1.0, 800.0).unwrap();
+fn filter_model() -> FilterModel {
+    let mut filter_model =
+        FilterModel::new(&gauss_markov_model(), FilterStates::Reduced15, 1.0, 800.0).unwrap();
     for (sensor, unit) in [(Sensor::Accel, 1.0), (Sensor::Gyro, 1e-2)] {
         let axes = DVec3::new(1.0, 2.0, 3.0);
-        belief.set_unknown(sensor, UnknownKind::Drift, axes * unit * 1e-6);
-        belief.set_unknown(sensor, UnknownKind::ScaleFactor, axes * 1e-3);
+        filter_model.set_unknown(sensor, CoefficientKind::Drift, axes * unit * 1e-6);
+        filter_model.set_unknown(sensor, CoefficientKind::ScaleFactor, axes * 1e-3);
     }
-    assert_eq!((belief.states, 3 * belief.blocks()), (DIM, DIM));
-    belief
+    assert_eq!((filter_model.states, 3 * filter_model.blocks()), (DIM, DIM));
+    filter_model
 }
 
 /// Squares of the deviations, of attitude those of roll, pitch and yaw of a level vehicle.
@@ -48,7 +51,7 @@ fn the_covariance_at_the_start_is_what_is_believed() {
         att_sigma_deg: [0.5, 0.6, 2.0],
         ..InitialSettings::default()
     };
-    let p = ekf(&belief(), &level, &initial).p.lane(0);
+    let p = ekf(&filter_model(), &level, &initial).p.lane(0);
     let angles = initial.att_sigma_deg.map(f64::to_radians);
     let sigmas = [initial.pos_sigma_m, initial.vel_sigma_m_s, angles].concat();
     for (i, sigma) in sigmas.iter().enumerate() {
@@ -65,14 +68,17 @@ fn the_covariance_at_the_start_is_what_is_believed() {
 fn flicker_noise_starts_with_its_variance() {
     let noise = Process::flicker(1e-8).unwrap();
     let axis = Composite::new(vec![noise]);
-    let belief = Belief::new(
+    let filter_model = FilterModel::new(
         &Model::pooled(100.0, &axis, &axis),
         FilterStates::Full,
         1.0,
         800.0,
     )
     .unwrap();
-    let variance: f64 = belief.groups[0].iter().map(|group| group.initial.x).sum();
+    let variance: f64 = filter_model.groups[0]
+        .iter()
+        .map(|group| group.initial.x)
+        .sum();
     assert_relative_eq!(variance, noise.initial_variance(), max_relative = 1e-12);
 }
 
@@ -85,13 +91,13 @@ fn a_turn_on_bias_is_beside_what_wanders() {
     for (processes, others) in [(vec![white, walk], 1), (vec![white], 0)] {
         let axis = Composite::new(processes);
         let model = Model::pooled(100.0, &axis, &axis);
-        let mut belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
+        let mut filter_model = FilterModel::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
         [0.03, 0.04]
             .iter()
-            .for_each(|sigma| belief.add_constant(Sensor::Accel, *sigma));
-        let groups = &belief.groups[0];
+            .for_each(|sigma| filter_model.add_constant(Sensor::Accel, *sigma));
+        let groups = &filter_model.groups[0];
         assert_eq!(
-            (groups.len(), belief.states),
+            (groups.len(), filter_model.states),
             (others + 1, 9 + 6 * others + 3)
         );
         assert!(
@@ -116,7 +122,7 @@ fn white_noises_add_up_to_their_long_run_variance() {
         Process::ma1(-0.5, 8.0).unwrap(),
     ];
     let axis = Composite::new(parts.to_vec());
-    let belief = Belief::new(
+    let filter_model = FilterModel::new(
         &Model::pooled(100.0, &axis, &axis),
         FilterStates::Full,
         1.0,
@@ -125,7 +131,7 @@ fn white_noises_add_up_to_their_long_run_variance() {
     .unwrap();
     // MA1: (1 + theta²) sigma² of the sample itself, theta sigma² with each neighbour
     assert_eq!(
-        belief.white,
+        filter_model.white,
         [DVec3::splat(3.0 + 8.0 * (1.25 - 2.0 * 0.5)); 2]
     );
 }
@@ -167,7 +173,7 @@ fn numeric_column(
 fn columns_of_unknowns_agree_with_central_differences() {
     let mut g = generator("unknowns");
     let exact = certain_start();
-    let mut silent = belief();
+    let mut silent = filter_model();
     silent.white = [DVec3::ZERO; 2];
     silent.groups = [vec![BiasGroup::default()], vec![BiasGroup::default()]];
     // second-order terms of the sample are 5e-4 of the first at 1 rad/s, and the first sample's age is 1
@@ -178,11 +184,11 @@ fn columns_of_unknowns_agree_with_central_differences() {
         let unknown = k % 12;
         let (sensor, kind) = (
             Sensor::ALL[unknown / 6],
-            [UnknownKind::Drift, UnknownKind::ScaleFactor][unknown / 3 % 2],
+            [CoefficientKind::Drift, CoefficientKind::ScaleFactor][unknown / 3 % 2],
         );
         let mut one = silent.clone();
         for other in Sensor::ALL {
-            for kind in [UnknownKind::Drift, UnknownKind::ScaleFactor] {
+            for kind in [CoefficientKind::Drift, CoefficientKind::ScaleFactor] {
                 // deviations so small that they leave no trace beside the one that is looked at
                 one.set_unknown(other, kind, DVec3::splat(1e-30));
             }
@@ -242,12 +248,12 @@ fn samples_are_corrected_by_what_is_estimated() {
         DVec3::new(3e-4, -1e-4, 2e-4),
         DVec3::splat(0.01),
     );
-    let mut filter = ekf(&belief(), &start(), &InitialSettings::default());
+    let mut filter = ekf(&filter_model(), &start(), &InitialSettings::default());
     let mut clean = Strapdown::new(&start(), GravityModel::Wgs84);
     let spoilt = |truth: DVec3, k: u32| truth * (DVec3::ONE + scale) + bias + slope * f64::from(k);
     for sensor in Sensor::ALL {
         let first = filter.sources().unknowns(sensor);
-        let groups = filter.belief.groups.clone();
+        let groups = filter.filter_model.groups.clone();
         filter.estimates[if sensor == Sensor::Accel {
             0
         } else {
@@ -311,7 +317,7 @@ fn covariance_agrees_with_dense_matrices_over_a_run() {
     let arm = DVec3::new(0.8, -0.4, -1.5);
     let initial = InitialSettings::default();
     let levels = [Level::Portable, Level::best()];
-    let mut filters = levels.map(|level| ekf(&belief(), &start(), &initial).at_level(level));
+    let mut filters = levels.map(|level| ekf(&filter_model(), &start(), &initial).at_level(level));
     let mut p = filters[0].p.lane(0);
     for k in 0..6000_u32 {
         let (omega, f) = manoeuvre((f64::from(k) + 0.5) * 0.01);
@@ -347,7 +353,7 @@ fn covariance_agrees_with_dense_matrices_over_a_run() {
                 .for_each(|filter| _ = update(filter, &fix));
         }
         for filter in &mut filters {
-            settle(filter);
+            apply_pending_earth_step(filter);
             for i in 0..DIM {
                 let ratio = (filter.p.get::<Lanes>(i, i)[0] / p[(i, i)]).sqrt();
                 assert!(
@@ -387,7 +393,7 @@ fn lever_arm_rows_of_unknowns_agree_with_central_differences() {
     let (mut g, arm) = (generator("h of unknowns"), DVec3::new(1.3, -0.7, -2.1));
     for _ in 0..2000 {
         let (state, omega, f) = random_case(&mut g);
-        let mut filter = ekf(&belief(), &state, &InitialSettings::default());
+        let mut filter = ekf(&filter_model(), &state, &InitialSettings::default());
         predict(&mut filter, omega, f);
         let now = filter.nominal.lane(0);
         let velocity = |omega: DVec3| {

@@ -1,7 +1,7 @@
 //! GNSS updates: position and velocity of an antenna on a lever arm, as scalars in sequence.
 
 use super::covariance::{BIAS, NAV, PSI, R, V};
-use super::filter::{Ekf, settle};
+use super::filter::{Ekf, apply_pending_earth_step};
 use crate::earth::{OMEGA_IE, radii};
 use crate::frames::wrap_angle;
 use crate::imu::Sensor;
@@ -59,7 +59,7 @@ impl Ekf {
     }
 
     /// The states that a measurement depends on, and their coefficients.
-    fn row(&self, h: &Coefficients<Lanes>) -> Row {
+    fn row(&self, h: &Coefficients<Lanes>) -> SparseRow {
         let sources = self.sources();
         let [_, gyro, unknown, gyro_unknown] = sources.starts();
         // The rate is that of the last sample: its biases count all alike. Its white noise times the arm
@@ -212,7 +212,7 @@ fn nis([z, s]: Innovation) -> Lanes {
 
 /// A scalar measurement of eight runs.
 pub(super) struct Scalar {
-    row: Row,
+    row: SparseRow,
     /// Estimate less measured.
     z: Lanes,
     /// Variance of its white noise.
@@ -221,7 +221,7 @@ pub(super) struct Scalar {
 
 /// Uses scalars in sequence, then corrects the nominal state; returns the innovation of each.
 fn use_scalars(ekf: &mut Ekf, scalars: &[Scalar]) -> Innovations {
-    settle(ekf);
+    apply_pending_earth_step(ekf);
     ekf.scratch.error.fill(Lanes::ZERO);
     dispatch(ekf.level, UseScalars { ekf, scalars })
 }
@@ -357,7 +357,7 @@ pub(crate) fn fix_rows(
 }
 
 /// A measurement row: states and their coefficients, on the stack for an antenna on a lever arm and two groups of biases.
-type Row = SmallVec<[(usize, Lanes); 16]>;
+type SparseRow = SmallVec<[(usize, Lanes); 16]>;
 
 /// Rows, innovations and covariance of the noise of scalars in one run.
 pub(super) fn dense(
@@ -417,7 +417,7 @@ impl Ekf {
     /// The first state of wheel scale, mounting pitch and mounting yaw, where the belief has them: behind all others.
     fn vehicle(&self) -> Option<usize> {
         let last = BIAS + self.estimates.len() - 1;
-        (self.belief.vehicle != DVec3::ZERO).then_some(3 * last)
+        (self.filter_model.vehicle != DVec3::ZERO).then_some(3 * last)
     }
 
     /// Estimates of wheel scale (1), mounting pitch and yaw (rad), and their standard deviations, of the first lane.
@@ -548,7 +548,7 @@ const STEPS: usize = 4;
 
 /// Uses a fix in all runs; returns its NIS, which is that of the first step.
 fn update_iterated(ekf: &mut Ekf, fix: &Fix) -> Lanes {
-    settle(ekf);
+    apply_pending_earth_step(ekf);
     let before = ekf.clone();
     let mut lanes: Vec<Lane> = (0..LANES)
         .map(|lane| Lane::new(before.p.lane(lane)))

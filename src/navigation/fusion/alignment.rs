@@ -7,12 +7,14 @@
 //! change of the GNSS velocity, whichever is known better. A start that the fixes of the following minute
 //! contradict is given up for the next, and a heading that they move is not believed as well as it says.
 
-use super::outcome::{Finding, nis_bound, total_nis, used};
+use super::outcome::{Finding, nis_bound, not_withheld, total_nis};
 use super::run::rates;
 use super::vehicle::{force, rate};
-use super::{AlignmentSummary, Heading, Levelling, Recorded, Settings, Solution, Start, fuse};
+use super::{
+    AlignmentSummary, DriveData, FusionSettings, Heading, Levelling, Solution, Start, fuse,
+};
 use crate::earth::{gravity_down, moved, ned_difference};
-use crate::ekf::{Belief, InitialSettings};
+use crate::ekf::{FilterModel, InitialSettings};
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
 use crate::gnss::GnssFix;
 use crate::imu::{ImuIncrement, Sensor};
@@ -42,9 +44,9 @@ pub struct Alignment {
 /// # Errors
 /// When it never moves, or there is nothing to level with.
 pub fn coarse(
-    recorded: &Recorded<'_>,
-    settings: &Settings,
-    belief: &Belief,
+    recorded: &DriveData<'_>,
+    settings: &FusionSettings,
+    filter_model: &FilterModel,
 ) -> Result<Alignment, Refused> {
     let gnss = settings.kept(recorded.gnss);
     let courses = courses(&gnss, recorded.imu);
@@ -57,7 +59,7 @@ pub fn coarse(
             SLOW.0
         )));
     };
-    let scene = StartSearch::new(&recorded.with_gnss(&gnss), settings, belief);
+    let scene = StartSearch::new(&recorded.with_gnss(&gnss), settings, filter_model);
     let first_s = courses[first].fix.t_s;
     let later = LATER_S
         .iter()
@@ -96,14 +98,14 @@ pub fn coarse(
 /// # Errors
 /// When there is nothing to level with.
 pub fn towards(
-    recorded: &Recorded<'_>,
-    settings: &Settings,
-    belief: &Belief,
+    recorded: &DriveData<'_>,
+    settings: &FusionSettings,
+    filter_model: &FilterModel,
     heading: Heading,
 ) -> Result<Alignment, Refused> {
     let gnss = settings.kept(recorded.gnss);
     let courses = courses(&gnss, recorded.imu);
-    let scene = StartSearch::new(&recorded.with_gnss(&gnss), settings, belief);
+    let scene = StartSearch::new(&recorded.with_gnss(&gnss), settings, filter_model);
     let sigma = heading.sigma.hypot(settings.mounting_sigma_b.z);
     let start_at = |at: usize| {
         let scene = scene.at(&courses[at].fix);
@@ -140,9 +142,9 @@ impl StartCandidate {
 /// A recording, and the filter that is tried on it.
 #[derive(Clone, Copy)]
 struct StartSearch<'a> {
-    recorded: Recorded<'a>,
-    settings: &'a Settings,
-    belief: &'a Belief,
+    recorded: DriveData<'a>,
+    settings: &'a FusionSettings,
+    filter_model: &'a FilterModel,
     /// Standard deviations of the biases, which spoil a levelling: accelerometer (m/s²), gyroscope (rad/s).
     bias: [f64; 2],
     /// Gravity at the fix that is examined (m/s²).
@@ -150,12 +152,16 @@ struct StartSearch<'a> {
 }
 
 impl<'a> StartSearch<'a> {
-    fn new(recorded: &Recorded<'a>, settings: &'a Settings, belief: &'a Belief) -> Self {
+    fn new(
+        recorded: &DriveData<'a>,
+        settings: &'a FusionSettings,
+        filter_model: &'a FilterModel,
+    ) -> Self {
         Self {
             recorded: *recorded,
             settings,
-            belief,
-            bias: Sensor::ALL.map(|sensor| belief.initial_bias_sigma(sensor)),
+            filter_model,
+            bias: Sensor::ALL.map(|sensor| filter_model.initial_bias_sigma(sensor)),
             g: f64::NAN,
         }
     }
@@ -238,7 +244,7 @@ impl<'a> StartSearch<'a> {
     fn finished(&self, mut candidate: StartCandidate) -> Alignment {
         let doubts = candidate.doubts();
         let start = &mut candidate.start;
-        let settings = Settings {
+        let settings = FusionSettings {
             smooth: true,
             ..self.settings.trial()
         };
@@ -263,9 +269,9 @@ impl<'a> StartSearch<'a> {
     }
 
     /// The solution from a start over this many seconds, its rows those of the start and the end.
-    fn until(&self, settings: &Settings, start: &Start, seconds: f64) -> Option<Solution> {
+    fn until(&self, settings: &FusionSettings, start: &Start, seconds: f64) -> Option<Solution> {
         let recorded = self.recorded.until(start.t_s + seconds);
-        fuse(&recorded, self.belief, start, settings, None).ok()
+        fuse(&recorded, self.filter_model, start, settings, None).ok()
     }
 
     fn agreement(&self, start: &Start, seconds: f64) -> Agreement {
@@ -276,10 +282,10 @@ impl<'a> StartSearch<'a> {
                 components: 0,
             };
         };
-        let (nis, components) = total_nis(used(&solution));
+        let (nis, components) = total_nis(not_withheld(&solution));
         Agreement {
             // the sum of the logarithms stands for the determinant: the correlations of both starts are alike
-            cost: used(&solution)
+            cost: not_withheld(&solution)
                 .map(|f| f.nis + 2.0 * f.sigma.iter().map(|s| s.ln()).sum::<f64>())
                 .sum(),
             nis: nis / components.max(1) as f64,

@@ -4,9 +4,9 @@
 //! is the rate of the course. The lag at which the two agree best is the difference of the clocks.
 
 use super::alignment::{MovingFix, coarse, courses, steps};
-use super::{Recorded, Settings, Solution, check_clocks, displaced, fuse};
+use super::{DriveData, FusionSettings, Solution, antenna_offset, check_clocks, fuse};
 use crate::earth::ned_difference;
-use crate::ekf::Belief;
+use crate::ekf::FilterModel;
 use crate::frames::wrap_angle;
 use crate::gnss::{GnssFix, GnssVelocity};
 use crate::imu::ImuIncrement;
@@ -47,8 +47,8 @@ pub struct ClocksApart {
 /// The lag at which the turns agree; none where they agree as they are, or at no lag. `rest` is what the innovations say is left
 /// of the delay where the fixes are earlier by it, and its standard deviation (s).
 pub fn clocks_apart(
-    recorded: &Recorded<'_>,
-    rest: impl FnOnce(&Recorded<'_>) -> Option<[f64; 2]>,
+    recorded: &DriveData<'_>,
+    rest: impl FnOnce(&DriveData<'_>) -> Option<[f64; 2]>,
 ) -> Option<ClocksApart> {
     let within = |longest_s: &f64| agreement(recorded, *longest_s);
     let [lag_s, best, now] = LONGEST_S.iter().find_map(within)?;
@@ -70,7 +70,7 @@ pub fn clocks_apart(
 
 /// The lag of the gyroscopes at which the turns are the same ones (s), their correlation there and as the clocks are; by
 /// positions where velocities tell none.
-fn agreement(recorded: &Recorded<'_>, longest_s: f64) -> Option<[f64; 3]> {
+fn agreement(recorded: &DriveData<'_>, longest_s: f64) -> Option<[f64; 3]> {
     let turned = TurnedAngle::new(recorded.imu);
     let steps = (longest_s / STEP_S) as i32;
     let of_turns = |gnss: &[GnssFix]| {
@@ -94,7 +94,7 @@ struct Turn {
 }
 
 /// The turns between fixes that move fast enough for a course, one after the other.
-fn turns(recorded: &Recorded<'_>) -> Vec<Turn> {
+fn turns(recorded: &DriveData<'_>) -> Vec<Turn> {
     let courses = courses(recorded.gnss, recorded.imu);
     let all: Vec<Turn> = steps(&courses, APART_S.0)
         .into_iter()
@@ -170,7 +170,7 @@ impl TurnedAngle {
 //
 // Two loggers of one drive begin within a minute of one another. The turns of the course against those of the
 // gyroscopes ([`super::clocks_apart`]) tell the rest to some tenths of a second; the delay among these at which the
-// filter's innovations are smallest, and their slope there ([`super::displaced()`]), tell it to hundredths.
+// filter's innovations are smallest, and their slope there ([`super::antenna_offset()`]), tell it to hundredths.
 
 /// Delays that are tried about the one at which the turns agree, and how far apart (s): the course of what walks is ahead
 /// of the turns of its body by half a step.
@@ -185,7 +185,7 @@ const CONTRADICTS: f64 = 16.0;
 
 /// Time that the clock of the fixes is ahead of the IMU's (s), where the two have nothing in common and the turns agree
 /// when both recordings begin within a minute of one another.
-pub fn rough_origin(recorded: &Recorded<'_>) -> Option<f64> {
+pub fn rough_origin(recorded: &DriveData<'_>) -> Option<f64> {
     let begins_s = check_clocks(recorded).err()?.delay_s()?;
     let gnss = earlier(recorded.gnss, begins_s);
     let [lag_s, ..] = agreement(&recorded.with_gnss(&gnss), LONGEST_S[0])?;
@@ -221,7 +221,11 @@ fn with_velocities(gnss: &[GnssFix]) -> Vec<GnssFix> {
 }
 
 /// The rest of a delay that was found roughly (s): the one at which the innovations are smallest.
-pub fn rest_of_origin(recorded: &Recorded<'_>, belief: &Belief, settings: &Settings) -> f64 {
+pub fn refine_clock_offset(
+    recorded: &DriveData<'_>,
+    filter_model: &FilterModel,
+    settings: &FusionSettings,
+) -> f64 {
     let to_s = recorded.gnss.first().map_or(0.0, |fix| fix.t_s) + MOST_S;
     let recorded = recorded.until(to_s);
     let fixes = recorded.gnss;
@@ -230,8 +234,8 @@ pub fn rest_of_origin(recorded: &Recorded<'_>, belief: &Belief, settings: &Setti
         let delay_s = f64::from(k) * TRIED.1;
         let gnss = earlier(fixes, delay_s);
         let recorded = recorded.with_gnss(&gnss);
-        let start = coarse(&recorded, &settings, belief).ok()?.start;
-        let solution = fuse(&recorded, belief, &start, &settings, None).ok()?;
+        let start = coarse(&recorded, &settings, filter_model).ok()?.start;
+        let solution = fuse(&recorded, filter_model, &start, &settings, None).ok()?;
         Some((delay_s, disagreement(&solution, fixes.len()), start))
     };
     let all: Vec<_> = (-TRIED.0..=TRIED.0)
@@ -243,7 +247,7 @@ pub fn rest_of_origin(recorded: &Recorded<'_>, belief: &Belief, settings: &Setti
         return 0.0;
     };
     let gnss = earlier(fixes, *delay_s);
-    let found = displaced(&recorded.with_gnss(&gnss), belief, start, &settings);
+    let found = antenna_offset(&recorded.with_gnss(&gnss), filter_model, start, &settings);
     let rest_s = found.and_then(|found| found.delay_s);
     delay_s + rest_s.map_or_else(|| vertex(&all, least), |[rest_s, _]| rest_s)
 }
@@ -326,7 +330,7 @@ mod tests {
     }
 
     fn turns_apart((imu, gnss): &(Vec<ImuIncrement>, Vec<GnssFix>)) -> Option<ClocksApart> {
-        let recorded = Recorded {
+        let recorded = DriveData {
             imu,
             gnss,
             aids: &[],
@@ -340,7 +344,7 @@ mod tests {
     }
 
     /// Positions alone, 2 m off to any side, that begin 20 s after the IMU on a clock of their own: the origin is found to the
-    /// second that `rest_of_origin` looks at.
+    /// second that `refine_clock_offset` looks at.
     #[test]
     fn positions_tell_the_origin_of_their_clock() {
         let late_s = 50_400.0;
@@ -352,7 +356,7 @@ mod tests {
             [fix.lat, fix.lon, fix.h] = moved(place, DVec3::new(off_m(), off_m(), 0.0));
             (fix.pos_sigma_n, fix.velocity) = (DVec3::splat(2.0), None);
         }
-        let found_s = rough_origin(&Recorded {
+        let found_s = rough_origin(&DriveData {
             imu: &imu,
             gnss: &gnss[20..],
             aids: &[],

@@ -27,7 +27,7 @@ pub(super) struct Gate {
 
 /// Fate of a fix.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Passage {
+pub(super) enum GateDecision {
     /// It is used.
     Used,
     /// It is used, since those before it were rejected for too long.
@@ -56,26 +56,26 @@ impl Gate {
     }
 
     /// Decides on the next fix.
-    pub(super) fn pass(&mut self, t_s: f64, nis: f64, components: usize) -> Passage {
+    pub(super) fn pass(&mut self, t_s: f64, nis: f64, components: usize) -> GateDecision {
         let bound = Self::bound(self.level, components);
         self.is_open |= t_s - self.last_s > self.apart_s;
         self.last_s = t_s;
         if nis <= bound {
             (self.is_open, self.rejected) = (false, 0);
-            return Passage::Used;
+            return GateDecision::Used;
         }
         if self.is_open {
-            return Passage::Used;
+            return GateDecision::Used;
         }
         if self.rejected == 0 {
             self.since_s = t_s;
         }
         if self.rejected >= RUN.0 && t_s - self.since_s >= RUN.1 {
             (self.is_open, self.rejected) = (true, 0);
-            return Passage::Reopened;
+            return GateDecision::Reopened;
         }
         self.rejected += 1;
-        Passage::Rejected(bound)
+        GateDecision::Rejected(bound)
     }
 }
 
@@ -83,7 +83,7 @@ impl Gate {
 mod tests {
     use super::*;
 
-    fn fates(nis: impl IntoIterator<Item = (f64, f64)>) -> Vec<Passage> {
+    fn fates(nis: impl IntoIterator<Item = (f64, f64)>) -> Vec<GateDecision> {
         let mut gate = Gate::new(Some(GATE_LEVEL), &[]);
         nis.into_iter()
             .map(|(t_s, nis)| gate.pass(t_s, nis, 3))
@@ -105,7 +105,9 @@ mod tests {
         ]);
         let is_rejected: Vec<bool> = of
             .iter()
-            .map(|fate| matches!(fate, Passage::Rejected(bound) if (bound - 21.1).abs() < 0.05))
+            .map(
+                |fate| matches!(fate, GateDecision::Rejected(bound) if (bound - 21.1).abs() < 0.05),
+            )
             .collect();
         let expected = [false, false, true, false, false, false, false, true];
         assert_eq!(is_rejected, expected, "{of:?}");
@@ -115,16 +117,16 @@ mod tests {
     fn a_run_of_rejections_opens_the_gate_until_a_fix_is_as_stated() {
         let far = (1..=40).map(|k| (f64::from(k), if k == 1 { 1.0 } else { 50.0 }));
         let of = fates(far.chain([(41.0, 3.0), (42.0, 50.0)]));
-        let reopened = of.iter().position(|fate| *fate == Passage::Reopened);
+        let reopened = of.iter().position(|fate| *fate == GateDecision::Reopened);
         assert_eq!(reopened, Some(31));
-        assert!(of[32..41].iter().all(|fate| *fate == Passage::Used));
-        assert!(matches!(of[41], Passage::Rejected(_)));
+        assert!(of[32..41].iter().all(|fate| *fate == GateDecision::Used));
+        assert!(matches!(of[41], GateDecision::Rejected(_)));
         // ten fixes a second: three seconds, of which there are more than ten fixes, are too short
         let fast = (1..=90).map(|k| (0.1 * f64::from(k), if k == 1 { 1.0 } else { 50.0 }));
         assert!(
             fates(fast)[1..]
                 .iter()
-                .all(|fate| matches!(fate, Passage::Rejected(_)))
+                .all(|fate| matches!(fate, GateDecision::Rejected(_)))
         );
     }
 }

@@ -1,7 +1,7 @@
 //! The solution of any filter against a reference: its errors, whether they are as large as it states, and what else may
 //! explain them: another clock, another point of the vehicle, other axes, heights or units.
 
-use super::displaced::{ANTENNA, DELAY, Normal};
+use super::antenna_offset::{ANTENNA, DELAY, Normal};
 use super::{Nine, horizontal};
 use crate::frames::{NavState, RollPitchYaw};
 use crate::linalg::{mean, median};
@@ -370,7 +370,7 @@ struct Transformation {
     is_uneven: bool,
 }
 
-const fn as_it_is(truth: NavState) -> NavState {
+const fn identity(truth: NavState) -> NavState {
     truth
 }
 
@@ -402,7 +402,7 @@ const TRANSFORMATIONS: [Transformation; 16] = {
         Transformation { block, cause, truth, sigma, is_uneven: false }
     }
     const fn variance(block: usize, cause: &'static str) -> Transformation {
-        Transformation { block, cause, truth: as_it_is, sigma: f64::sqrt, is_uneven: true }
+        Transformation { block, cause, truth: identity, sigma: f64::sqrt, is_uneven: true }
     }
     const RADIANS: &str = "attitudes are radians named degrees";
     const DEGREES: &str = "attitudes are degrees named radians";
@@ -417,8 +417,8 @@ const TRANSFORMATIONS: [Transformation; 16] = {
         new(1, SPEEDS, |x| with_velocity(x, |v| v / KM_H), |s| s / KM_H),
         new(1, "velocities are east, north, up, named north, east, down",
             |x| with_velocity(x, |v| DVec3::new(v.y, v.x, -v.z)), |s| s),
-        new(2, "standard deviations of attitude are radians named degrees", as_it_is, |s| s / DEG),
-        new(2, "standard deviations of attitude are degrees named radians", as_it_is, |s| s * DEG),
+        new(2, "standard deviations of attitude are radians named degrees", identity, |s| s / DEG),
+        new(2, "standard deviations of attitude are degrees named radians", identity, |s| s * DEG),
         new(2, RADIANS, |x| with_angles(x, |all| all.map(|a| a * DEG)), |s| s),
         new(2, RADIANS, |x| with_angles(x, |all| all.map(|a| a * DEG)), |s| s * DEG),
         new(2, DEGREES, |x| with_angles(x, |all| all.map(|a| a / DEG)), |s| s),

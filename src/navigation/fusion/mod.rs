@@ -21,7 +21,7 @@
 //! let axis = Composite::new(vec![Process::white(1e-6)?, Process::random_walk(1e-14)?]);
 //! let model = Model::pooled(100.0, &axis, &axis);
 //! let scenario = Scenario::default();
-//! let beliefs = [Belief::new(&model, FilterStates::Full, 1.0, 800.0)?.with_initial(&scenario.initial)];
+//! let beliefs = [FilterModel::new(&model, FilterStates::Full, 1.0, 800.0)?.with_initial(&scenario.initial)];
 //! let experiment = scenario.experiment(&drive, Truth::Model(&model), &beliefs, &[], 1);
 //! let recording = record(&Plan::new(&experiment)?, 0);
 //! let recorded = Recorded { imu: &recording.imu, gnss: &recording.gnss, aids: &[] };
@@ -46,8 +46,8 @@
 //! ```
 
 pub mod alignment;
+mod antenna_offset;
 mod clocks;
-mod displaced;
 mod gate;
 pub mod judge;
 pub mod mounting;
@@ -59,10 +59,11 @@ mod vehicle_tests;
 mod white_noise;
 mod withheld;
 
-pub use clocks::{ClocksApart, clocks_apart, earlier, rest_of_origin, rough_origin};
-pub use displaced::{
-    Correlation, Displaced, WeightedSolution, Whiteness, displaced, fuse_correlated, interval_s,
+pub use antenna_offset::{
+    AntennaOffset, Correlation, WeightedSolution, Whiteness, antenna_offset, fuse_correlated,
+    interval_s,
 };
+pub use clocks::{ClocksApart, clocks_apart, earlier, refine_clock_offset, rough_origin};
 pub use gate::GATE_LEVEL;
 pub use outcome::{
     EndError, Finding, FixCounts, FromReference, FusionAssessment, FusionError, FusionFigures,
@@ -73,8 +74,8 @@ pub use vehicle::{
     AidInnovations, AidRecord, VehicleVelocity, WheelSpeed, aid_innovations, vehicle_velocities,
     wheel_ratio,
 };
-pub use white_noise::{OwnNoise, own_noise, predicts_as_well};
-pub use withheld::{Withheld, withheld};
+pub use white_noise::{ExcessWhiteNoise, own_noise, predicts_as_well};
+pub use withheld::{WithheldWindows, withheld};
 
 use crate::earth::GravityModel;
 use crate::ekf::InitialSettings;
@@ -95,7 +96,7 @@ fn horizontal(values: &Nine) -> f64 {
 
 /// Recorded measurements, each in order of time.
 #[derive(Debug, Clone, Copy)]
-pub struct Recorded<'a> {
+pub struct DriveData<'a> {
     /// Samples whose intervals follow one another.
     pub imu: &'a [ImuIncrement],
     /// Fixes.
@@ -104,7 +105,7 @@ pub struct Recorded<'a> {
     pub aids: &'a [VehicleVelocity],
 }
 
-impl<'a> Recorded<'a> {
+impl<'a> DriveData<'a> {
     /// The same with other fixes.
     const fn with_gnss(self, gnss: &'a [GnssFix]) -> Self {
         Self { gnss, ..self }
@@ -120,7 +121,7 @@ impl<'a> Recorded<'a> {
     }
 }
 
-impl Settings {
+impl FusionSettings {
     /// For a trial, of which innovations are examined and hardly a row.
     fn trial(&self) -> Self {
         Self {
@@ -145,7 +146,7 @@ fn kept(gnss: &[GnssFix], outages: &[Outage]) -> Vec<GnssFix> {
 
 /// Settings of a fusion.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Settings {
+pub struct FusionSettings {
     /// The IMU in the vehicle: takes the IMU's axes, returns front, right, down.
     #[serde(rename = "imu_to_vehicle_xyzw")]
     pub q_s_b: DQuat,
@@ -219,7 +220,7 @@ pub enum Levelling {
 
 /// The state at an instant, and how well it is known.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct SolutionRow {
     /// Time (s).
     pub t_s: f64,
     /// Position of the IMU, velocity, attitude of the vehicle.
@@ -275,9 +276,9 @@ pub struct FixRecord {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Solution {
     /// States at `rows_hz`.
-    pub rows: Vec<Row>,
+    pub rows: Vec<SolutionRow>,
     /// The same rows smoothed, where that was asked for.
-    pub smoothed: Option<Vec<Row>>,
+    pub smoothed: Option<Vec<SolutionRow>>,
     /// Every fix from start to end of the IMU.
     pub fixes: Vec<FixRecord>,
     /// When the gate was opened after a run of rejections (s).
@@ -294,7 +295,7 @@ pub struct Solution {
 ///
 /// # Errors
 /// [`FusionError::Clocks`].
-pub fn check_clocks(recorded: &Recorded<'_>) -> Result<(), FusionError> {
+pub fn check_clocks(recorded: &DriveData<'_>) -> Result<(), FusionError> {
     let (imu, gnss) = spans(recorded);
     if imu.0 <= gnss.1 && gnss.0 <= imu.1 {
         Ok(())
@@ -303,7 +304,7 @@ pub fn check_clocks(recorded: &Recorded<'_>) -> Result<(), FusionError> {
     }
 }
 
-fn spans(recorded: &Recorded<'_>) -> ((f64, f64), (f64, f64)) {
+fn spans(recorded: &DriveData<'_>) -> ((f64, f64), (f64, f64)) {
     // microseconds: what clocks and people tell apart
     let rounded = |t: Option<f64>| t.map_or(f64::NAN, |t| (t * 1e6).round() / 1e6);
     let ends = |first: Option<f64>, last: Option<f64>| (rounded(first), rounded(last));

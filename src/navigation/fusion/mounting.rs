@@ -10,9 +10,9 @@ use super::alignment::{
     Alignment, CarrierSpeed, MovingFix, between, carried, coarse, courses, steps,
 };
 use super::outcome::{is_contradicted, nis_per_component};
-use super::{Recorded, Row, Settings, fuse};
+use super::{DriveData, FusionSettings, SolutionRow, fuse};
 use crate::earth::gravity_down;
-use crate::ekf::Belief;
+use crate::ekf::FilterModel;
 use crate::frames::RollPitchYaw;
 use crate::units::{DEG, Refused};
 use glam::{DQuat, DVec3};
@@ -55,9 +55,9 @@ impl Mounting {
 /// # Errors
 /// When the drive does not show it.
 pub fn find(
-    recorded: &Recorded<'_>,
-    settings: &Settings,
-    belief: &Belief,
+    recorded: &DriveData<'_>,
+    settings: &FusionSettings,
+    filter_model: &FilterModel,
 ) -> Result<Mounting, Refused> {
     let gnss = settings.kept(recorded.gnss);
     let recorded = recorded.with_gnss(&gnss);
@@ -65,7 +65,7 @@ pub fn find(
     // with standard deviations as stated, or where the fixes contradict those, with what makes their NIS 1
     let (mut widened, mut factor) = (gnss.clone(), 1.0);
     let found = loop {
-        match through(&recorded.with_gnss(&widened), settings, belief, rough)? {
+        match refine_with_filter(&recorded.with_gnss(&widened), settings, filter_model, rough)? {
             Ok(found) => break found,
             Err(nis) if nis > 1.0 && factor * nis.sqrt() <= MOST_WIDENED => {
                 factor *= nis.sqrt();
@@ -219,27 +219,28 @@ struct MotionSample {
 }
 
 /// Refined by the filter, or the NIS per component of fixes that contradict it.
-fn through(
-    recorded: &Recorded<'_>,
-    settings: &Settings,
-    belief: &Belief,
+fn refine_with_filter(
+    recorded: &DriveData<'_>,
+    settings: &FusionSettings,
+    filter_model: &FilterModel,
     rough: (DQuat, f64),
 ) -> Result<Result<Mounting, f64>, Refused> {
     let named = settings.q_s_b.inverse();
     let loose = DVec3::Z * (LOOSE * rough.1);
-    let settings = Settings {
+    let settings = FusionSettings {
         q_s_b: rough.0,
         mounting_sigma_b: loose,
         rows_hz: ROWS_HZ,
         ..settings.clone()
     };
-    let Alignment { start, doubts } = coarse(recorded, &settings, belief).map_err(not_found)?;
+    let Alignment { start, doubts } =
+        coarse(recorded, &settings, filter_model).map_err(not_found)?;
     // what the rows state is then of the IMU's attitude
-    let settings = Settings {
+    let settings = FusionSettings {
         mounting_sigma_b: DVec3::ZERO,
         ..settings
     };
-    let solution = fuse(recorded, belief, &start, &settings, None).map_err(not_found)?;
+    let solution = fuse(recorded, filter_model, &start, &settings, None).map_err(not_found)?;
     // attitudes of a filter that the fixes contradict are no worse than it states only by chance
     if is_contradicted(&solution, &doubts) {
         return Ok(Err(nis_per_component(&solution)));
@@ -254,7 +255,7 @@ fn through(
         .collect();
     turn_to_front(&mut moments)?;
     let mean = mean(&moments);
-    upright(&moments, mean)?;
+    refuse_banking(&moments, mean)?;
     let blocks = deviations(&moments, mean);
     if blocks[0].count() < FEWEST {
         return Err(too_slow(moments.len() as f64 / ROWS_HZ));
@@ -275,7 +276,7 @@ fn through(
 }
 
 /// The vehicle beside its track at a row that moves fast enough for a course.
-fn moment([before, row, after]: [&Row; 3], pace: CarrierSpeed) -> Option<MotionSample> {
+fn moment([before, row, after]: [&SolutionRow; 3], pace: CarrierSpeed) -> Option<MotionSample> {
     let (v_n, speed) = (row.state.v_n, row.state.v_n.truncate().length());
     let of_velocity = row.sigma[3].max(row.sigma[4]);
     if speed < pace.min_heading_speed(of_velocity) {
@@ -342,7 +343,7 @@ fn mean(moments: &[MotionSample]) -> DQuat {
 
 /// Refuses a carrier that banks into its turns: an aircraft, whose track says little of its
 /// attitude.
-fn upright(moments: &[MotionSample], mean: DQuat) -> Result<(), Refused> {
+fn refuse_banking(moments: &[MotionSample], mean: DQuat) -> Result<(), Refused> {
     let square = moments
         .iter()
         .map(|m| deviation(m, mean).x.powi(2))
@@ -421,7 +422,7 @@ fn track_attitude(v_n: DVec3, sigma_down: f64) -> DQuat {
 }
 
 /// The rotation from the IMU to the track, and the standard deviation of its yaw (rad).
-fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), Refused> {
+fn along(recorded: &DriveData<'_>, settings: &FusionSettings) -> Result<(DQuat, f64), Refused> {
     let stretches = stretches(recorded, settings);
     let mut seen = BlockSums::default();
     stretches.iter().for_each(|s| seen.add(s.t_s, 0.0, 1.0));
@@ -472,7 +473,7 @@ fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<(DQuat, f64), R
 }
 
 /// The stretches between fixes that have a course.
-fn stretches(recorded: &Recorded<'_>, settings: &Settings) -> Vec<VelocityChange> {
+fn stretches(recorded: &DriveData<'_>, settings: &FusionSettings) -> Vec<VelocityChange> {
     let courses: Vec<MovingFix> = courses(recorded.gnss, recorded.imu)
         .into_iter()
         .filter(|m| m.speed() >= m.min_heading_speed())
@@ -485,8 +486,8 @@ fn stretches(recorded: &Recorded<'_>, settings: &Settings) -> Vec<VelocityChange
 }
 
 fn stretch(
-    recorded: &Recorded<'_>,
-    settings: &Settings,
+    recorded: &DriveData<'_>,
+    settings: &FusionSettings,
     (from, from_s): (&MovingFix, f64),
     (to, to_s): (&MovingFix, f64),
 ) -> Option<VelocityChange> {

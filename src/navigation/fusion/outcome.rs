@@ -1,8 +1,8 @@
 //! Figures of a fusion: fixes used, consistency, errors at the ends of outages. They serialize as `summary.json` has them.
 
 use super::{
-    AidInnovations, FixRecord, Nine, Row, RowError, Solution, WeightedSolution, Withheld,
-    aid_innovations, horizontal,
+    AidInnovations, FixRecord, Nine, RowError, Solution, SolutionRow, WeightedSolution,
+    WithheldWindows, aid_innovations, horizontal,
 };
 use crate::linalg::{by_value, mean, median};
 use crate::metrics::{DriveVerdict, NormalisedErrors, PerState, Verdict, VerdictKind};
@@ -167,10 +167,10 @@ pub fn outcome(solution: &Solution, outages: &[Outage]) -> FusionFigures {
 }
 
 fn outliers(solution: &Solution) -> Option<Outliers> {
-    let rejected = used(solution).filter(|f| !f.used);
+    let rejected = not_withheld(solution).filter(|f| !f.used);
     let t_s: Vec<f64> = rejected.map(|f| f.t_s).collect();
     (!t_s.is_empty()).then(|| Outliers {
-        share: t_s.len() as f64 / used(solution).count() as f64,
+        share: t_s.len() as f64 / not_withheld(solution).count() as f64,
         t_s,
         gate_reopened_s: solution.gate_reopened_s.clone(),
     })
@@ -202,7 +202,7 @@ fn ends(solution: &Solution) -> Option<OutageEnds> {
 
 /// Mean NIS of the fixes used or rejected, divided by their number of components.
 pub(super) fn nis_per_component(solution: &Solution) -> f64 {
-    let (nis, components) = total_nis(used(solution));
+    let (nis, components) = total_nis(not_withheld(solution));
     nis / components as f64
 }
 
@@ -214,13 +214,13 @@ pub(super) fn total_nis<'a>(fixes: impl Iterator<Item = &'a FixRecord>) -> (f64,
     })
 }
 
-fn from_reference(rows: &[Row], outages: &[Outage]) -> Option<FromReference> {
+fn from_reference(rows: &[SolutionRow], outages: &[Outage]) -> Option<FromReference> {
     let errors: Vec<RowError> = rows.iter().filter_map(|row| row.error).collect();
     let rms = |of: &dyn Fn(&RowError) -> f64| mean(errors.iter().map(|e| of(e).powi(2))).sqrt();
     let per_state =
         |of: &dyn Fn(&RowError, usize) -> f64| std::array::from_fn(|i| rms(&|e| of(e, i)));
     let rmse: Nine = per_state(&|e, i| e.values[i]);
-    let normalised = |row: &Row| {
+    let normalised = |row: &SolutionRow| {
         let e = row.error?;
         Some(NormalisedErrors {
             t_s: row.t_s,
@@ -247,8 +247,12 @@ fn from_reference(rows: &[Row], outages: &[Outage]) -> Option<FromReference> {
     })
 }
 
-fn smoothed(filtered: &[Row], smoothed: &[Row], outages: &[Outage]) -> SmoothedOutcome {
-    let sigma_rms = |rows: &[Row]| {
+fn smoothed(
+    filtered: &[SolutionRow],
+    smoothed: &[SolutionRow],
+    outages: &[Outage],
+) -> SmoothedOutcome {
+    let sigma_rms = |rows: &[SolutionRow]| {
         let squares = rows.iter().map(|row| horizontal(&row.sigma).powi(2));
         mean(squares).sqrt()
     };
@@ -276,7 +280,7 @@ fn smoothed(filtered: &[Row], smoothed: &[Row], outages: &[Outage]) -> SmoothedO
 }
 
 /// Largest horizontal standard deviation of the rows in an outage and distance from the reference; none without rows.
-fn largest(rows: &[Row], outage: &Outage) -> Option<(f64, Option<f64>)> {
+fn largest(rows: &[SolutionRow], outage: &Outage) -> Option<(f64, Option<f64>)> {
     let within = || rows.iter().filter(|row| outage.withholds(row.t_s));
     let error = within()
         .filter_map(|row| Some(horizontal(&row.error?.values)))
@@ -325,7 +329,7 @@ const NIS_LIMITS: (f64, f64) = (2.0, 4.0);
 /// NIS per component below which the stated sigmas of the fixes are too large to decide.
 const NIS_LOW: f64 = 0.5;
 /// Components with which the mean NIS of a consistent filter stays below the first limit.
-const FEWEST: usize = 50;
+const MIN_COMPONENTS: usize = 50;
 /// Stretch in which the NIS is examined by itself (s), and the share of bad ones that is too much.
 const STRETCH_S: f64 = 60.0;
 const BAD_STRETCHES: f64 = 0.1;
@@ -389,7 +393,7 @@ pub enum Finding {
         verdict: Verdict,
     },
     /// Errors at the ends of windows in which fixes were withheld.
-    Withheld(Withheld),
+    Withheld(WithheldWindows),
 }
 
 /// Verdict and the findings it rests on.
@@ -418,7 +422,7 @@ pub fn assess(
     weighed: &WeightedSolution,
     outcome: &FusionFigures,
     of_start: &[(VerdictKind, Finding)],
-    withheld: Option<Withheld>,
+    withheld: Option<WithheldWindows>,
 ) -> FusionAssessment {
     let mut findings = of_start.to_vec();
     let of_fixes = weighed.with_stated_sigmas();
@@ -490,19 +494,19 @@ fn correlated(weighed: &WeightedSolution) -> Option<(VerdictKind, Finding)> {
 }
 
 /// Fixes that were not withheld: used, or rejected by the gate.
-pub(super) fn used(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
+pub(super) fn not_withheld(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
     let fixes = solution.fixes.iter();
     fixes.filter(|f| f.used || f.rejected_above.is_some())
 }
 
 fn nis(solution: &Solution) -> (VerdictKind, Finding) {
-    let (nis, components) = total_nis(used(solution));
+    let (nis, components) = total_nis(not_withheld(solution));
     let per_component = nis / components as f64;
     let verdict = match per_component {
         _ if components == 0 => return (VerdictKind::Doubtful, Finding::NoFix),
         nis if nis > nis_bound(components) => VerdictKind::Overconfident,
         nis if nis > bound(NIS_LIMITS.0, components) => VerdictKind::Doubtful,
-        nis if nis < NIS_LOW || components < FEWEST => VerdictKind::Undecided,
+        nis if nis < NIS_LOW || components < MIN_COMPONENTS => VerdictKind::Undecided,
         _ => VerdictKind::Consistent,
     };
     (verdict, Finding::Nis { per_component })
@@ -527,9 +531,9 @@ fn aids(solution: &Solution) -> impl Iterator<Item = (VerdictKind, Finding)> {
 /// Minutes in which most fixes are far from what is stated. The farthest tenth of them is left out: single
 /// wild fixes are the receiver's.
 fn stretches(solution: &Solution) -> Option<(VerdictKind, Finding)> {
-    let begin_s = used(solution).next()?.t_s;
+    let begin_s = not_withheld(solution).next()?.t_s;
     let mut minutes: Vec<Vec<&FixRecord>> = Vec::new();
-    for fix in used(solution) {
+    for fix in not_withheld(solution) {
         let minute = ((fix.t_s - begin_s) / STRETCH_S) as usize;
         minutes.resize(minutes.len().max(minute + 1), Vec::new());
         minutes[minute].push(fix);
@@ -538,7 +542,7 @@ fn stretches(solution: &Solution) -> Option<(VerdictKind, Finding)> {
     let bad: Vec<(usize, f64)> = minutes
         .iter()
         .enumerate()
-        .filter_map(|(k, fixes)| Some((k, far(fixes)?)))
+        .filter_map(|(k, fixes)| Some((k, trimmed_nis_if_too_large(fixes)?)))
         .collect();
     let (worst, nis_per_component) = *bad.iter().max_by(|a, b| by_value(a, b))?;
     let minutes = Finding::Minutes {
@@ -552,7 +556,7 @@ fn stretches(solution: &Solution) -> Option<(VerdictKind, Finding)> {
 }
 
 /// NIS per component of these fixes without the largest tenth; `None` if it is not too large.
-fn far(fixes: &[&FixRecord]) -> Option<f64> {
+fn trimmed_nis_if_too_large(fixes: &[&FixRecord]) -> Option<f64> {
     let mut sorted = fixes.to_vec();
     sorted.sort_by(|a, b| a.nis.total_cmp(&b.nis));
     let kept = sorted[..sorted.len() * 9 / 10].iter().copied();
@@ -811,7 +815,7 @@ mod assessment_tests {
         let judged_at = |nis: f64, ratio: f64, windows: usize| {
             let all = solution(|_| nis, 600);
             let squares = (0..windows).map(|_| (6.0 * ratio * ratio, 6));
-            let withheld = Withheld {
+            let withheld = WithheldWindows {
                 windows,
                 length_s: 20.0,
                 verdict: Verdict::of_windows(squares).unwrap(),

@@ -1,15 +1,16 @@
 //! A run of the filter through recorded data.
 
-use super::gate::{Gate, Passage};
+use super::gate::{Gate, GateDecision};
 use super::vehicle::{force, rate};
 use super::{
-    AidRecord, FixRecord, FusionError, Nine, Recorded, Row, RowError, Settings, Solution, Start,
-    VehicleVelocity, check_clocks, spans,
+    AidRecord, DriveData, FixRecord, FusionError, FusionSettings, Nine, RowError, Solution,
+    SolutionRow, Start, VehicleVelocity, check_clocks, spans,
 };
 use crate::earth::{MAX_LATITUDE, geodetic_to_ecef};
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::{
-    Belief, BodyVelocity, Ekf, Fix, Snapshot, advance, settle, update, update_body_velocity,
+    BodyVelocity, Ekf, FilterModel, Fix, Snapshot, advance, apply_pending_earth_step, update,
+    update_body_velocity,
 };
 use crate::frames::{NavState, RollPitchYaw};
 use crate::gnss::GnssFix;
@@ -31,10 +32,10 @@ use nalgebra::{DMatrix, DVector, Matrix3, SVector};
 /// # Errors
 /// Clocks that do not overlap, a start outside the data, a pole, divergence.
 pub fn fuse(
-    recorded: &Recorded<'_>,
-    belief: &Belief,
+    recorded: &DriveData<'_>,
+    filter_model: &FilterModel,
     start: &Start,
-    settings: &Settings,
+    settings: &FusionSettings,
     reference: Option<&Reference>,
 ) -> Result<Solution, FusionError> {
     check_clocks(recorded)?;
@@ -46,16 +47,16 @@ pub fn fuse(
         });
     }
     check_place(recorded, start, settings)?;
-    let mut filter = Filter::new(belief, start, settings);
+    let mut filter = Filter::new(filter_model, start, settings);
     let tape = match settings.smooth {
-        true => Some(Tape::new(
+        true => Some(SmootherHistory::new(
             &mut filter,
             start.t_s,
             most_marks(recorded, start, settings),
         )?),
         false => None,
     };
-    let mut run = Run {
+    let mut run = FusionPass {
         filter,
         tape,
         settings,
@@ -65,7 +66,7 @@ pub fn fuse(
         next_row: start.t_s,
         solution: Solution::default(),
     };
-    let mut bridges = Bridges::new(recorded.imu);
+    let mut bridges = GapFiller::new(recorded.imu);
     let mut fixes = recorded
         .gnss
         .iter()
@@ -104,7 +105,7 @@ pub fn fuse(
 }
 
 /// Rows, fixes and aids that there will be at most.
-fn most_marks(recorded: &Recorded<'_>, start: &Start, settings: &Settings) -> f64 {
+fn most_marks(recorded: &DriveData<'_>, start: &Start, settings: &FusionSettings) -> f64 {
     let samples = recorded.imu.iter().filter(|s| s.t_s > start.t_s).count() as f64;
     let rows = (spans(recorded).0.1 - start.t_s) * settings.rows_hz;
     1.0 + rows.min(samples).ceil() + (recorded.gnss.len() + recorded.aids.len()) as f64
@@ -113,9 +114,9 @@ fn most_marks(recorded: &Recorded<'_>, start: &Start, settings: &Settings) -> f6
 /// Refuses a start that its own and the receiver's deviations cannot explain: 10 km or 50 of both, beside
 /// the way to the first fix.
 fn check_place(
-    recorded: &Recorded<'_>,
+    recorded: &DriveData<'_>,
     start: &Start,
-    settings: &Settings,
+    settings: &FusionSettings,
 ) -> Result<(), FusionError> {
     const FAR: (f64, f64) = (10_000.0, 50.0);
     let Some(fix) = recorded.gnss.iter().find(|f| f.t_s >= start.t_s) else {
@@ -141,10 +142,10 @@ fn check_place(
 }
 
 /// The state of a run through the data.
-struct Run<'a> {
+struct FusionPass<'a> {
     filter: Filter,
-    tape: Option<Tape>,
-    settings: &'a Settings,
+    tape: Option<SmootherHistory>,
+    settings: &'a FusionSettings,
     reference: Option<&'a Reference>,
     gate: Gate,
     now: f64,
@@ -152,7 +153,7 @@ struct Run<'a> {
     solution: Solution,
 }
 
-impl Run<'_> {
+impl FusionPass<'_> {
     /// Through the sample as far as `to`, which is taken as the sample's end when it is nearly that.
     /// Where it bridges a gap, with the gap's uncertainty.
     fn advance(&mut self, sample: &ImuIncrement, spread: Option<Spread>, to: f64, slack: f64) {
@@ -171,21 +172,21 @@ impl Run<'_> {
     }
 
     fn fix(&mut self, fix: &GnssFix) -> Result<(), FusionError> {
-        let mut record = self.filter.look_at(fix);
+        let mut record = self.filter.innovation_of(fix);
         record.error = self.error().map(|e| e.values);
         if Outage::any_withholds(&self.settings.outages, fix.t_s) {
             record.used = false;
         } else {
             match self.gate.pass(fix.t_s, record.nis, record.innovation.len()) {
-                Passage::Rejected(bound) => {
+                GateDecision::Rejected(bound) => {
                     (record.used, record.rejected_above) = (false, Some(bound));
                 }
-                Passage::Reopened => self.solution.gate_reopened_s.push(fix.t_s),
-                Passage::Used => {}
+                GateDecision::Reopened => self.solution.gate_reopened_s.push(fix.t_s),
+                GateDecision::Used => {}
             }
         }
         if record.used {
-            self.taped(|filter| filter.update(fix));
+            self.record_update(|filter| filter.update(fix));
         }
         let nis = record.nis;
         self.solution.fixes.push(record);
@@ -199,7 +200,7 @@ impl Run<'_> {
     }
 
     /// An update of the filter, which a tape records if there is one.
-    fn taped<T>(&mut self, update: impl FnOnce(&mut Filter) -> T) -> T {
+    fn record_update<T>(&mut self, update: impl FnOnce(&mut Filter) -> T) -> T {
         match &mut self.tape {
             Some(tape) => tape.fix(&mut self.filter, self.now, update),
             None => update(&mut self.filter),
@@ -208,8 +209,8 @@ impl Run<'_> {
 
     /// Uses what the vehicle knows of its velocity.
     fn aid(&mut self, aid: &VehicleVelocity) -> Result<(), FusionError> {
-        settle(&mut self.filter.ekf);
-        let record = self.taped(|filter| filter.aid(aid));
+        apply_pending_earth_step(&mut self.filter.ekf);
+        let record = self.record_update(|filter| filter.aid(aid));
         let nis = record.nis();
         self.solution.aids.push(record);
         self.finite(nis)
@@ -267,7 +268,7 @@ struct Filter {
 }
 
 impl Filter {
-    fn new(belief: &Belief, start: &Start, settings: &Settings) -> Self {
+    fn new(filter_model: &FilterModel, start: &Start, settings: &FusionSettings) -> Self {
         let q_s_b = settings.q_s_b;
         let of_imu = NavState {
             q_b_n: start.state.q_b_n * q_s_b,
@@ -276,7 +277,7 @@ impl Filter {
         let nominal = Strapdown::new(&of_imu, settings.gravity);
         Self {
             // roll, pitch and yaw are those of the vehicle: their deviations go to n at its attitude
-            ekf: Ekf::new(nominal, belief, &start.state, &start.sigma),
+            ekf: Ekf::new(nominal, filter_model, &start.state, &start.sigma),
             q_s_b,
             mounting_sigma_b: settings.mounting_sigma_b,
             lever_arm_s: q_s_b.inverse() * settings.lever_arm_b,
@@ -324,8 +325,8 @@ impl Filter {
     }
 
     /// Innovation, its standard deviations and NIS, all measured components together.
-    fn look_at(&mut self, fix: &GnssFix) -> FixRecord {
-        settle(&mut self.ekf);
+    fn innovation_of(&mut self, fix: &GnssFix) -> FixRecord {
+        apply_pending_earth_step(&mut self.ekf);
         let measured = self.fix(fix);
         let components = fix.components();
         let (z, s) = self.ekf.innovation(&measured);
@@ -394,20 +395,20 @@ impl Filter {
         axes.iter().map(|axis| axis * axis.transpose()).sum()
     }
 
-    fn row(&mut self, t_s: f64) -> Row {
-        settle(&mut self.ekf);
+    fn row(&mut self, t_s: f64) -> SolutionRow {
+        apply_pending_earth_step(&mut self.ekf);
         let (state, p) = (self.state(), &self.ekf.p);
         let (r, v) = (p.variances(R).lane(0), p.variances(V).lane(0));
         let full = p.lane(0);
         let psi = full.fixed_view::<3, 3>(3 * PSI, 3 * PSI) + self.of_mounting(state.q_b_n);
-        let sigma = nine(&[
+        let sigma = flatten(&[
             r.map(f64::sqrt),
             v.map(f64::sqrt),
             angle_sigmas(state.q_b_n, &psi),
         ]);
         let bias = Sensor::ALL.map(|sensor| self.ekf.bias_of(sensor).lane(0));
         let bias_sigma = Sensor::ALL.map(|sensor| self.ekf.bias_sigma(sensor).lane(0));
-        Row {
+        SolutionRow {
             t_s,
             state,
             sigma,
@@ -424,7 +425,7 @@ impl Filter {
 
     /// Difference from a state whose velocity is known as well as `velocity_sigma` (m/s).
     fn error(&mut self, truth: &NavState, velocity_sigma: f64) -> RowError {
-        settle(&mut self.ekf);
+        apply_pending_earth_step(&mut self.ekf);
         let (values, psi_n) = reported_error(&self.state(), truth);
         let mut x = SVector::from(values);
         x.fixed_rows_mut::<3>(3 * PSI)
@@ -438,7 +439,7 @@ impl Filter {
         let sigma = |block: usize| {
             DVec3::from_array([0, 1, 2].map(|i| p[(3 * block + i, 3 * block + i)].sqrt()))
         };
-        let sigma = nine(&[sigma(R), sigma(V), angle_sigma]);
+        let sigma = flatten(&[sigma(R), sigma(V), angle_sigma]);
         let nees = p.cholesky().map_or(f64::NAN, |c| x.dot(&c.solve(&x)));
         RowError {
             values,
@@ -457,7 +458,7 @@ fn angle_sigmas(q_b_n: DQuat, psi: &Matrix3<f64>) -> DVec3 {
     DVec3::from_array(jacobian.map(|row| (row.transpose() * psi * row)[0].sqrt() / DEG))
 }
 
-fn nine(of: &[DVec3; 3]) -> Nine {
+fn flatten(of: &[DVec3; 3]) -> Nine {
     std::array::from_fn(|i| of[i / 3][i % 3])
 }
 
@@ -524,14 +525,14 @@ pub(super) fn rates(samples: &[ImuIncrement]) -> (f64, [DVec3; 2]) {
 }
 
 /// Which samples of a recording are bridges, and how far from the truth.
-struct Bridges<'a> {
+struct GapFiller<'a> {
     imu: &'a [ImuIncrement],
     step_s: f64,
     /// By length in steps.
     known: Vec<(usize, Spread)>,
 }
 
-impl<'a> Bridges<'a> {
+impl<'a> GapFiller<'a> {
     fn new(imu: &'a [ImuIncrement]) -> Self {
         let step_s = median(imu.iter().map(|s| s.dt_s)).unwrap_or(1.0);
         Self {
@@ -597,8 +598,8 @@ impl<'a> Bridges<'a> {
 const MOST_BYTES: f64 = 2e9;
 
 /// States recorded for the smoother: an instant for every row and every fix that was used.
-struct Tape {
-    marks: Vec<Mark>,
+struct SmootherHistory {
+    marks: Vec<SmootherEpoch>,
     /// Covariance at the last mark, after its fix.
     covariance: DMatrix<f64>,
     /// The mark of each row.
@@ -606,7 +607,7 @@ struct Tape {
 }
 
 /// An instant.
-struct Mark {
+struct SmootherEpoch {
     t_s: f64,
     /// The filter after the fix.
     after: Snapshot,
@@ -616,7 +617,7 @@ struct Mark {
     link: Option<Link>,
 }
 
-impl Mark {
+impl SmootherEpoch {
     fn of(ekf: &Ekf, t_s: f64) -> Self {
         Self {
             t_s,
@@ -627,7 +628,7 @@ impl Mark {
     }
 }
 
-impl Tape {
+impl SmootherHistory {
     /// A tape that begins where the filter is, for up to so many marks.
     ///
     /// # Errors
@@ -645,7 +646,7 @@ impl Tape {
         filter.ekf.keep_transition();
         let covariance = filter.ekf.p.lane(0);
         Ok(Self {
-            marks: vec![Mark::of(&filter.ekf, t_s)],
+            marks: vec![SmootherEpoch::of(&filter.ekf, t_s)],
             covariance,
             rows: Vec::new(),
         })
@@ -660,7 +661,7 @@ impl Tape {
         let predicted = filter.ekf.p.lane(0);
         last.link = Some(Link::new(&self.covariance, &transition, &predicted));
         self.covariance = predicted;
-        self.marks.push(Mark::of(&filter.ekf, t_s));
+        self.marks.push(SmootherEpoch::of(&filter.ekf, t_s));
     }
 
     /// A row is written here.
@@ -693,9 +694,9 @@ impl Tape {
     fn smoothed(
         self,
         filter: &mut Filter,
-        filtered: &[Row],
+        filtered: &[SolutionRow],
         reference: Option<&Reference>,
-    ) -> Vec<Row> {
+    ) -> Vec<SolutionRow> {
         let mut smoothed = filtered.to_vec();
         let mut rows = self.rows.iter().zip(&mut smoothed).rev().peekable();
         let mut p = self.covariance;
@@ -770,7 +771,7 @@ mod gap_tests {
         let imu: Vec<_> = (0..60_000)
             .map(|k| sample(k, (std::f64::consts::TAU * k as f64 / 1000.0).sin()))
             .collect();
-        let mut bridges = Bridges::new(&imu);
+        let mut bridges = GapFiller::new(&imu);
         assert!(bridges.spread(&imu[7]).is_none());
         let [accel, gyro] = bridges
             .spread(&ImuIncrement {
@@ -786,7 +787,7 @@ mod gap_tests {
             "{gyro}"
         );
         assert!(accel.length() < 1e-9 && gyro.x == 0.0);
-        let short = Bridges::new(&imu[..1000]).spread(&ImuIncrement {
+        let short = GapFiller::new(&imu[..1000]).spread(&ImuIncrement {
             dt_s: 5.0,
             ..imu[7]
         });

@@ -2,7 +2,7 @@
 //! speed, standstill (ZUPT).
 
 use super::alignment::courses;
-use super::{Recorded, Whiteness, kept};
+use super::{DriveData, Whiteness, kept};
 use crate::imu::ImuIncrement;
 use crate::linalg::median;
 use crate::metrics::{Band, chi_square_band};
@@ -102,7 +102,7 @@ pub fn aid_innovations(records: &[AidRecord]) -> Vec<AidInnovations> {
 /// The measurements of a recording: the constraint and standstill at sample times, a wheel at its own. Fixes that are
 /// withheld tell nothing of standstill, which is none where the recording shows too little of it.
 pub fn vehicle_velocities(
-    recorded: &Recorded<'_>,
+    recorded: &DriveData<'_>,
     wheel: &[WheelSpeed],
     settings: &AidingSettings,
     outages: &[Outage],
@@ -149,7 +149,7 @@ pub fn vehicle_velocities(
 
 /// Median ratio of the wheel's speed to that of the fixes while moving; none where they never move.
 pub fn wheel_ratio(
-    recorded: &Recorded<'_>,
+    recorded: &DriveData<'_>,
     wheel: &[WheelSpeed],
     outages: &[Outage],
 ) -> Option<f64> {
@@ -175,7 +175,7 @@ fn every<T>(all: &[T], t_s: impl Fn(&T) -> f64, rate_hz: f64) -> impl Iterator<I
 }
 
 /// Horizontal speeds of the fixes: their own, or by positions a second apart.
-fn speeds(recorded: &Recorded<'_>, outages: &[Outage]) -> Vec<(f64, f64)> {
+fn speeds(recorded: &DriveData<'_>, outages: &[Outage]) -> Vec<(f64, f64)> {
     let courses = courses(&kept(recorded.gnss, outages), recorded.imu).into_iter();
     courses.map(|m| (m.fix.t_s, m.speed())).collect()
 }

@@ -3,25 +3,25 @@
 
 use super::vehicle::MISSES;
 use super::{
-    Recorded, Settings, Solution, Start, VehicleVelocity, WheelSpeed, aid_innovations, fuse,
+    DriveData, FusionSettings, Solution, Start, VehicleVelocity, WheelSpeed, aid_innovations, fuse,
     vehicle_velocities,
 };
-use crate::ekf::Belief;
+use crate::ekf::FilterModel;
 use crate::imu::ImuIncrement;
 
 use crate::scenario::aiding_tests::{OUTAGE, consumer, scenario, town};
 
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
-use crate::simulation::lincov::{FilterPass, TruthSide};
+use crate::simulation::lincov::{FilterPass, TruthModel};
 use crate::simulation::{Plan, SimulatedRecording, record};
 use crate::tests::{assert_chi_square, normals};
 use crate::trajectory::Trajectory;
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use glam::{DQuat, DVec3};
 
-pub(super) fn settings() -> Settings {
-    Settings {
+pub(super) fn settings() -> FusionSettings {
+    FusionSettings {
         q_s_b: DQuat::IDENTITY,
         mounting_sigma_b: DVec3::ZERO,
         lever_arm_b: DVec3::ZERO,
@@ -37,18 +37,18 @@ pub(super) fn settings() -> Settings {
 fn recorded(
     aiding: &str,
     runs: u64,
-    mut then: impl FnMut(u64, &SimulatedRecording, &Start, &Belief),
+    mut then: impl FnMut(u64, &SimulatedRecording, &Start, &FilterModel),
 ) {
     let (trajectory, model) = (town(), consumer());
     let aided = scenario(aiding);
     let track = aided.track(&trajectory, &model, &[]).unwrap();
-    let belief = aided.belief(&model, &[], &track).unwrap();
+    let filter_model = aided.filter_model(&model, &[], &track).unwrap();
     let plain = scenario("");
     let experiment = plain.experiment(&trajectory, Truth::Model(&model), &[], &[], 23);
     let plan = Plan::new(&experiment).unwrap();
     for run in 0..runs {
         let recording = record(&plan, run);
-        then(run, &recording, &start_of(&recording), &belief);
+        then(run, &recording, &start_of(&recording), &filter_model);
     }
 }
 
@@ -61,8 +61,8 @@ pub(super) fn start_of(recording: &SimulatedRecording) -> Start {
     }
 }
 
-pub(super) fn without_aids(recording: &SimulatedRecording) -> Recorded<'_> {
-    Recorded {
+pub(super) fn without_aids(recording: &SimulatedRecording) -> DriveData<'_> {
+    DriveData {
         imu: &recording.imu,
         gnss: &recording.gnss,
         aids: &[],
@@ -96,25 +96,25 @@ fn the_scale_of_a_wheel_is_found() {
         dv: q_s_b.inverse() * s.dv,
         ..*s
     };
-    recorded(aiding, 4, |run, recording, start, belief| {
+    recorded(aiding, 4, |run, recording, start, filter_model| {
         let imu: Vec<_> = recording.imu.iter().map(askew).collect();
-        let bare = Recorded {
+        let bare = DriveData {
             imu: &imu,
             ..without_aids(recording)
         };
         let wheel = wheel(&trajectory, 1.01, run);
         let aids = vehicle_velocities(&bare, &wheel, &scenario(aiding).aiding, &[]);
         assert_eq!(aids.len(), 89);
-        let settings = Settings {
+        let settings = FusionSettings {
             q_s_b,
             ..settings()
         };
         let solution = fuse(
-            &Recorded {
+            &DriveData {
                 aids: &aids,
                 ..bare
             },
-            belief,
+            filter_model,
             start,
             &settings,
             None,
@@ -148,7 +148,7 @@ struct OutageEnds {
 fn ends(aiding: &str, runs: u64) -> OutageEnds {
     let reference = town().into();
     let mut sums = OutageEnds::default();
-    recorded(aiding, runs, |run, recording, start, belief| {
+    recorded(aiding, runs, |run, recording, start, filter_model| {
         let bare = without_aids(recording);
         let mut normal = normals(run);
         // a car that keeps the constraint as well as it is believed to
@@ -160,17 +160,17 @@ fn ends(aiding: &str, runs: u64) -> OutageEnds {
             .into_iter()
             .map(moves)
             .collect();
-        let settings = Settings {
+        let settings = FusionSettings {
             outages: vec![OUTAGE],
             smooth: true,
             ..settings()
         };
-        let recorded = Recorded {
+        let recorded = DriveData {
             aids: &aids,
             ..bare
         };
         let solution: Solution =
-            fuse(&recorded, belief, start, &settings, Some(&reference)).unwrap();
+            fuse(&recorded, filter_model, start, &settings, Some(&reference)).unwrap();
         let mut fixes = solution.fixes.iter();
         let end = fixes.find(|f| f.t_s > OUTAGE.end_s - 1e-6).unwrap();
         let error = end.error.unwrap();
@@ -189,10 +189,10 @@ fn foretold(aiding: &str) -> f64 {
     let (trajectory, model, outages) = (town(), consumer(), [OUTAGE]);
     let scenario = scenario(aiding);
     let track = scenario.track(&trajectory, &model, &outages).unwrap();
-    let belief = scenario.belief(&model, &outages, &track).unwrap();
+    let filter_model = scenario.filter_model(&model, &outages, &track).unwrap();
     let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &[], &outages, 5);
-    let truth = TruthSide::together(&TruthSide::sources(&experiment, &model));
-    let rmse = FilterPass::new(&track, &belief).errors_at_ends(&truth)[0]
+    let truth = TruthModel::together(&TruthModel::sources(&experiment, &model));
+    let rmse = FilterPass::new(&track, &filter_model).errors_at_ends(&truth)[0]
         .errors
         .rmse();
     rmse[0].hypot(rmse[1])
@@ -225,7 +225,7 @@ fn standstill_is_measured_where_the_vehicle_stands() {
     let trajectory = town();
     let aiding = "zupt = {}\nnhc.mounting_sigma_deg = 1";
     let settings_of_aids = scenario(aiding).aiding;
-    recorded(aiding, 4, |_, recording, start, belief| {
+    recorded(aiding, 4, |_, recording, start, filter_model| {
         let bare = without_aids(recording);
         let aids_in =
             |outages: &[Outage]| vehicle_velocities(&bare, &[], &settings_of_aids, outages);
@@ -244,11 +244,11 @@ fn standstill_is_measured_where_the_vehicle_stands() {
         );
         assert_eq!(aids.len(), 90);
         assert!(stands(&aids_in(&[OUTAGE])).is_empty());
-        let recorded = Recorded {
+        let recorded = DriveData {
             aids: &aids,
             ..bare
         };
-        let solution = fuse(&recorded, belief, start, &settings(), None).unwrap();
+        let solution = fuse(&recorded, filter_model, start, &settings(), None).unwrap();
         let worths = aid_innovations(&solution.aids);
         assert!(worths.iter().map(|w| w.aid).eq(["nhc", "zupt"]));
     });

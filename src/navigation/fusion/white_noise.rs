@@ -5,12 +5,12 @@
 //! they are far larger than the model's, the recording's own white noise is taken unless the fixes disagree: at a low rate
 //! motion can still be read as noise.
 
-use super::outcome::{total_nis, used};
-use super::{Recorded, Settings, Solution, Start, fuse};
-use crate::ekf::Belief;
+use super::outcome::{not_withheld, total_nis};
+use super::{DriveData, FusionSettings, Solution, Start, fuse};
+use crate::ekf::FilterModel;
 use crate::imu::{Channel, ImuIncrement, Sensor};
 use crate::linalg::{mean, median};
-use crate::noise::{Composite, Kind, Model, Process};
+use crate::noise::{Composite, Model, Process, ProcessKind};
 use serde::Serialize;
 use std::f64::consts::FRAC_PI_2;
 
@@ -30,7 +30,7 @@ const MOST_S: f64 = 1200.0;
 
 /// White noise of a sensor that is larger than the model's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct OwnNoise {
+pub struct ExcessWhiteNoise {
     /// The sensor.
     pub sensor: Sensor,
     /// Its standard deviation over the model's, root mean square of the axes.
@@ -40,7 +40,7 @@ pub struct OwnNoise {
 }
 
 /// The sensors whose white noise in the recording is far larger than the model's.
-pub fn own_noise(imu: &[ImuIncrement], rate_hz: f64, model: &Model) -> Vec<OwnNoise> {
+pub fn own_noise(imu: &[ImuIncrement], rate_hz: f64, model: &Model) -> Vec<ExcessWhiteNoise> {
     let band = rate_hz / model.rate_hz;
     let of_sensor = |sensor: Sensor| {
         let channels = || Channel::ALL.into_iter().filter(|c| c.sensor == sensor);
@@ -48,7 +48,7 @@ pub fn own_noise(imu: &[ImuIncrement], rate_hz: f64, model: &Model) -> Vec<OwnNo
         let stated = mean(channels().map(|channel| stated(model.axis(channel), band)));
         let times_model = (sigma2 / stated).sqrt();
         let is_larger = times_model > LARGER && times_model.is_finite();
-        (is_larger && imu.len() >= FEWEST).then_some(OwnNoise {
+        (is_larger && imu.len() >= FEWEST).then_some(ExcessWhiteNoise {
             sensor,
             times_model,
             sigma2,
@@ -85,13 +85,13 @@ fn stated(axis: &Composite, band: f64) -> f64 {
     mean(power) / OF_FOURTH
 }
 
-impl OwnNoise {
+impl ExcessWhiteNoise {
     /// The model with this noise for the white noise of the sensor.
     pub fn apply_to(&self, model: &mut Model) {
         let channels = Channel::ALL.into_iter().filter(|c| c.sensor == self.sensor);
         for channel in channels {
             let processes = &mut model.axes[channel.index()].processes;
-            processes.retain(|p| p.kind() != Kind::White);
+            processes.retain(|p| p.kind() != ProcessKind::White);
             processes.extend(Process::white(self.sigma2));
         }
     }
@@ -100,25 +100,28 @@ impl OwnNoise {
 /// True if the first belief predicts the fixes as well as the second. What receivers state is right to a factor, so one
 /// factor of all deviations is left open.
 pub fn predicts_as_well(
-    recorded: &Recorded<'_>,
-    beliefs: [&Belief; 2],
+    recorded: &DriveData<'_>,
+    filter_models: [&FilterModel; 2],
     start: &Start,
-    settings: &Settings,
+    settings: &FusionSettings,
 ) -> bool {
     let recorded = recorded.until(start.t_s + MOST_S);
     let settings = settings.trial();
-    let cost = |belief: &Belief| {
-        let solution = fuse(&recorded, belief, start, &settings, None).ok()?;
+    let cost = |filter_model: &FilterModel| {
+        let solution = fuse(&recorded, filter_model, start, &settings, None).ok()?;
         Some(cost(&solution)).filter(|cost| cost.is_finite())
     };
-    let [first, second] = beliefs.map(cost);
+    let [first, second] = filter_models.map(cost);
     first.is_some_and(|first| second.is_none_or(|second| first < second + DECIDES))
 }
 
 /// −2 ln(likelihood) of the innovations, but for a constant, at the factor of all variances that makes it least.
 fn cost(solution: &Solution) -> f64 {
-    let log: f64 = used(solution).flat_map(|f| &f.sigma).map(|s| s.ln()).sum();
-    let (nis, components) = total_nis(used(solution));
+    let log: f64 = not_withheld(solution)
+        .flat_map(|f| &f.sigma)
+        .map(|s| s.ln())
+        .sum();
+    let (nis, components) = total_nis(not_withheld(solution));
     2.0 * log + components as f64 * (nis / components as f64).ln()
 }
 
@@ -146,11 +149,11 @@ mod tests {
             }
             model
         };
-        let belief = |model: &Model| {
+        let filter_model = |model: &Model| {
             let track = plain.track(&trajectory, model, &[]).unwrap();
-            plain.belief(model, &[], &track).unwrap()
+            plain.filter_model(model, &[], &track).unwrap()
         };
-        let [stated, larger] = [1.0, 400.0].map(|times| belief(&with_white(times)));
+        let [stated, larger] = [1.0, 400.0].map(|times| filter_model(&with_white(times)));
         for (times, found) in [(1.0, 0), (400.0, 2)] {
             let truth = with_white(times);
             let experiment = plain.experiment(&trajectory, Truth::Model(&truth), &[], &[], 7);

@@ -1,10 +1,10 @@
 //! Windows without fixes in a second run of the filter: at their ends the fixes tell how wrong it became, which those that it
 //! uses cannot.
 
-use super::displaced::interval_s;
-use super::outcome::used;
-use super::{FixRecord, FusionError, Recorded, Settings, Start, WeightedSolution, fuse};
-use crate::ekf::Belief;
+use super::antenna_offset::interval_s;
+use super::outcome::not_withheld;
+use super::{DriveData, FixRecord, FusionError, FusionSettings, Start, WeightedSolution, fuse};
+use crate::ekf::FilterModel;
 use crate::gnss::GnssFix;
 use crate::linalg::mean;
 use crate::metrics::{Basis, Verdict, VerdictKind};
@@ -26,7 +26,7 @@ const ENOUGH: usize = 66;
 
 /// Errors at the ends of withheld windows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Withheld {
+pub struct WithheldWindows {
     /// Number of windows.
     pub windows: usize,
     /// Length of each (s).
@@ -41,14 +41,14 @@ pub struct Withheld {
 /// # Errors
 /// Those of [`fuse`].
 pub fn withheld(
-    recorded: &Recorded<'_>,
-    belief: &Belief,
+    recorded: &DriveData<'_>,
+    filter_model: &FilterModel,
     start: &Start,
-    settings: &Settings,
+    settings: &FusionSettings,
     weighed: &WeightedSolution,
-) -> Result<Option<Withheld>, FusionError> {
+) -> Result<Option<WithheldWindows>, FusionError> {
     let first_s = start.t_s + SETTLING_S;
-    let fixes: Vec<&FixRecord> = used(&weighed.solution).collect();
+    let fixes: Vec<&FixRecord> = not_withheld(&weighed.solution).collect();
     let (Some(last), Some(interval_s)) = (fixes.last(), interval_s(recorded.gnss)) else {
         return Ok(None);
     };
@@ -76,7 +76,7 @@ pub fn withheld(
         .find(|l| *l >= least_s)
         .unwrap_or(least_s);
     let needed_s = SETTLING_S + most as f64 * (shortest_s + BETWEEN.0.max(BETWEEN.1 * shortest_s));
-    let mut found = Some(Withheld {
+    let mut found = Some(WithheldWindows {
         windows: 0,
         length_s: shortest_s,
         verdict: Verdict {
@@ -116,12 +116,18 @@ pub fn withheld(
             false => fix.with_sigmas_times(position, velocity),
         };
         let gnss: Vec<GnssFix> = kept.iter().enumerate().map(believed).collect();
-        let settings = Settings {
+        let settings = FusionSettings {
             outages: outages.clone(),
             gate: None,
             ..settings.trial()
         };
-        let solution = fuse(&recorded.with_gnss(&gnss), belief, start, &settings, None)?;
+        let solution = fuse(
+            &recorded.with_gnss(&gnss),
+            filter_model,
+            start,
+            &settings,
+            None,
+        )?;
         let at_end = |end: &usize| {
             let t_s = gnss[*end].t_s;
             let at = solution
@@ -138,7 +144,7 @@ pub fn withheld(
         let shows_filter = mean(ends.iter().map(share)) > SHARE;
         let squares = ends.iter().map(|(f, _)| (f.nis, f.innovation.len()));
         if let Some(verdict) = Verdict::of_windows(squares) {
-            found = Some(Withheld {
+            found = Some(WithheldWindows {
                 windows: ends.len(),
                 length_s,
                 verdict,

@@ -7,11 +7,13 @@ use super::summary::{
     AccuracySummary, Nis, OutageSummary, QuantileSummary, Recovery, Summary, with_verdicts,
 };
 use super::verdict;
-use crate::ekf::Belief;
+use crate::ekf::FilterModel;
 use crate::linalg::mean;
 use crate::noise::Model;
 use crate::sensors::outage::Outage;
-use crate::simulation::lincov::{AssessedInstant, ErrorLaw, FilterPass, Instant, Track, TruthSide};
+use crate::simulation::lincov::{
+    AssessedInstant, ErrorDistribution, FilterPass, Instant, Track, TruthModel,
+};
 use crate::simulation::{
     BIASES, COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord,
 };
@@ -27,7 +29,7 @@ const NEARLY_ALL: f64 = 0.999;
 
 /// The law of a filter's errors as the figures of a run.
 #[derive(Debug, Clone)]
-pub struct Expected {
+pub struct ExpectedRun {
     /// Statistics of every reporting epoch, all without a Monte-Carlo error.
     pub epochs: Vec<EpochMetrics>,
     /// A run whose squares are the expected ones: it stands for all runs where runs are compared.
@@ -36,17 +38,17 @@ pub struct Expected {
     pub summary: Summary,
 }
 
-impl Expected {
+impl ExpectedRun {
     /// The figures of a filter in an experiment whose inertial errors `truth` makes, along the experiment's track; none
     /// where a covariance did not stay finite and positive.
     pub fn along(
         track: &Track,
         experiment: &Experiment<'_>,
-        belief: &Belief,
+        filter_model: &FilterModel,
         truth: &Model,
     ) -> Option<Self> {
-        let truth = TruthSide::together(&TruthSide::sources(experiment, truth));
-        let filter = FilterPass::new(track, belief);
+        let truth = TruthModel::together(&TruthModel::sources(experiment, truth));
+        let filter = FilterPass::new(track, filter_model);
         let law = filter.errors(&truth);
         let limit = experiment.coverage_quantile();
         let reports = law.reports.iter().zip(&filter.biases);
@@ -76,7 +78,7 @@ impl Expected {
         let (nis, fixes) = record.nis;
         let summary = Summary {
             method: "lincov",
-            filter_states: belief.states,
+            filter_states: filter_model.states,
             seed: Some(experiment.seed),
             outages: with_verdicts(outages, verdicts),
             nis: Nis {
@@ -191,7 +193,11 @@ fn outage(
 }
 
 /// The run whose squares are the expected ones.
-fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageSummary]) -> RunRecord {
+fn record(
+    epochs: &[EpochMetrics],
+    law: &ErrorDistribution,
+    outages: &[OutageSummary],
+) -> RunRecord {
     let mean = |value: &dyn Fn(&EpochMetrics) -> f64| mean(epochs.iter().map(value));
     let of_outage = |o: &OutageSummary| OutageRecord {
         see_mean: o.asee_mean.0,

@@ -21,7 +21,7 @@ mod summary;
 mod verdict;
 
 pub use estimate::{Band, Estimate, PerState, QuadraticForm, SampleSize, chi_square_band};
-pub use expected::{Expected, horizontal_quantiles};
+pub use expected::{ExpectedRun, horizontal_quantiles};
 pub use outage::{Budget, EpochMetrics, epochs};
 pub use ratio::{EpochRow, ExperimentResult, OutageComparison, StateRatio, compare};
 pub(crate) use summary::name_and_limit;

@@ -19,7 +19,7 @@
 //! let axis = Composite::new(vec![Process::white(1e-6)?, Process::random_walk(1e-14)?]);
 //! let model = Model::pooled(100.0, &axis, &axis);
 //! let scenario = Scenario::default();
-//! let beliefs = [Belief::new(&model, FilterStates::Full, 1.0, 800.0)?.with_initial(&scenario.initial)];
+//! let beliefs = [FilterModel::new(&model, FilterStates::Full, 1.0, 800.0)?.with_initial(&scenario.initial)];
 //! let experiment = scenario.experiment(&drive, Truth::Model(&model), &beliefs, &[], 1);
 //! let results = monte_carlo::run(&experiment, 40, &|_| {})?;
 //! let last = epochs(&results[0]).pop().expect("an epoch a second");
@@ -29,7 +29,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::ekf::Belief;
+use crate::ekf::FilterModel;
 use crate::lanes::LANES;
 use crate::simulation::{
     EpochSums, Experiment, ExperimentError, GainsUsed, Plan, REPORTED, RunRecord, RunResult,
@@ -62,15 +62,15 @@ pub fn run_range(
 ) -> Option<Vec<RunResult>> {
     let experiment = plan.experiment;
     let windows = experiment.outages.iter().map(|o| (o.start_s, o.end_s));
-    let empty = |belief: &Belief| RunResult {
+    let empty = |filter_model: &FilterModel| RunResult {
         outages: windows.clone().collect(),
-        filter_states: belief.states,
+        filter_states: filter_model.states,
         fix_components: experiment.gnss.components(),
         coverage_level: experiment.coverage_level,
         independent_windows: experiment.truth.independent_windows(plan.samples()),
         ..RunResult::default()
     };
-    let mut results: Vec<RunResult> = experiment.beliefs.iter().map(empty).collect();
+    let mut results: Vec<RunResult> = experiment.filter_models.iter().map(empty).collect();
     let all: Vec<u64> = (0..runs).step_by(LANES).collect();
     for together in all.chunks(TOGETHER) {
         let batch = |done: &u64| {

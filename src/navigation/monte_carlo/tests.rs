@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::earth::{self, GravityModel};
-use crate::ekf::{Belief, FilterStates, FixUpdate, InitialSettings};
+use crate::ekf::{FilterModel, FilterStates, FixUpdate, InitialSettings};
 use crate::frames::RollPitchYaw;
 use crate::imu::Channel;
 use crate::noise::{Composite, Model, Process, VirtualImu};
@@ -51,7 +51,7 @@ fn outage(start_s: f64, end_s: f64) -> Outage {
 struct Setting {
     trajectory: Trajectory,
     model: Model,
-    beliefs: Vec<Belief>,
+    filter_models: Vec<FilterModel>,
     gnss: GnssSettings,
     initial: InitialSettings,
     outages: Vec<Outage>,
@@ -65,12 +65,13 @@ struct Setting {
 
 impl Setting {
     fn new(duration_s: f64, belief_scales: &[f64]) -> Self {
-        let belief =
-            |scale: &f64| Belief::new(&model(*scale), FilterStates::Reduced15, 1.0, 800.0).unwrap();
+        let filter_model = |scale: &f64| {
+            FilterModel::new(&model(*scale), FilterStates::Reduced15, 1.0, 800.0).unwrap()
+        };
         Self {
             trajectory: trajectory(duration_s),
             model: model(1.0),
-            beliefs: belief_scales.iter().map(belief).collect(),
+            filter_models: belief_scales.iter().map(filter_model).collect(),
             gnss: GnssSettings::default(),
             initial: InitialSettings::default(),
             outages: vec![outage(20.0, 40.0)],
@@ -89,7 +90,7 @@ impl Setting {
             rate_hz: 100.0,
             gravity: GravityModel::Wgs84,
             truth: Truth::Model(&self.model),
-            beliefs: &self.beliefs,
+            filter_models: &self.filter_models,
             gnss: &self.gnss,
             initial: &self.initial,
             defects: &self.defects,
@@ -405,7 +406,7 @@ fn windows_of_recordings_leave_the_matched_filter_consistent() {
         .map(|k| imu.recording(k, &Channel::ALL, 60_000).unwrap())
         .collect();
     let mut setting = Setting::new(60.0, &[]);
-    setting.beliefs = vec![Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap()];
+    setting.filter_models = vec![FilterModel::new(&model, FilterStates::Full, 1.0, 800.0).unwrap()];
     let experiment = Experiment {
         truth: Truth::Static(&recordings),
         ..setting.experiment()

@@ -214,7 +214,7 @@ impl AidingSettings {
     pub(crate) fn errors(&self) -> Vec<AidError> {
         use AidPart::*;
         let mut all = Vec::new();
-        let mut push = |part, law: Law, unfelt: f64| {
+        let mut push = |part, law: ErrorProcess, unfelt: f64| {
             let size = law.size();
             let is_felt = size > unfelt;
             all.extend((size > 0.0).then_some(AidError { part, law, is_felt }));
@@ -224,17 +224,17 @@ impl AidingSettings {
         if let Some(nhc) = &self.nhc {
             let (truth, time_s) = (&nhc.truth, nhc.truth.correlation_time_s);
             for part in [MountingPitch, MountingYaw] {
-                let law = Law::Constant(truth.mounting_sigma_deg * DEG);
+                let law = ErrorProcess::Constant(truth.mounting_sigma_deg * DEG);
                 push(part, law, 2.0 * nhc.mounting_sigma_deg * DEG);
             }
             push(
                 Slip,
-                Law::Known(truth.sideslip_s2_m),
+                ErrorProcess::Known(truth.sideslip_s2_m),
                 0.5 * nhc.sigma_m_s / BRISK,
             );
             for part in [SuspensionLateral, SuspensionVertical] {
                 let sigma = truth.walk_sigma_m_s;
-                let law = Law::GaussMarkov { sigma, time_s };
+                let law = ErrorProcess::GaussMarkov { sigma, time_s };
                 push(part, law, averaged(nhc.sigma_m_s, nhc.rate_hz * time_s));
             }
         }
@@ -242,27 +242,27 @@ impl AidingSettings {
             let truth = &wheel.truth;
             push(
                 WheelScale,
-                Law::Constant(truth.scale_sigma),
+                ErrorProcess::Constant(truth.scale_sigma),
                 2.0 * wheel.scale_sigma,
             );
             push(
                 WheelSlip,
-                Law::Known(truth.slip_s2_m),
+                ErrorProcess::Known(truth.slip_s2_m),
                 0.5 * wheel.sigma_m_s / BRISK,
             );
         }
         if let Some(zupt) = &self.zupt {
             let (sigma, time_s) = (zupt.truth.walk_sigma_m_s, zupt.truth.correlation_time_s);
-            let law = Law::GaussMarkov { sigma, time_s };
+            let law = ErrorProcess::GaussMarkov { sigma, time_s };
             push(Creep, law, averaged(zupt.sigma_m_s, zupt.rate_hz * time_s));
         }
         if let Some(heading) = &self.heading {
             let (truth, time_s) = (&heading.truth, heading.truth.correlation_time_s);
             let white = heading.sigma_deg * DEG;
-            let offset = Law::Constant(truth.offset_sigma_deg * DEG);
+            let offset = ErrorProcess::Constant(truth.offset_sigma_deg * DEG);
             push(HeadingOffset, offset, averaged(white, LASTING_FIXES));
             let sigma = truth.walk_sigma_deg * DEG;
-            let law = Law::GaussMarkov { sigma, time_s };
+            let law = ErrorProcess::GaussMarkov { sigma, time_s };
             push(
                 HeadingCorrelated,
                 law,
@@ -277,7 +277,7 @@ impl AidingSettings {
 #[derive(Clone, Copy)]
 pub(crate) struct AidError {
     pub part: AidPart,
-    pub law: Law,
+    pub law: ErrorProcess,
     /// True if the filter, with the states that it has, does not expect so large a one.
     is_felt: bool,
 }
@@ -372,7 +372,7 @@ impl AidPart {
 
 /// Time behaviour of an error.
 #[derive(Clone, Copy)]
-pub(crate) enum Law {
+pub(crate) enum ErrorProcess {
     /// The same value in every run.
     Known(f64),
     /// A constant of each run, of this standard deviation.
@@ -381,7 +381,7 @@ pub(crate) enum Law {
     GaussMarkov { sigma: f64, time_s: f64 },
 }
 
-impl Law {
+impl ErrorProcess {
     const fn size(self) -> f64 {
         match self {
             Self::Known(size) | Self::Constant(size) | Self::GaussMarkov { sigma: size, .. } => {
@@ -414,9 +414,9 @@ impl AidNoise {
             let source = aid.name();
             let mut stream = key.stream(source, process);
             let value = match error.law {
-                Law::Known(value) => value,
+                ErrorProcess::Known(value) => value,
                 // a Gauss-Markov process is stationary from the start
-                Law::Constant(sigma) | Law::GaussMarkov { sigma, .. } => {
+                ErrorProcess::Constant(sigma) | ErrorProcess::GaussMarkov { sigma, .. } => {
                     sigma * normal(&mut stream)
                 }
             };
@@ -468,8 +468,8 @@ impl AidNoise {
 }
 
 impl Walk {
-    fn at(&mut self, law: Law, after_s: f64) -> f64 {
-        if let Law::GaussMarkov { sigma, time_s } = law {
+    fn at(&mut self, law: ErrorProcess, after_s: f64) -> f64 {
+        if let ErrorProcess::GaussMarkov { sigma, time_s } = law {
             let kappa = (after_s - self.at_s) / time_s;
             // phi e + √(1 − phi²) σ w keeps the variance; expm1 keeps the digits of a short step.
             self.value = (-kappa).exp() * self.value
@@ -722,7 +722,7 @@ mod tests {
     #[test]
     fn an_error_lasts_its_correlation_time() {
         let (n, time_s, step_s) = (20_000, 20.0, 5.0);
-        let law = Law::GaussMarkov { sigma: 1.0, time_s };
+        let law = ErrorProcess::GaussMarkov { sigma: 1.0, time_s };
         let mut stream = key(1).generator();
         let value = normal(&mut stream);
         let mut walk = Walk {

@@ -195,11 +195,12 @@ impl Defects {
     }
 
     /// The error of a sample where this is felt: accelerometer (m/s²), gyroscope (rad/s).
-    pub(crate) fn error(&self, felt: &Surroundings) -> [DVec3; 2] {
-        let [force, rate] = felt.sample;
-        let [accel, gyro] = [0, 1].map(|s| self.bias[s] + self.per_kelvin[s] * felt.warming_k);
+    pub(crate) fn error(&self, error_inputs: &ErrorInputs) -> [DVec3; 2] {
+        let [force, rate] = error_inputs.sample;
+        let [accel, gyro] =
+            [0, 1].map(|s| self.bias[s] + self.per_kelvin[s] * error_inputs.warming_k);
         [
-            accel + self.matrix[0] * force + self.rectification * felt.square,
+            accel + self.matrix[0] * force + self.rectification * error_inputs.square,
             gyro + self.matrix[1] * rate + self.g_sensitivity * force,
         ]
     }
@@ -307,7 +308,7 @@ pub(crate) enum ErrorInput {
 
 /// Motion and temperature of the IMU over a sample.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Surroundings {
+pub(crate) struct ErrorInputs {
     /// Specific force (m/s²) and angular rate (rad/s) in b.
     pub sample: [DVec3; 2],
     /// Mean square of the specific force along each axis, with the vibration, less that of the start ((m/s²)²).
@@ -316,7 +317,7 @@ pub(crate) struct Surroundings {
     warming_k: f64,
 }
 
-impl Surroundings {
+impl ErrorInputs {
     /// Environment of a true sample at a time; the trajectory begins with the sample `first`.
     pub(crate) fn at(
         settings: &ImuSettings,

@@ -7,8 +7,8 @@ use super::{BIASES, COVERAGE_DOF, EpochSums, NEES_DOF, OutageRecord, REPORTED, R
 use crate::earth::ned_difference;
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::{
-    Belief, BodyVelocity, Ekf, GainSource, advance, settle, update, update_body_velocity,
-    update_height, update_yaw,
+    BodyVelocity, Ekf, FilterModel, GainSource, advance, apply_pending_earth_step, update,
+    update_body_velocity, update_height, update_yaw,
 };
 use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::Sensor;
@@ -32,7 +32,7 @@ pub struct Batch {
 }
 
 /// A filter, and the same along the reference where runs share its gains.
-pub(super) type BatchFilter<'a> = (&'a Belief, Option<&'a SharedFilter>);
+pub(super) type BatchFilter<'a> = (&'a FilterModel, Option<&'a SharedFilter>);
 
 /// Runs `first..first + live` (at most [`LANES`]) through filters: the noise is drawn once.
 pub(super) fn run_candidates(
@@ -113,7 +113,7 @@ struct LaneFilter<'a> {
 impl<'a> LaneFilter<'a> {
     fn new(
         plan: &Plan<'_>,
-        (belief, shared): BatchFilter<'a>,
+        (filter_model, shared): BatchFilter<'a>,
         starts: &[NavState],
         live: usize,
     ) -> Self {
@@ -127,7 +127,7 @@ impl<'a> LaneFilter<'a> {
                 ..Default::default()
             })
         };
-        let mut ekf = Ekf::new(nominal, belief, &plan.start, plan.experiment.initial)
+        let mut ekf = Ekf::new(nominal, filter_model, &plan.start, plan.experiment.initial)
             .with_update(plan.experiment.update);
         if shared.is_some() {
             ekf.gains = GainSource::Given(Arc::default(), 0);
@@ -165,7 +165,7 @@ impl<'a> LaneFilter<'a> {
             self.ekf.p.set_shared(after);
         }
         if event.report {
-            settle(&mut self.ekf);
+            apply_pending_earth_step(&mut self.ekf);
             let epoch = EpochLanes::of(&self.ekf, self.live, plan, event);
             self.follow_outages(plan, event, &epoch);
             self.trace.push(epoch);
@@ -177,7 +177,7 @@ impl<'a> LaneFilter<'a> {
         if !plan.ends_outage(index) {
             return;
         }
-        settle(&mut self.ekf);
+        apply_pending_earth_step(&mut self.ekf);
         let found = LaneAssessment::of(&self.ekf, self.live, &event.reference);
         let log_density = found.log_density(&self.ekf);
         for (_, records) in plan

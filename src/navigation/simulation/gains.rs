@@ -9,7 +9,9 @@ use super::batch::{Batch, BatchFilter, measure, run_candidates};
 use super::plan::{Event, Plan};
 use super::source::LaneMeasurements;
 use crate::ekf::covariance::SharedCovariance;
-use crate::ekf::{Belief, Ekf, FixUpdate, GainSource, SharedUpdate, advance, settle};
+use crate::ekf::{
+    Ekf, FilterModel, FixUpdate, GainSource, SharedUpdate, advance, apply_pending_earth_step,
+};
 use crate::lanes::{LANES, Vec3};
 use crate::strapdown::Strapdown;
 use schemars::JsonSchema;
@@ -76,25 +78,25 @@ pub(super) struct SharedEvent {
 
 /// The gains of all candidates, decided once a plan.
 #[derive(Debug)]
-pub(super) struct Decision {
+pub(super) struct SharedGains {
     /// For each candidate its filter along the reference, or none where runs have their own.
     shared: Vec<Option<SharedFilter>>,
     /// Runs 0 to 7, where they were made to decide it.
     first: Option<Vec<Batch>>,
 }
 
-impl Decision {
+impl SharedGains {
     pub(super) fn new(plan: &Plan<'_>) -> Self {
-        let (beliefs, gains) = (plan.experiment.beliefs, plan.experiment.gains);
+        let (filter_models, gains) = (plan.experiment.filter_models, plan.experiment.gains);
         if gains == Gains::Own || plan.experiment.update == FixUpdate::Iterated {
-            let shared = beliefs.iter().map(|_| None).collect();
+            let shared = filter_models.iter().map(|_| None).collect();
             return Self {
                 shared,
                 first: None,
             };
         }
-        let along = |belief| Some(along_reference(plan, belief));
-        let mut shared: Vec<_> = beliefs.iter().map(along).collect();
+        let along = |filter_model| Some(along_reference(plan, filter_model));
+        let mut shared: Vec<_> = filter_models.iter().map(along).collect();
         if gains == Gains::Shared {
             return Self {
                 shared,
@@ -137,7 +139,7 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
 
 fn filters<'a>(plan: &'a Plan<'_>, shared: &'a [Option<SharedFilter>]) -> Vec<BatchFilter<'a>> {
     let shared = shared.iter().map(Option::as_ref);
-    plan.experiment.beliefs.iter().zip(shared).collect()
+    plan.experiment.filter_models.iter().zip(shared).collect()
 }
 
 /// A batch with the gains given, and for each candidate that shares them the same with its own.
@@ -152,7 +154,7 @@ fn both_ways(
         .clone()
         .into_iter()
         .filter(|(_, shared)| shared.is_some());
-    candidates.extend(sharing.map(|(belief, _)| (belief, None)));
+    candidates.extend(sharing.map(|(filter_model, _)| (filter_model, None)));
     let mut batches = run_candidates(plan, first, live, &candidates);
     let mut owns = batches.split_off(shared.len()).into_iter();
     let compared = |(mut batch, shared): (Batch, &Option<SharedFilter>)| {
@@ -189,16 +191,16 @@ fn largest_difference(shared: &Batch, own: &Batch) -> f64 {
 }
 
 /// A filter whose errors are zero, as are those of its measurements.
-fn along_reference(plan: &Plan<'_>, belief: &Belief) -> SharedFilter {
+fn along_reference(plan: &Plan<'_>, filter_model: &FilterModel) -> SharedFilter {
     let nominal = Strapdown::new(&plan.start, plan.experiment.gravity);
-    let mut ekf = Ekf::new(nominal, belief, &plan.start, plan.experiment.initial);
+    let mut ekf = Ekf::new(nominal, filter_model, &plan.start, plan.experiment.initial);
     let (mut done, mut none) = (0, Vec::new());
     let at = |(index, event): (usize, &Event)| {
         let samples = &plan.ideal[done..event.sample];
         none.resize(samples.len(), [Vec3::ZERO; 2]);
         advance(&mut ekf, samples, &none);
         done = event.sample;
-        settle(&mut ekf);
+        apply_pending_earth_step(&mut ekf);
         let before = plan.ends_outage(index).then(|| ekf.p.shared());
         ekf.gains = GainSource::Kept(Vec::new());
         let _ = measure(&mut ekf, plan, &LaneMeasurements::exact(plan, event));

@@ -1,13 +1,13 @@
 //! Common data of all runs of an experiment, computed once: ideal samples, reference, schedule.
 
-use super::gains::{Decision, Gains};
+use super::gains::{Gains, SharedGains};
 use crate::earth::{GravityModel, MAX_LATITUDE};
-use crate::ekf::{Belief, FixUpdate, InitialSettings};
+use crate::ekf::{FilterModel, FixUpdate, InitialSettings};
 use crate::frames::NavState;
 use crate::imu::ImuSample;
 use crate::noise::continuous::same_rate;
 use crate::sensors::aiding::{Aid, AidingSettings};
-use crate::sensors::defects::{ImuSettings, Surroundings};
+use crate::sensors::defects::{ErrorInputs, ImuSettings};
 use crate::sensors::gnss::{BaroSettings, GnssSettings};
 use crate::sensors::imu::{Truth, TruthError, best_spans};
 use crate::sensors::outage::Outage;
@@ -30,7 +30,7 @@ pub struct Experiment<'a> {
     /// Source of the inertial errors.
     pub truth: Truth<'a>,
     /// The candidates: filters that run on the same noise, each with its own belief.
-    pub beliefs: &'a [Belief],
+    pub filter_models: &'a [FilterModel],
     /// The receiver; its standard deviations are both truth and belief.
     pub gnss: &'a GnssSettings,
     /// The start.
@@ -98,7 +98,7 @@ pub(super) struct Event {
     /// True if the barometer has a height here.
     pub baro: bool,
     /// Aiding measurements of the vehicle here.
-    pub aids: Vec<Aided>,
+    pub aids: Vec<TrueAid>,
     /// True if the epoch is reported (1 Hz).
     pub report: bool,
 }
@@ -117,7 +117,7 @@ pub struct Plan<'a> {
     pub(super) outages: Vec<(f64, usize)>,
     /// Quantile of the coverage statistic.
     pub(super) coverage_quantile: f64,
-    decision: OnceLock<Decision>,
+    decision: OnceLock<SharedGains>,
 }
 
 impl<'a> Plan<'a> {
@@ -127,11 +127,11 @@ impl<'a> Plan<'a> {
     /// What does not fit, with values.
     pub fn new(experiment: &'a Experiment<'a>) -> Result<Self, ExperimentError> {
         let rate_hz = experiment.rate_hz;
-        for belief in experiment.beliefs {
-            if !same_rate(belief.rate_hz, rate_hz) {
+        for filter_model in experiment.filter_models {
+            if !same_rate(filter_model.rate_hz, rate_hz) {
                 return refused(format!(
                     "the filter's model is at {} Hz, the IMU at {rate_hz} Hz",
-                    belief.rate_hz
+                    filter_model.rate_hz
                 ));
             }
         }
@@ -165,13 +165,13 @@ impl<'a> Plan<'a> {
     }
 
     /// The gains of the candidates, decided when a run first needs them.
-    pub(super) fn decision(&self) -> &Decision {
-        self.decision.get_or_init(|| Decision::new(self))
+    pub(super) fn decision(&self) -> &SharedGains {
+        self.decision.get_or_init(|| SharedGains::new(self))
     }
 
     /// Motion and temperature of the IMU in the middle of a sample.
-    pub(super) fn felt(&self, sample: usize) -> Surroundings {
-        felt(self.experiment, sample, &self.ideal[sample], &self.ideal[0])
+    pub(super) fn error_inputs(&self, sample: usize) -> ErrorInputs {
+        error_inputs(self.experiment, sample, &self.ideal[sample], &self.ideal[0])
     }
 
     /// IMU samples of one run.
@@ -190,14 +190,14 @@ fn effects(outage: &Outage, events: &[Event]) -> (f64, usize) {
 }
 
 /// Motion and temperature of the IMU in the middle of a sample; `first` is the first sample.
-pub(super) fn felt(
+pub(super) fn error_inputs(
     experiment: &Experiment<'_>,
     index: usize,
     sample: &ImuSample,
     first: &ImuSample,
-) -> Surroundings {
+) -> ErrorInputs {
     let t_s = experiment.trajectory.start_s() + (index as f64 + 0.5) / experiment.rate_hz;
-    Surroundings::at(experiment.defects, sample, t_s, first)
+    ErrorInputs::at(experiment.defects, sample, t_s, first)
 }
 
 /// Refuses a sample in which the vehicle turns too fast for the strapdown.
@@ -332,7 +332,7 @@ const STANDS_RAD_S: f64 = 0.01 * DEG;
 
 /// A measurement of the vehicle by itself, as it would be without error.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Aided {
+pub(super) struct TrueAid {
     pub aid: Aid,
     /// Velocity of the point that it belongs to, in b (m/s).
     pub v_b: DVec3,
@@ -347,7 +347,7 @@ fn aided<'a>(
     experiment: &Experiment<'_>,
     t_s: f64,
     aids: impl Iterator<Item = &'a (Aid, usize)>,
-) -> Vec<Aided> {
+) -> Vec<TrueAid> {
     let mut aids = aids.peekable();
     if aids.peek().is_none() {
         return Vec::new();
@@ -364,7 +364,7 @@ fn aided<'a>(
         .map(|(aid, _)| {
             let swing = k.omega_eb_b.cross(experiment.aiding.lever_arm_b(*aid));
             let withheld = in_outage && experiment.aiding.is_of_gnss(*aid);
-            Aided {
+            TrueAid {
                 aid: *aid,
                 v_b: v_b + swing,
                 a_b,

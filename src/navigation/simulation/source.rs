@@ -1,9 +1,9 @@
 //! Random quantities of eight runs: starts, inertial errors, fixes, heights, aiding measurements.
 
-use super::plan::{Aided, Event, Plan};
+use super::plan::{Event, Plan, TrueAid};
 use crate::earth::moved;
 use crate::ekf::Fix;
-use crate::ekf::belief::psi_of_angles;
+use crate::ekf::filter_model::psi_of_angles;
 use crate::frames::{NavState, RollPitchYaw};
 use crate::gnss::{GnssFix, GnssVelocity};
 use crate::imu::{ImuIncrement, Sensor};
@@ -54,7 +54,7 @@ fn exact_fix(plan: &Plan<'_>, event: &Event) -> Fix {
     }
 }
 
-fn exact_aid(event: &Event, aided: &Aided) -> Vec3 {
+fn exact_aid(event: &Event, aided: &TrueAid) -> Vec3 {
     Vec3::splat(match aided.aid {
         Aid::Heading => DVec3::X * RollPitchYaw::from_quat(event.reference.q_b_n).yaw,
         _ => aided.v_b,
@@ -127,9 +127,9 @@ impl<'a> LaneSource<'a> {
         let block = self.imu.next(samples.len());
         if !self.defects.is_empty() {
             for (sample, k) in block.iter_mut().zip(samples) {
-                let felt = plan.felt(k);
+                let error_inputs = plan.error_inputs(k);
                 for (lane, defects) in self.defects.iter().enumerate() {
-                    for (error, more) in sample.iter_mut().zip(defects.error(&felt)) {
+                    for (error, more) in sample.iter_mut().zip(defects.error(&error_inputs)) {
                         error.set_lane(lane, error.lane(lane) + more);
                     }
                 }
@@ -162,7 +162,7 @@ impl<'a> LaneSource<'a> {
     /// Aiding measurements of the vehicle at this epoch.
     fn aids(&mut self, event: &Event) -> Vec<(Aid, Vec3)> {
         let after_s = event.sample as f64 / self.rate_hz;
-        let mut measure = |aided: &Aided| {
+        let mut measure = |aided: &TrueAid| {
             let is_heading = aided.aid == Aid::Heading;
             let axes = if is_heading { &[0] } else { aided.aid.axes() };
             let mut value = exact_aid(event, aided);

@@ -23,7 +23,7 @@ use std::sync::OnceLock;
 
 /// The AR1 that stand for flicker noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ladder {
+pub struct Ar1Bank {
     /// Ratio of neighbouring correlation times.
     pub ratio: f64,
     /// Shortest correlation time (samples): what is faster is white noise.
@@ -32,7 +32,7 @@ pub struct Ladder {
     pub longest: f64,
 }
 
-impl Ladder {
+impl Ar1Bank {
     /// For synthesis and the truth of an analysis: off by 5e-4 in all records of up to 10⁸ samples.
     pub const FINE: Self = Self {
         ratio: 3.0,
@@ -85,16 +85,16 @@ fn summed(samples: u32) -> f64 {
 
 /// Variance at the beginning of what is slower than the fastest AR1 of a filter: of all that is synthesised, however slow.
 pub(super) fn initial_variance(b2: f64) -> f64 {
-    let fastest = (-1.0 / Ladder::FILTER.shortest).exp() * (1.0 - 1e-9);
-    let parts = Ladder::FINE.parts(b2).into_iter();
+    let fastest = (-1.0 / Ar1Bank::FILTER.shortest).exp() * (1.0 - 1e-9);
+    let parts = Ar1Bank::FINE.parts(b2).into_iter();
     let slow = parts.filter_map(|part| part.recursion().filter(|[phi, ..]| *phi >= fastest));
     slow.map(|[.., variance]| variance).sum()
 }
 
-impl Ladder {
+impl Ar1Bank {
     /// White noise and the AR1 whose sum stands for it, the fastest first.
     pub(super) fn parts(self, b2: f64) -> Vec<Process> {
-        let Ladder {
+        let Ar1Bank {
             ratio,
             shortest,
             longest,
@@ -207,8 +207,8 @@ mod tests {
     fn the_sums_are_off_by_what_is_said() {
         let noise = Process::flicker(4.0).unwrap();
         for (ladder, levels, error) in [
-            (Ladder::FINE, 1..=24, 6e-4),
-            (Ladder::FILTER, 9..=17, 0.035),
+            (Ar1Bank::FINE, 1..=24, 6e-4),
+            (Ar1Bank::FILTER, 9..=17, 0.035),
         ] {
             let sum = Composite::new(noise.parts(ladder));
             for level in levels {
@@ -216,7 +216,7 @@ mod tests {
                 assert!((ratio - 1.0).abs() < error, "{ladder:?}, {level}: {ratio}");
             }
         }
-        assert!(noise.parts(Ladder::FILTER).len() <= 7);
+        assert!(noise.parts(Ar1Bank::FILTER).len() <= 7);
     }
 }
 

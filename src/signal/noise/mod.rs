@@ -25,9 +25,13 @@ pub mod contamination;
 pub mod spread;
 mod synthesis;
 
-pub use flicker_noise::{Flicker, Ladder};
-pub use process::{Composite, Kind, Parameter, ParameterError, ParameterRef, Process, labels};
-pub use spread::{Law, ReplicateError, Spread, SpreadError, Variation, VirtualImu};
+pub use flicker_noise::{Ar1Bank, Flicker};
+pub use process::{
+    Composite, Parameter, ParameterError, ParameterRef, Process, ProcessKind, labels,
+};
+pub use spread::{
+    ParameterDistribution, ReplicateError, Spread, SpreadError, Variation, VirtualImu,
+};
 pub use synthesis::Synthesizer;
 
 use crate::imu::{Channel, Sensor};

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! N²/τ rules below τ = √3 N/K, K²τ/3 above. Models with several AR1 are more than such a pair; a [`Policy`] says which
-//! pair stands for them over a [`Horizon`] of averaging times, and [`Pair::closure`] by how much it is off.
+//! pair stands for them over a [`Horizon`] of averaging times, and [`NoiseDensities::closure`] by how much it is off.
 //!
 //! ```
 //! use nav_sim_signal::noise::{practical::*, Composite, Process};
@@ -25,7 +25,7 @@
 //! ```
 
 use super::continuous::{walk_density, white_density};
-use super::{Composite, Kind, Process};
+use super::{Composite, Process, ProcessKind};
 use crate::minimise::line_minimum;
 use crate::units::Refused;
 
@@ -68,7 +68,7 @@ crate::named!(Policy { Strict = "strict", Matched = "matched", Envelope = "envel
 
 /// Model of the bias in the other program.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Bias {
+pub enum BiasModel {
     /// A random walk.
     Walk,
     /// A Gauss-Markov process, its correlation time sought too.
@@ -95,7 +95,7 @@ impl Markov {
 
 /// White noise and a bias: what is exported.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Pair {
+pub struct NoiseDensities {
     /// White noise density N (units/√Hz).
     pub density: f64,
     /// Random-walk density K (units/s/√Hz).
@@ -104,7 +104,7 @@ pub struct Pair {
     pub markov: Option<Markov>,
 }
 
-impl Pair {
+impl NoiseDensities {
     /// Its Allan variance (units²) for averages over `samples` at `rate_hz`, sampled as the model is.
     pub fn allan_variance(&self, samples: u32, rate_hz: f64) -> f64 {
         let n2 = self.density * self.density * white(samples, rate_hz);
@@ -233,8 +233,8 @@ impl AllanCurve {
     }
 
     /// The pair that stands for the model.
-    pub fn pair(&self, policy: Policy, bias: Bias) -> Pair {
-        let walk = bias == Bias::Walk;
+    pub fn pair(&self, policy: Policy, bias: BiasModel) -> NoiseDensities {
+        let walk = bias == BiasModel::Walk;
         // A model that is such a pair is itself the best one, exactly and not to the accuracy of a search.
         if policy == Policy::Strict || (walk && self.is_white_and_walk()) {
             return self.strict(walk);
@@ -251,17 +251,19 @@ impl AllanCurve {
     /// Returns true if all axes have the same white noise and random walk, so that the largest is
     /// one of them.
     fn is_white_and_walk(&self) -> bool {
-        let pair = |p: &Process| matches!(p.kind(), Kind::White | Kind::RandomWalk);
+        let pair = |p: &Process| matches!(p.kind(), ProcessKind::White | ProcessKind::RandomWalk);
         self.axes
             .iter()
             .all(|a| *a == self.axes[0] && a.processes.iter().all(pair))
     }
 
-    fn strict(&self, walk: bool) -> Pair {
+    fn strict(&self, walk: bool) -> NoiseDensities {
         // Each figure is the largest of any axis, so the pair need not be that of one of them.
         let largest = |f: &dyn Fn(&Composite) -> f64| self.axes.iter().map(f).fold(0.0, f64::max);
-        let density = largest(&|axis| white_density(axis.amplitude_of(Kind::White), self.rate_hz));
-        let k = largest(&|axis| walk_density(axis.amplitude_of(Kind::RandomWalk), self.rate_hz));
+        let density =
+            largest(&|axis| white_density(axis.amplitude_of(ProcessKind::White), self.rate_hz));
+        let k =
+            largest(&|axis| walk_density(axis.amplitude_of(ProcessKind::RandomWalk), self.rate_hz));
         let slowest = self.axes.iter().filter_map(|axis| {
             let own = axis.processes.iter();
             own.filter_map(|p| markov_of(p, self.rate_hz))
@@ -270,7 +272,7 @@ impl AllanCurve {
         // Of each axis the slowest, of these the largest: a filter has one bias state an axis, and one figure
         // for all three.
         let markov = slowest.max_by(|a, b| a.sigma.total_cmp(&b.sigma));
-        Pair {
+        NoiseDensities {
             density,
             walk: if walk { k } else { 0.0 },
             markov: markov.filter(|_| !walk),
@@ -306,7 +308,7 @@ fn point(axes: &[&Composite], samples: u32) -> Point {
         };
         axes.iter().map(of_axis).fold(0.0, f64::max)
     };
-    let carried = |p: &Process| !matches!(p.kind(), Kind::Quantization | Kind::Drift);
+    let carried = |p: &Process| !matches!(p.kind(), ProcessKind::Quantization | ProcessKind::Drift);
     Point {
         samples,
         whole: largest(&|_| true),
@@ -362,21 +364,21 @@ fn bias(t_corr_s: Option<f64>, samples: u32, rate_hz: f64) -> f64 {
 }
 
 /// The pair of a policy.
-fn pair(curve: &AllanCurve, policy: Policy, kind: Bias) -> Pair {
+fn pair(curve: &AllanCurve, policy: Policy, kind: BiasModel) -> NoiseDensities {
     let t_corr_s = match kind {
-        Bias::Walk => None,
-        Bias::MarkovOf(t_corr_s) => Some(t_corr_s),
-        Bias::Markov => Some(correlation_time_s(&[curve], policy)),
+        BiasModel::Walk => None,
+        BiasModel::MarkovOf(t_corr_s) => Some(t_corr_s),
+        BiasModel::Markov => Some(correlation_time_s(&[curve], policy)),
     };
     let found = PairProblem::new(curve, policy, t_corr_s).solve();
     let (density, amplitude) = (found.white.sqrt(), found.bias.sqrt());
     match t_corr_s {
-        None => Pair {
+        None => NoiseDensities {
             density,
             walk: amplitude,
             markov: None,
         },
-        Some(t_corr_s) => Pair {
+        Some(t_corr_s) => NoiseDensities {
             density,
             walk: 0.0,
             markov: Some(Markov {
@@ -548,9 +550,9 @@ impl AllanMinimum {
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct AxisParameters {
     /// N and K of the policy: white noise and random walk.
-    pub walk: Pair,
+    pub walk: NoiseDensities,
     /// N, sigma_b and T of the policy: white noise and a Gauss-Markov bias.
-    pub markov: Pair,
+    pub markov: NoiseDensities,
     /// The lowest minimum of the Allan deviation within the range; none where it still falls, or rises from the start.
     pub minimum: Option<AllanMinimum>,
 }
@@ -569,8 +571,8 @@ impl AxisParameters {
     ) -> Result<Self, Refused> {
         let curve = AllanCurve::largest(axes, rate_hz, horizon)?;
         Ok(Self {
-            walk: curve.pair(policy, Bias::Walk),
-            markov: curve.pair(policy, Bias::Markov),
+            walk: curve.pair(policy, BiasModel::Walk),
+            markov: curve.pair(policy, BiasModel::Markov),
             minimum: AllanMinimum::of(axes, rate_hz, range_s),
         })
     }

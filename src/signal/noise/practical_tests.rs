@@ -17,8 +17,8 @@ fn gm(sigma: f64, t_corr_s: f64) -> Process {
     Process::gauss_markov(1.0 / t_corr_s, sigma * sigma, RATE).unwrap()
 }
 
-fn pair(density: f64, walk: f64) -> Pair {
-    Pair {
+fn pair(density: f64, walk: f64) -> NoiseDensities {
+    NoiseDensities {
         density,
         walk,
         markov: None,
@@ -44,7 +44,7 @@ fn without_wn() -> Vec<Process> {
 fn a_pair_comes_back_from_every_policy() {
     let (n, k) = (0.15 * DEG / 60.0, 2e-7);
     for policy in [Policy::Strict, Policy::Matched, Policy::Envelope] {
-        let pair = curve(vec![wn(n), rw(k)]).pair(policy, Bias::Walk);
+        let pair = curve(vec![wn(n), rw(k)]).pair(policy, BiasModel::Walk);
         assert_relative_eq!(pair.density, n, max_relative = 1e-12);
         assert_relative_eq!(pair.walk, k, max_relative = 1e-12);
     }
@@ -58,7 +58,7 @@ fn the_search_finds_a_pair_by_another_name() {
     let white = Process::ar1(0.0, n * n * RATE).unwrap();
     let slow = gm(k * (0.5 * t).sqrt(), t);
     for policy in [Policy::Matched, Policy::Envelope] {
-        let pair = curve(vec![white, slow]).pair(policy, Bias::Walk);
+        let pair = curve(vec![white, slow]).pair(policy, BiasModel::Walk);
         assert_relative_eq!(pair.density, n, max_relative = 1e-4);
         assert_relative_eq!(pair.walk, k, max_relative = 1e-4);
     }
@@ -68,7 +68,7 @@ fn the_search_finds_a_pair_by_another_name() {
 fn a_gauss_markov_bias_comes_back() {
     let (n, sigma, t) = (2e-3, 3e-3, 30.0);
     for policy in [Policy::Strict, Policy::Matched, Policy::Envelope] {
-        let pair = curve(vec![wn(n), gm(sigma, t)]).pair(policy, Bias::Markov);
+        let pair = curve(vec![wn(n), gm(sigma, t)]).pair(policy, BiasModel::Markov);
         let markov = pair.markov.unwrap();
         let found = [pair.density, markov.sigma, markov.t_corr_s, markov.drive()];
         let expected = [n, sigma, t, sigma * (2.0 / t).sqrt()];
@@ -81,7 +81,7 @@ fn a_gauss_markov_bias_comes_back() {
 #[test]
 fn a_fast_ar1_is_the_white_noise() {
     let axis = vec![Process::ar1(0.6, 4e-5).unwrap()];
-    let pair = curve(axis).pair(Policy::Matched, Bias::Walk);
+    let pair = curve(axis).pair(Policy::Matched, BiasModel::Walk);
     let n = (4e-5_f64 / RATE).sqrt() / (1.0 - 0.6);
     assert_relative_eq!(pair.density, n, max_relative = 0.03);
 }
@@ -90,7 +90,11 @@ fn a_fast_ar1_is_the_white_noise() {
 fn matched_is_exact_at_one_second() {
     let model = without_wn();
     let carried = Composite::new(model[..3].to_vec());
-    for kind in [Bias::Walk, Bias::Markov, Bias::MarkovOf(50.0)] {
+    for kind in [
+        BiasModel::Walk,
+        BiasModel::Markov,
+        BiasModel::MarkovOf(50.0),
+    ] {
         let pair = curve(model.clone()).pair(Policy::Matched, kind);
         let ratio = pair.allan_variance(100, RATE) / carried.allan_variance(100);
         assert!((ratio - 1.0).abs() < 1e-9, "{kind:?}: {ratio}");
@@ -101,8 +105,8 @@ fn matched_is_exact_at_one_second() {
 #[test]
 fn matched_is_the_least_squares_pair() {
     let curve = curve(without_wn());
-    let pair = curve.pair(Policy::Matched, Bias::Walk);
-    let misfit = |pair: &Pair| -> f64 {
+    let pair = curve.pair(Policy::Matched, BiasModel::Walk);
+    let misfit = |pair: &NoiseDensities| -> f64 {
         let log = |p: &Point| 0.5 * (pair.allan_variance(p.samples, RATE) / p.carried).ln();
         curve.points.iter().map(|p| log(p).powi(2)).sum()
     };
@@ -129,7 +133,11 @@ fn the_envelope_is_nowhere_below() {
         vec![wn(1e-3)],
     ] {
         let composite = Composite::new(model.clone());
-        for kind in [Bias::Walk, Bias::Markov, Bias::MarkovOf(50.0)] {
+        for kind in [
+            BiasModel::Walk,
+            BiasModel::Markov,
+            BiasModel::MarkovOf(50.0),
+        ] {
             let curve = curve(model.clone());
             let pair = curve.pair(Policy::Envelope, kind);
             for m in 100..=10_000 {
@@ -147,7 +155,7 @@ fn the_envelope_is_nowhere_below() {
 fn what_a_pair_cannot_carry_is_told() {
     let drift = Process::drift(1e-7).unwrap();
     let with_drift = curve(vec![wn(1e-4), drift]);
-    let pair = with_drift.pair(Policy::Matched, Bias::Walk);
+    let pair = with_drift.pair(Policy::Matched, BiasModel::Walk);
     let expected =
         (1e-8 / 100.0_f64).sqrt() / (1e-8 / 100.0 + 0.5 * (1e-5_f64 * 100.0).powi(2)).sqrt();
     let closure = pair.closure(&with_drift);
@@ -163,10 +171,10 @@ fn the_largest_axis_rules() {
         Composite::new(vec![wn(2e-3), rw(1e-5)]),
     );
     let both = AllanCurve::largest(&[&small, &large], RATE, Horizon::default()).unwrap();
-    let strict = both.pair(Policy::Strict, Bias::Walk);
+    let strict = both.pair(Policy::Strict, BiasModel::Walk);
     assert_relative_eq!(strict.density, 2e-3, max_relative = 1e-12);
     assert_relative_eq!(strict.walk, 4e-5, max_relative = 1e-12);
-    let pair = both.pair(Policy::Envelope, Bias::Walk);
+    let pair = both.pair(Policy::Envelope, BiasModel::Walk);
     for m in (100..=10_000).step_by(50) {
         for axis in [&small, &large] {
             assert!(pair.allan_variance(m, RATE) > axis.allan_variance(m) * (1.0 - 1e-3));
@@ -224,7 +232,7 @@ fn a_pair_departs_from_a_model_without_its_random_walk() {
     assert!((1.0..1.045).contains(&found), "{found}");
     assert_eq!(departs(vec![wn(n)], 250.0), None);
     assert_eq!(departs(vec![wn(n), rw(k)], 1e4), None);
-    let white = Pair { walk: 0.0, ..pair };
+    let white = NoiseDensities { walk: 0.0, ..pair };
     assert_eq!(
         white.departs_s(&Composite::new(vec![wn(0.1 * n)]), RATE, 1e4, 2.0),
         None

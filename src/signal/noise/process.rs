@@ -4,13 +4,13 @@
 //! answered here; longer derivations stand in `ar1` and `flicker_noise`.
 
 use super::ar1::{self, half_scale};
-use super::flicker_noise::{self, Ladder};
+use super::flicker_noise::{self, Ar1Bank};
 use crate::units::Refused;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 /// A kind of process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Kind {
+pub enum ProcessKind {
     /// White noise.
     White,
     /// Quantization noise.
@@ -72,7 +72,7 @@ struct KindRow {
     power: i32,
 }
 
-/// One row a kind, in the order of [`Kind::ALL`].
+/// One row a kind, in the order of [`ProcessKind::ALL`].
 const TABLE: [KindRow; 8] = [
     KindRow {
         code: "WN",
@@ -124,7 +124,7 @@ const TABLE: [KindRow; 8] = [
     },
 ];
 
-impl Kind {
+impl ProcessKind {
     /// All kinds, in the order in which models list them.
     pub const ALL: [Self; 8] = [
         Self::White,
@@ -268,7 +268,7 @@ impl Parameter {
     }
 
     /// Accepts a value of its domain.
-    fn checked(self, kind: Kind, value: f64) -> Result<f64, ParameterError> {
+    fn checked(self, kind: ProcessKind, value: f64) -> Result<f64, ParameterError> {
         let (is_inside, domain) = match self {
             Self::Phi => (value.abs() < 1.0, "between −1 and 1 (exclusive)"),
             Self::Theta => (value.abs() <= 1.0, "between −1 and 1"),
@@ -305,7 +305,7 @@ pub struct ParameterError {
 /// One latent process.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Process {
-    kind: Kind,
+    kind: ProcessKind,
     /// 0 of a kind without a shape.
     shape: f64,
     amplitude: f64,
@@ -332,12 +332,12 @@ impl Process {
     /// # Errors
     /// When a parameter is outside its domain, or the rate of a GM is not positive.
     pub fn new(
-        kind: Kind,
+        kind: ProcessKind,
         shape: f64,
         amplitude: f64,
         rate_hz: f64,
     ) -> Result<Self, ParameterError> {
-        let is_timed = kind == Kind::GaussMarkov;
+        let is_timed = kind == ProcessKind::GaussMarkov;
         if is_timed && !(rate_hz > 0.0 && rate_hz.is_finite()) {
             return Err(ParameterError {
                 process: kind.code(),
@@ -357,11 +357,15 @@ impl Process {
         })
     }
 
-    /// From the values of its parameters in the order of [`Kind::parameters`]; a wrong number of values is refused.
+    /// From the values of its parameters in the order of [`ProcessKind::parameters`]; a wrong number of values is refused.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn of_values(kind: Kind, values: &[f64], rate_hz: f64) -> Result<Self, ParameterError> {
+    pub fn of_values(
+        kind: ProcessKind,
+        values: &[f64],
+        rate_hz: f64,
+    ) -> Result<Self, ParameterError> {
         let (shape, amplitude) = match (kind.shape(), values) {
             (None, &[amplitude]) => (0.0, amplitude),
             (Some(_), &[shape, amplitude]) => (shape, amplitude),
@@ -375,7 +379,7 @@ impl Process {
     /// # Errors
     /// When it is negative or not finite.
     pub fn white(sigma2: f64) -> Result<Self, ParameterError> {
-        Self::new(Kind::White, 0.0, sigma2, 1.0)
+        Self::new(ProcessKind::White, 0.0, sigma2, 1.0)
     }
 
     /// Quantization noise X_t = √(12 Q²) (U_t − U_{t−1}), U uniform on (0, 1), from Q² (units²).
@@ -383,7 +387,7 @@ impl Process {
     /// # Errors
     /// When it is negative or not finite.
     pub fn quantization(q2: f64) -> Result<Self, ParameterError> {
-        Self::new(Kind::Quantization, 0.0, q2, 1.0)
+        Self::new(ProcessKind::Quantization, 0.0, q2, 1.0)
     }
 
     /// First-order autoregression X_t = phi X_{t−1} + W_t, stationary, from phi and the variance of W (units²).
@@ -391,7 +395,7 @@ impl Process {
     /// # Errors
     /// When |phi| ≥ 1, the variance is negative, or either is not finite.
     pub fn ar1(phi: f64, sigma2: f64) -> Result<Self, ParameterError> {
-        Self::new(Kind::Ar1, phi, sigma2, 1.0)
+        Self::new(ProcessKind::Ar1, phi, sigma2, 1.0)
     }
 
     /// Gauss-Markov process of autocovariance s2·exp(−beta·|t|), from beta (1/s), s2 (units²) and the rate (Hz): sampled, an AR1
@@ -400,7 +404,7 @@ impl Process {
     /// # Errors
     /// When beta or the rate is not positive, s2 is negative, or one is not finite.
     pub fn gauss_markov(beta: f64, s2: f64, rate_hz: f64) -> Result<Self, ParameterError> {
-        Self::new(Kind::GaussMarkov, beta, s2, rate_hz)
+        Self::new(ProcessKind::GaussMarkov, beta, s2, rate_hz)
     }
 
     /// First-order moving average X_t = W_t + theta W_{t−1}, invertible, from theta and the variance of W (units²).
@@ -408,7 +412,7 @@ impl Process {
     /// # Errors
     /// When |theta| > 1, the variance is negative, or either is not finite.
     pub fn ma1(theta: f64, sigma2: f64) -> Result<Self, ParameterError> {
-        Self::new(Kind::Ma1, theta, sigma2, 1.0)
+        Self::new(ProcessKind::Ma1, theta, sigma2, 1.0)
     }
 
     /// Flicker noise from B² (units²).
@@ -416,7 +420,7 @@ impl Process {
     /// # Errors
     /// When it is negative or not finite.
     pub fn flicker(b2: f64) -> Result<Self, ParameterError> {
-        Self::new(Kind::Flicker, 0.0, b2, 1.0)
+        Self::new(ProcessKind::Flicker, 0.0, b2, 1.0)
     }
 
     /// Random walk, the running sum of white increments, from their variance (units²).
@@ -424,7 +428,7 @@ impl Process {
     /// # Errors
     /// When it is negative or not finite.
     pub fn random_walk(gamma2: f64) -> Result<Self, ParameterError> {
-        Self::new(Kind::RandomWalk, 0.0, gamma2, 1.0)
+        Self::new(ProcessKind::RandomWalk, 0.0, gamma2, 1.0)
     }
 
     /// Drift X_t = slope · t, t in samples, from the slope (units per sample).
@@ -432,11 +436,11 @@ impl Process {
     /// # Errors
     /// When it is not finite.
     pub fn drift(slope: f64) -> Result<Self, ParameterError> {
-        Self::new(Kind::Drift, 0.0, slope, 1.0)
+        Self::new(ProcessKind::Drift, 0.0, slope, 1.0)
     }
 
     /// Its kind.
-    pub const fn kind(&self) -> Kind {
+    pub const fn kind(&self) -> ProcessKind {
         self.kind
     }
 
@@ -445,17 +449,17 @@ impl Process {
         self.kind.code()
     }
 
-    /// The parameter that gives its shape ([`Kind::shape`]); 0 of a kind without one.
+    /// The parameter that gives its shape ([`ProcessKind::shape`]); 0 of a kind without one.
     pub const fn shape(&self) -> f64 {
         self.shape
     }
 
-    /// The parameter that its size grows with ([`Kind::amplitude`]).
+    /// The parameter that its size grows with ([`ProcessKind::amplitude`]).
     pub const fn amplitude(&self) -> f64 {
         self.amplitude
     }
 
-    /// The values of its parameters, in the order of [`Kind::parameters`].
+    /// The values of its parameters, in the order of [`ProcessKind::parameters`].
     pub fn values(&self) -> Vec<f64> {
         let shape = self.kind.shape().map(|_| self.shape);
         shape.into_iter().chain([self.amplitude]).collect()
@@ -494,8 +498,8 @@ impl Process {
     pub fn kappa(&self) -> Option<f64> {
         match self.kind {
             // phi − 1 is exact for phi ≥ ½: kappa keeps its digits where phi is next to 1.
-            Kind::Ar1 if self.shape > 0.0 => Some(-(self.shape - 1.0).ln_1p()),
-            Kind::GaussMarkov => Some(self.shape / self.rate_hz),
+            ProcessKind::Ar1 if self.shape > 0.0 => Some(-(self.shape - 1.0).ln_1p()),
+            ProcessKind::GaussMarkov => Some(self.shape / self.rate_hz),
             _ => None,
         }
     }
@@ -507,19 +511,23 @@ impl Process {
         let (shape, amplitude) = (self.shape, self.amplitude);
         match self.kind {
             // Factorised: 1 − phi is exact for phi ≥ ½, whereas phi² would be rounded before the subtraction.
-            Kind::Ar1 => Some([
+            ProcessKind::Ar1 => Some([
                 shape,
                 amplitude,
                 amplitude / ((1.0 - shape) * (1.0 + shape)),
             ]),
             // s2 (1 − phi²) by expm1: of a slow process phi² is next to 1 and the difference would lose its digits.
-            Kind::GaussMarkov => {
+            ProcessKind::GaussMarkov => {
                 let kappa = shape / self.rate_hz;
                 let innovation = amplitude * -(-2.0 * kappa).exp_m1();
                 Some([(-kappa).exp(), innovation, amplitude])
             }
-            Kind::RandomWalk => Some([1.0, amplitude, 0.0]),
-            Kind::White | Kind::Quantization | Kind::Ma1 | Kind::Flicker | Kind::Drift => None,
+            ProcessKind::RandomWalk => Some([1.0, amplitude, 0.0]),
+            ProcessKind::White
+            | ProcessKind::Quantization
+            | ProcessKind::Ma1
+            | ProcessKind::Flicker
+            | ProcessKind::Drift => None,
         }
     }
 
@@ -527,10 +535,10 @@ impl Process {
     /// (units²). None for other kinds.
     pub fn moving_average(&self) -> Option<[f64; 2]> {
         match self.kind {
-            Kind::Quantization => Some([-1.0, self.amplitude]),
-            Kind::Ma1 => Some([self.shape, self.amplitude]),
-            Kind::White | Kind::Flicker | Kind::Drift => None,
-            Kind::Ar1 | Kind::GaussMarkov | Kind::RandomWalk => None,
+            ProcessKind::Quantization => Some([-1.0, self.amplitude]),
+            ProcessKind::Ma1 => Some([self.shape, self.amplitude]),
+            ProcessKind::White | ProcessKind::Flicker | ProcessKind::Drift => None,
+            ProcessKind::Ar1 | ProcessKind::GaussMarkov | ProcessKind::RandomWalk => None,
         }
     }
 
@@ -538,7 +546,7 @@ impl Process {
     /// that is slower than a filter's fastest state.
     pub fn initial_variance(&self) -> f64 {
         match self.kind {
-            Kind::Flicker => flicker_noise::initial_variance(self.amplitude),
+            ProcessKind::Flicker => flicker_noise::initial_variance(self.amplitude),
             _ => self.recursion().map_or(0.0, |[.., initial]| initial),
         }
     }
@@ -546,11 +554,15 @@ impl Process {
     /// Variance of the white noise in the integral (units²): of an MA1 its long-run variance.
     pub fn white_variance(&self) -> f64 {
         match self.kind {
-            Kind::White => self.amplitude,
-            Kind::Ma1 => (1.0 + self.shape).powi(2) * self.amplitude,
+            ProcessKind::White => self.amplitude,
+            ProcessKind::Ma1 => (1.0 + self.shape).powi(2) * self.amplitude,
             // its integral is bounded
-            Kind::Quantization => 0.0,
-            Kind::Ar1 | Kind::GaussMarkov | Kind::RandomWalk | Kind::Flicker | Kind::Drift => 0.0,
+            ProcessKind::Quantization => 0.0,
+            ProcessKind::Ar1
+            | ProcessKind::GaussMarkov
+            | ProcessKind::RandomWalk
+            | ProcessKind::Flicker
+            | ProcessKind::Drift => 0.0,
         }
     }
 
@@ -560,14 +572,14 @@ impl Process {
         let distance = |r: f64| (1.0 - r) * (1.0 - r) + 4.0 * r * sin2;
         let amplitude = self.amplitude;
         match self.kind {
-            Kind::White => amplitude,
-            Kind::Quantization => 4.0 * amplitude * sin2,
-            Kind::Ma1 => amplitude * distance(-self.shape),
-            Kind::Flicker => amplitude / (2.0 * sin2.sqrt()),
-            Kind::Ar1 | Kind::GaussMarkov | Kind::RandomWalk => self
+            ProcessKind::White => amplitude,
+            ProcessKind::Quantization => 4.0 * amplitude * sin2,
+            ProcessKind::Ma1 => amplitude * distance(-self.shape),
+            ProcessKind::Flicker => amplitude / (2.0 * sin2.sqrt()),
+            ProcessKind::Ar1 | ProcessKind::GaussMarkov | ProcessKind::RandomWalk => self
                 .recursion()
                 .map_or(0.0, |[phi, innovation, _]| innovation / distance(phi)),
-            Kind::Drift => 0.0,
+            ProcessKind::Drift => 0.0,
         }
     }
 
@@ -595,17 +607,17 @@ impl Process {
         let m = f64::from(samples.max(1));
         let amplitude = self.amplitude;
         match self.kind {
-            Kind::White => amplitude / m,
-            Kind::Quantization => 3.0 * amplitude / (m * m),
-            Kind::RandomWalk => amplitude * (2.0 * m * m + 1.0) / (6.0 * m),
-            Kind::Drift => 0.5 * amplitude * amplitude * m * m,
-            Kind::Ma1 => {
+            ProcessKind::White => amplitude / m,
+            ProcessKind::Quantization => 3.0 * amplitude / (m * m),
+            ProcessKind::RandomWalk => amplitude * (2.0 * m * m + 1.0) / (6.0 * m),
+            ProcessKind::Drift => 0.5 * amplitude * amplitude * m * m,
+            ProcessKind::Ma1 => {
                 let sum = 1.0 + self.shape;
                 amplitude * (m * sum * sum - 3.0 * self.shape) / (m * m)
             }
-            Kind::Flicker => amplitude * flicker_noise::allan_shape(samples),
-            Kind::Ar1 => ar1::allan_variance(self.shape, amplitude, samples.max(1)),
-            Kind::GaussMarkov => {
+            ProcessKind::Flicker => amplitude * flicker_noise::allan_shape(samples),
+            ProcessKind::Ar1 => ar1::allan_variance(self.shape, amplitude, samples.max(1)),
+            ProcessKind::GaussMarkov => {
                 amplitude * ar1::unit_markov(self.shape / self.rate_hz, samples.max(1))
             }
         }
@@ -616,23 +628,23 @@ impl Process {
     pub(crate) fn mean_variance(&self, n: f64) -> f64 {
         let amplitude = self.amplitude;
         match self.kind {
-            Kind::White => amplitude / n,
+            ProcessKind::White => amplitude / n,
             // The sum telescopes to √(12 Q²) (U_n − U_0).
-            Kind::Quantization => 2.0 * amplitude / (n * n),
+            ProcessKind::Quantization => 2.0 * amplitude / (n * n),
             // Step i is in n + 1 − i of the samples: γ² Σ i²/n².
-            Kind::RandomWalk => amplitude * (n + 1.0) * (2.0 * n + 1.0) / (6.0 * n),
-            Kind::Flicker => {
-                let parts = self.parts(Ladder::FINE);
+            ProcessKind::RandomWalk => amplitude * (n + 1.0) * (2.0 * n + 1.0) / (6.0 * n),
+            ProcessKind::Flicker => {
+                let parts = self.parts(Ar1Bank::FINE);
                 parts.iter().map(|part| part.mean_variance(n)).sum()
             }
-            Kind::Drift => 0.0,
-            Kind::Ma1 => {
+            ProcessKind::Drift => 0.0,
+            ProcessKind::Ma1 => {
                 // W_1 … W_(n−1) occur in two samples, with 1 and theta; W_n in one with 1, W_0 in one with theta.
                 let theta = self.shape;
                 let inner = (1.0 + theta) * (1.0 + theta);
                 amplitude * ((n - 1.0) * inner + 1.0 + theta * theta) / (n * n)
             }
-            Kind::Ar1 | Kind::GaussMarkov => {
+            ProcessKind::Ar1 | ProcessKind::GaussMarkov => {
                 let [phi, _, variance] = self.recursion().expect("recursion");
                 variance * ar1::mean_shape(phi, n)
             }
@@ -641,9 +653,9 @@ impl Process {
 
     /// The processes by which a simulator or filter represents it: of flicker noise white noise and AR1, the fastest first; any other
     /// process itself.
-    pub fn parts(&self, ladder: Ladder) -> Vec<Self> {
+    pub fn parts(&self, ladder: Ar1Bank) -> Vec<Self> {
         match self.kind {
-            Kind::Flicker => ladder.parts(self.amplitude),
+            ProcessKind::Flicker => ladder.parts(self.amplitude),
             _ => vec![*self],
         }
     }
@@ -658,15 +670,15 @@ impl Process {
         let (shape, amplitude) = (self.shape, self.amplitude);
         let (shape, amplitude) = match self.kind {
             // What is kept: N² = sigma2/f, K² = gamma2·f, and the slope per second.
-            Kind::White => (shape, amplitude * ratio),
-            Kind::RandomWalk | Kind::Drift => (shape, amplitude / ratio),
+            ProcessKind::White => (shape, amplitude * ratio),
+            ProcessKind::RandomWalk | ProcessKind::Drift => (shape, amplitude / ratio),
             // B² is that of every rate.
-            Kind::Flicker | Kind::GaussMarkov => (shape, amplitude),
-            Kind::Ar1 | Kind::Ma1 | Kind::Quantization => {
+            ProcessKind::Flicker | ProcessKind::GaussMarkov => (shape, amplitude),
+            ProcessKind::Ar1 | ProcessKind::Ma1 | ProcessKind::Quantization => {
                 let (Some(kappa), Some([.., variance])) = (self.kappa(), self.recursion()) else {
                     let why = match self.kind {
-                        Kind::Ar1 => "phi ≤ 0 has no continuous counterpart",
-                        Kind::Ma1 => "it has no continuous counterpart",
+                        ProcessKind::Ar1 => "phi ≤ 0 has no continuous counterpart",
+                        ProcessKind::Ma1 => "it has no continuous counterpart",
                         _ => "quantization belongs to the quantiser's own rate",
                     };
                     let code = self.code();
@@ -687,9 +699,10 @@ impl Process {
 
 /// A label for each process of a sum, unique within it: "WN", "AR1_1", "AR1_2", … (numbered only where a kind occurs
 /// more than once, in order of appearance).
-pub fn labels(kinds: &[Kind]) -> Vec<String> {
-    let count = |kinds: &[Kind], kind: Kind| kinds.iter().filter(|k| **k == kind).count();
-    let label = |(i, kind): (usize, &Kind)| match count(kinds, *kind) {
+pub fn labels(kinds: &[ProcessKind]) -> Vec<String> {
+    let count =
+        |kinds: &[ProcessKind], kind: ProcessKind| kinds.iter().filter(|k| **k == kind).count();
+    let label = |(i, kind): (usize, &ProcessKind)| match count(kinds, *kind) {
         1 => kind.code().to_owned(),
         _ => format!("{}_{}", kind.code(), count(&kinds[..=i], *kind)),
     };
@@ -739,8 +752,8 @@ impl Composite {
             .collect()
     }
 
-    /// Sum of the amplitudes ([`Kind::amplitude`]) of the processes of a kind.
-    pub fn amplitude_of(&self, kind: Kind) -> f64 {
+    /// Sum of the amplitudes ([`ProcessKind::amplitude`]) of the processes of a kind.
+    pub fn amplitude_of(&self, kind: ProcessKind) -> f64 {
         let own = self.processes.iter().filter(|p| p.kind() == kind);
         own.map(Process::amplitude).sum()
     }
@@ -799,7 +812,7 @@ mod tests {
 
     #[test]
     fn every_process_comes_back_from_its_parameters() {
-        for kind in Kind::ALL {
+        for kind in ProcessKind::ALL {
             let names: Vec<&str> = kind.parameters().iter().map(|p| p.name()).collect();
             let values: Vec<f64> = (1..=names.len()).map(|i| 0.25 * i as f64).collect();
             let process = Process::of_values(kind, &values, 100.0).unwrap();
@@ -808,19 +821,19 @@ mod tests {
             assert_eq!(process.parameters(), expected);
             assert!(!kind.amplitude().is_shape() && kind.shape().is_none_or(Parameter::is_shape));
         }
-        assert_eq!(Kind::named("XX"), None);
-        let missing = Process::of_values(Kind::Ar1, &[1.0], 100.0).unwrap_err();
+        assert_eq!(ProcessKind::named("XX"), None);
+        let missing = Process::of_values(ProcessKind::Ar1, &[1.0], 100.0).unwrap_err();
         assert_eq!(missing.parameter, "phi");
-        assert!(Process::of_values(Kind::White, &[1.0, 2.0], 100.0).is_err());
+        assert!(Process::of_values(ProcessKind::White, &[1.0, 2.0], 100.0).is_err());
     }
 
     /// One of each kind, sampled at 100 Hz.
     fn each() -> [Process; 8] {
-        let shape = |kind: Kind| match kind.shape() {
+        let shape = |kind: ProcessKind| match kind.shape() {
             Some(Parameter::Beta) => 10.0,
             _ => 0.5,
         };
-        Kind::ALL.map(|kind| Process::new(kind, shape(kind), 0.3, 100.0).unwrap())
+        ProcessKind::ALL.map(|kind| Process::new(kind, shape(kind), 0.3, 100.0).unwrap())
     }
 
     /// Central differences: their error is of the order of the square of the step, 1e-8, and their rounding 1e-16 of the variance over
@@ -848,8 +861,8 @@ mod tests {
     fn spectra_integrate_to_the_wavelet_variance() {
         let half = 1 << 14;
         for process in each() {
-            let is_flicker = process.kind() == Kind::Flicker;
-            for level in (1..=6).filter(|_| process.kind() != Kind::Drift) {
+            let is_flicker = process.kind() == ProcessKind::Flicker;
+            for level in (1..=6).filter(|_| process.kind() != ProcessKind::Drift) {
                 let m = f64::from(level - 1).exp2();
                 let term = |k: usize| {
                     let x = 0.5 * PI * (k as f64 + 0.5) / half as f64;
@@ -868,10 +881,10 @@ mod tests {
     #[test]
     fn parts_and_white_noise_are_those_of_the_process() {
         for process in each() {
-            let is_slow = process.recursion().is_some() || process.kind() == Kind::Flicker;
+            let is_slow = process.recursion().is_some() || process.kind() == ProcessKind::Flicker;
             let white = if is_slow { 0.0 } else { process.spectrum(0.0) };
             assert_relative_eq!(process.white_variance(), white);
-            let parts = Composite::new(process.parts(Ladder::FINE));
+            let parts = Composite::new(process.parts(Ar1Bank::FINE));
             for level in [1, 6, 12] {
                 let (own, sum) = (process.haar_wv(level), parts.haar_wv(level));
                 assert_relative_eq!(sum, own, max_relative = 1e-3);

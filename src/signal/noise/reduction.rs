@@ -4,7 +4,7 @@
 //! weights, over the scales from one GNSS interval to [`window_s`]. Quantization noise is left out: its
 //! integral is bounded. So is a drift: the filter has a state for its slope. The reduction is a pure function of model, interval and window.
 
-use super::{Composite, Kind, ParameterError, Process};
+use super::{Composite, ParameterError, Process, ProcessKind};
 use crate::minimise::{Descent, MOST, Matrix};
 
 /// Longest time scale that matters to a filter whose longest outage is given (s): eight times the outage,
@@ -16,7 +16,7 @@ pub fn window_s(longest_outage_s: f64) -> f64 {
 
 /// White noise and one bias in the place of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reduced {
+pub struct ReducedModel {
     /// Variance of a sample of white noise (units²).
     pub white: f64,
     /// The bias: a Gauss-Markov process, sampled as an AR1.
@@ -58,7 +58,7 @@ pub fn reduce(
     rate_hz: f64,
     interval_s: f64,
     window_s: f64,
-) -> Result<Reduced, ReductionError> {
+) -> Result<ReducedModel, ReductionError> {
     let kept = carried(noise);
     // Level 1 (two samples) is the first there is; level 40 is three and a half centuries at 100 Hz.
     let level = |seconds: f64| (seconds * rate_hz).max(2.0).log2().round();
@@ -79,7 +79,7 @@ pub fn reduce(
     // The Gauss-Markov bias as the AR1 that it is when sampled; expm1 keeps the digits of 1 − phi² for a slow
     // one.
     let (kappa, variance) = (ln_kappa.exp(), ln_variance.exp());
-    Ok(Reduced {
+    Ok(ReducedModel {
         white: ln_white.exp(),
         bias: Process::ar1((-kappa).exp(), variance * -(-2.0 * kappa).exp_m1())?,
         initial_variance: kept.processes.iter().map(Process::initial_variance).sum(),
@@ -95,7 +95,7 @@ pub fn reduce(
 #[must_use]
 pub fn is_exact(noise: &Composite) -> bool {
     let states = |p: &Process| match p.kind() {
-        Kind::Flicker => 2,
+        ProcessKind::Flicker => 2,
         _ => usize::from(p.recursion().is_some()),
     };
     noise.processes.iter().map(states).sum::<usize>() <= 1
@@ -104,7 +104,7 @@ pub fn is_exact(noise: &Composite) -> bool {
 /// The processes that the pair stands for: without quantization noise and without drift.
 #[must_use]
 pub fn carried(noise: &Composite) -> Composite {
-    let is_apart = |p: &Process| matches!(p.kind(), Kind::Quantization | Kind::Drift);
+    let is_apart = |p: &Process| matches!(p.kind(), ProcessKind::Quantization | ProcessKind::Drift);
     let processes = noise.processes.iter().copied();
     Composite::new(processes.filter(|p| !is_apart(p)).collect())
 }
@@ -129,7 +129,7 @@ impl WaveletFit {
             self.start(-log2_tau * std::f64::consts::LN_2)
         });
         let best = starts.min_by(|a, b| self.cost(a).total_cmp(&self.cost(b)));
-        self.polish(best.expect("grid"))
+        self.refine(best.expect("grid"))
     }
 
     /// The two variances for a given kappa: linear least squares of the relative misfit, both kept
@@ -138,8 +138,11 @@ impl WaveletFit {
         let (mut aa, mut ab, mut bb, mut a1, mut b1) = (0.0, 0.0, 0.0, 0.0, 0.0);
         let (mut a_max, mut b_max) = (0.0_f64, 0.0_f64);
         for (level, target) in self.levels.iter().zip(&self.target) {
-            let a = Kind::White.haar_shape(0.0, *level).0 / target;
-            let b = Kind::GaussMarkov.haar_shape(ln_kappa.exp(), *level).0 / target;
+            let a = ProcessKind::White.haar_shape(0.0, *level).0 / target;
+            let b = ProcessKind::GaussMarkov
+                .haar_shape(ln_kappa.exp(), *level)
+                .0
+                / target;
             (aa, ab, bb, a1, b1) = (aa + a * a, ab + a * b, bb + b * b, a1 + a, b1 + b);
             (a_max, b_max) = (a_max.max(a), b_max.max(b));
         }
@@ -163,8 +166,8 @@ impl WaveletFit {
     fn residuals(&self, x: &[f64]) -> Vec<f64> {
         let (white, variance, kappa) = (x[0].exp(), x[1].exp(), x[2].exp());
         let model = |l| {
-            white * Kind::White.haar_shape(0.0, l).0
-                + variance * Kind::GaussMarkov.haar_shape(kappa, l).0
+            white * ProcessKind::White.haar_shape(0.0, l).0
+                + variance * ProcessKind::GaussMarkov.haar_shape(kappa, l).0
         };
         self.levels
             .iter()
@@ -177,7 +180,7 @@ impl WaveletFit {
         self.residuals(x).iter().map(|r| r * r).sum()
     }
 
-    fn polish(&self, start: [f64; 3]) -> [f64; 3] {
+    fn refine(&self, start: [f64; 3]) -> [f64; 3] {
         let descent = Descent {
             // Range of ln x for any f64.
             ranges: &[(-700.0, 700.0); 3],
@@ -198,8 +201,8 @@ impl WaveletFit {
         let (white, variance, kappa) = (x[0].exp(), x[1].exp(), x[2].exp());
         let (mut normal, mut gradient) = ([[0.0; MOST]; MOST], vec![0.0; 3]);
         for (level, target) in self.levels.iter().zip(&self.target) {
-            let (shape, slope) = Kind::GaussMarkov.haar_shape(kappa, *level);
-            let a = white * Kind::White.haar_shape(0.0, *level).0;
+            let (shape, slope) = ProcessKind::GaussMarkov.haar_shape(kappa, *level);
+            let a = white * ProcessKind::White.haar_shape(0.0, *level).0;
             let b = variance * shape;
             // d ln(a + b) with respect to ln sigma2, ln variance and ln kappa.
             let row = [a, b, variance * slope * kappa].map(|part| part / (a + b));
@@ -261,7 +264,7 @@ mod tests {
                 log10(i / 16 % 16, -12.0, -5.0),
                 log10(i / 256, -7.0, -1.0),
             ];
-            assert!(found <= fit.cost(&fit.polish(x)) * (1.0 + 1e-6) + 1e-12);
+            assert!(found <= fit.cost(&fit.refine(x)) * (1.0 + 1e-6) + 1e-12);
         }
     }
 

@@ -59,7 +59,7 @@ const LARGEST_SD: f64 = 10.0;
 /// A distribution, as in model files.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase", tag = "distribution")]
-pub enum Law {
+pub enum ParameterDistribution {
     /// low + width × a beta law
     Beta {
         /// First shape
@@ -100,7 +100,7 @@ pub struct Variation {
     #[serde(skip)]
     pub of: ParameterRef,
     /// Its law.
-    pub law: Law,
+    pub law: ParameterDistribution,
 }
 
 impl Variation {
@@ -112,7 +112,7 @@ impl Variation {
         noise: &Composite,
         process: &str,
         parameter: &str,
-        law: Law,
+        law: ParameterDistribution,
     ) -> Result<Self, SpreadError> {
         let labels = noise.labels();
         let Some(at) = labels.iter().position(|l| l == process) else {
@@ -141,9 +141,9 @@ impl Variation {
         // The domains are intervals: a beta law stays inside if its two ends do. Other laws are drawn again
         // until inside, so only their centres must be there.
         let ends = match law {
-            Law::Beta { low, width, .. } => [low, low + width],
-            Law::Normal { .. } => [value; 2],
-            Law::Lognormal { median, .. } => [median; 2],
+            ParameterDistribution::Beta { low, width, .. } => [low, low + width],
+            ParameterDistribution::Normal { .. } => [value; 2],
+            ParameterDistribution::Lognormal { median, .. } => [median; 2],
         };
         for end in ends {
             if let Err(e) = noise.clone().set(of, end) {
@@ -163,24 +163,28 @@ impl Variation {
             }
         };
         match self.law {
-            Law::Beta { a, b, low, width } => {
+            ParameterDistribution::Beta { a, b, low, width } => {
                 check("a", a, a > 0.0, "a finite number > 0")?;
                 check("b", b, b > 0.0, "a finite number > 0")?;
                 check("low", low, true, "a finite number")?;
                 check("width", width, width >= 0.0, "a finite number ≥ 0")
             }
             // Below 1, at least 47 % of the draws of a coefficient in (−1, 1) are inside: redrawing ends.
-            Law::Normal { sd }
+            ParameterDistribution::Normal { sd }
                 if matches!(self.of.parameter, Parameter::Phi | Parameter::Theta) =>
             {
                 check("sd", sd, (0.0..=1.0).contains(&sd), "between 0 and 1")
             }
-            Law::Normal { sd } => check("sd", sd, sd >= 0.0, "a finite number ≥ 0"),
-            Law::Lognormal { .. } if self.of.parameter == Parameter::Theta => refused(
-                "distribution",
-                "theta has no logarithm: lognormal is for variances, slopes, phi and beta",
-            ),
-            Law::Lognormal { median, sd, .. } => {
+            ParameterDistribution::Normal { sd } => {
+                check("sd", sd, sd >= 0.0, "a finite number ≥ 0")
+            }
+            ParameterDistribution::Lognormal { .. } if self.of.parameter == Parameter::Theta => {
+                refused(
+                    "distribution",
+                    "theta has no logarithm: lognormal is for variances, slopes, phi and beta",
+                )
+            }
+            ParameterDistribution::Lognormal { median, sd, .. } => {
                 check("median", median, median > 0.0, "a finite number > 0")?;
                 // ±8 standard deviations of 10 are 1e±35: more is a slip, and would leave the range of numbers.
                 check(
@@ -199,15 +203,17 @@ impl Variation {
         let centre = noise.value(self.of);
         loop {
             let value = match self.law {
-                Law::Beta { a, b, low, width } => {
+                ParameterDistribution::Beta { a, b, low, width } => {
                     let share = Beta::new(a, b).expect("shapes");
                     low + width * g.sample(share)
                 }
-                Law::Normal { sd } => centre + sd * g.sample::<f64, _>(StandardNormal),
-                Law::Lognormal {
+                ParameterDistribution::Normal { sd } => {
+                    centre + sd * g.sample::<f64, _>(StandardNormal)
+                }
+                ParameterDistribution::Lognormal {
                     median, sd: 0.0, ..
                 } => median,
-                Law::Lognormal { median, sd, .. } => {
+                ParameterDistribution::Lognormal { median, sd, .. } => {
                     let scaled = parameter.scaled(median) + sd * g.sample::<f64, _>(StandardNormal);
                     parameter.unscaled(scaled)
                 }
@@ -372,7 +378,7 @@ mod replicate_tests {
     use crate::imu::{Axis, Sensor};
     use crate::noise::contamination::Operation;
     use crate::noise::contamination::tests::contamination;
-    use crate::noise::{Composite, Kind, Law, Process, Variation};
+    use crate::noise::{Composite, ParameterDistribution, Process, ProcessKind, Variation};
 
     const X: Channel = Channel {
         sensor: Sensor::Accel,
@@ -381,7 +387,7 @@ mod replicate_tests {
 
     fn model() -> Model {
         let process = |code, values: &[f64]| {
-            Process::of_values(Kind::named(code).unwrap(), values, 100.0).unwrap()
+            Process::of_values(ProcessKind::named(code).unwrap(), values, 100.0).unwrap()
         };
         let noise = Composite::new(vec![process("WN", &[1.0]), process("RW", &[0.01])]);
         Model::pooled(100.0, &noise, &noise)
@@ -421,7 +427,7 @@ mod replicate_tests {
     #[test]
     fn parameters_are_drawn_then_scaled() {
         let model = model();
-        let law = Law::Beta {
+        let law = ParameterDistribution::Beta {
             a: 2.0,
             b: 2.0,
             low: 1.0,

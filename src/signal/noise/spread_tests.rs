@@ -1,14 +1,14 @@
 //! Laws, their draws and their refusals.
 
 use super::*;
-use crate::noise::{Kind, Process};
+use crate::noise::{Process, ProcessKind};
 use approx::assert_abs_diff_eq;
 
 const RATE: f64 = 100.0;
 
 fn n1() -> Composite {
     let process = |code, values: &[f64]| {
-        Process::of_values(Kind::named(code).unwrap(), values, RATE).unwrap()
+        Process::of_values(ProcessKind::named(code).unwrap(), values, RATE).unwrap()
     };
     Composite::new(vec![
         process("WN", &[5e-5]),
@@ -17,7 +17,7 @@ fn n1() -> Composite {
     ])
 }
 
-fn spread(process: &str, parameter: &str, law: Law) -> Spread {
+fn spread(process: &str, parameter: &str, law: ParameterDistribution) -> Spread {
     let variation = Variation::new(&n1(), process, parameter, law).unwrap();
     Spread {
         axes: std::array::from_fn(|_| vec![variation.clone()]),
@@ -36,7 +36,11 @@ fn drawn(spread: &Spread, replicates: u64, axis: usize, at: (usize, usize)) -> V
 fn beta_has_its_range_and_moments() {
     let (a, b, low, width) = (6.0, 2.0, 0.983_548_9, 3.447_648_9e-3);
     let x = drawn(
-        &spread("AR1", "phi", Law::Beta { a, b, low, width }),
+        &spread(
+            "AR1",
+            "phi",
+            ParameterDistribution::Beta { a, b, low, width },
+        ),
         4000,
         0,
         (1, 0),
@@ -64,7 +68,7 @@ fn beta_has_its_range_and_moments() {
 fn normal_is_truncated_to_the_domain() {
     let mut noise = n1();
     noise.processes[0] = Process::white(0.0).unwrap();
-    let law = Law::Normal { sd: 2.0 };
+    let law = ParameterDistribution::Normal { sd: 2.0 };
     let variation = Variation::new(&noise, "WN", "sigma2", law).unwrap();
     let mut spread = Spread::default();
     spread.axes[0].push(variation);
@@ -83,7 +87,7 @@ fn normal_is_truncated_to_the_domain() {
 /// its standard deviations, their deviation within five of 1/√8000.
 #[test]
 fn lognormal_is_of_variances_and_of_correlation_times() {
-    let law = |median| Law::Lognormal {
+    let law = |median| ParameterDistribution::Lognormal {
         median,
         sd: 0.3,
         median_ci95: None,
@@ -112,7 +116,7 @@ fn axes_and_replicates_draw_for_themselves_and_repeat() {
     let s = spread(
         "WN",
         "sigma2",
-        Law::Beta {
+        ParameterDistribution::Beta {
             a: 3.0,
             b: 4.0,
             low: 5e-5,
@@ -127,25 +131,25 @@ fn axes_and_replicates_draw_for_themselves_and_repeat() {
 
 #[test]
 fn what_is_not_drawn_keeps_its_value() {
-    let s = spread("WN", "sigma2", Law::Normal { sd: 1e-6 });
+    let s = spread("WN", "sigma2", ParameterDistribution::Normal { sd: 1e-6 });
     assert_eq!(drawn(&s, 5, 3, (1, 0)), [0.985; 5]);
 }
 
 #[test]
 fn impossible_laws_are_refused_in_words() {
-    let beta = |a, low, width| Law::Beta {
+    let beta = |a, low, width| ParameterDistribution::Beta {
         a,
         b: 1.0,
         low,
         width,
     };
-    let lognormal = |median, sd| Law::Lognormal {
+    let lognormal = |median, sd| ParameterDistribution::Lognormal {
         median,
         sd,
         median_ci95: None,
         sd_ci95: None,
     };
-    let normal = |sd| Law::Normal { sd };
+    let normal = |sd| ParameterDistribution::Normal { sd };
     for (process, parameter, law, expected) in [
         (
             "AR1_2",

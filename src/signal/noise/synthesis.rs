@@ -1,6 +1,6 @@
 //! Synthesis: draws the noise of one axis from its model, block by block, for one run or for eight side by side.
 
-use super::{Composite, Kind, Ladder, Process};
+use super::{Ar1Bank, Composite, Process, ProcessKind};
 use crate::lanes::{
     Bits, Kernel, LANES, Lanes, Level, Real, Wide, dispatch, horner, sinc_cos_of_square,
 };
@@ -14,7 +14,7 @@ use std::f64::consts::{FRAC_PI_2, LN_2};
 /// Every process of the sum draws from a stream of its own, so that adding or removing one changes no
 /// other's numbers. The output does not depend on the sizes of the blocks it is asked for.
 ///
-/// FN is a sum of AR1 ([`Ladder::FINE`]). AR1 and GM start stationary; MA1 and QN have a past; RW starts at 0 (its first sample is its first
+/// FN is a sum of AR1 ([`Ar1Bank::FINE`]). AR1 and GM start stationary; MA1 and QN have a past; RW starts at 0 (its first sample is its first
 /// increment) and DR at one slope (X_t = slope·t, t = 1, 2, …).
 #[derive(Debug, Clone)]
 pub struct Synthesizer<S: Streams = Generator> {
@@ -61,7 +61,7 @@ impl<S: Streams> Synthesizer<S> {
         for (i, label) in first.labels().into_iter().enumerate() {
             let parts: Vec<Vec<Process>> = runs
                 .iter()
-                .map(|(noise, _)| noise.processes[i].parts(Ladder::FINE))
+                .map(|(noise, _)| noise.processes[i].parts(Ar1Bank::FINE))
                 .collect();
             for part in 0..parts[0].len() {
                 let label = match parts[0].len() {
@@ -105,11 +105,11 @@ impl<S: Streams> Synthesizer<S> {
         }
         let zero = S::Sample::from(0.0);
         let (filter, size, last) = match runs[0].kind() {
-            Kind::White => (ProcessFilter::White, size, zero),
-            Kind::Drift => (ProcessFilter::Drift, of(&Process::amplitude), zero),
+            ProcessKind::White => (ProcessFilter::White, size, zero),
+            ProcessKind::Drift => (ProcessFilter::Drift, of(&Process::amplitude), zero),
             // The value before the first one is drawn too, so that the first sample has the variance 2 Q² of
             // all others.
-            Kind::Quantization => {
+            ProcessKind::Quantization => {
                 let step = of(&|p| (12.0 * p.amplitude()).sqrt());
                 let last = first_of(&mut streams, UnitDistribution::Uniform);
                 (ProcessFilter::Quantization, step, last)

@@ -22,11 +22,11 @@
 use super::haar::Compensated;
 use super::interval::edof_eta3;
 use super::robust::m_scale;
-use super::{RobustVariance, Status, Tuning, WaveletError, check_levels, coefficient_count};
+use super::{RobustVariance, RootStatus, Tuning, WaveletError, check_levels, coefficient_count};
 
 /// Wavelet variances of a signal with holes at levels 1, 2, …
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Gappy {
+pub struct GappyVariances {
     /// Classical (units²).
     pub classical: Vec<f64>,
     /// Robust.
@@ -40,7 +40,7 @@ pub struct Gappy {
 ///
 /// # Errors
 /// When the signal is too short for the levels, a sample is infinite, or fewer than two are there.
-pub fn gappy(signal: &[f64], levels: u32, tuning: &Tuning) -> Result<Gappy, WaveletError> {
+pub fn gappy(signal: &[f64], levels: u32, tuning: &Tuning) -> Result<GappyVariances, WaveletError> {
     let present: Vec<f64> = signal.iter().copied().filter(|x| !x.is_nan()).collect();
     check_levels(&present, 1)?;
     if coefficient_count(signal.len(), levels) == 0 {
@@ -64,7 +64,7 @@ pub fn gappy(signal: &[f64], levels: u32, tuning: &Tuning) -> Result<Gappy, Wave
         counts: there.clone(),
         half: 1,
     };
-    let mut found = Gappy::default();
+    let mut found = GappyVariances::default();
     for level in 1..=levels {
         let Some(coefficients) = windows.coefficients() else {
             break;
@@ -74,7 +74,7 @@ pub fn gappy(signal: &[f64], levels: u32, tuning: &Tuning) -> Result<Gappy, Wave
         let mut robust = coefficients.robust(nu, excess, tuning);
         let degrees = edof_eta3(signal.len(), level) * coefficients.coverage;
         if robust.is_moved_by_steps(nu, degrees, tuning.efficiency()) {
-            robust.status = Status::Coarse;
+            robust.status = RootStatus::Coarse;
         }
         found.classical.push(nu);
         found.robust.push(robust);

@@ -3,7 +3,7 @@
 use super::*;
 use crate::noise::{Composite, Process, Synthesizer};
 use crate::rng::{Generator, StreamKey};
-use crate::wavelet::both;
+use crate::wavelet::classical_and_robust;
 use approx::assert_relative_eq;
 use rand::{RngExt, SeedableRng};
 
@@ -90,7 +90,7 @@ fn signal(seed: u64, samples: usize) -> Vec<f64> {
 #[test]
 fn without_holes_it_is_the_plain_one() {
     let signal = signal(1, 3000);
-    let (classical, robust) = both(&signal, 10, &tuning()).unwrap();
+    let (classical, robust) = classical_and_robust(&signal, 10, &tuning()).unwrap();
     let found = gappy(&signal, 10, &tuning()).unwrap();
     assert_eq!(found.coverage, [1.0; 10]);
     assert_relative_eq!(found.classical[..], classical[..], max_relative = 1e-9);
@@ -109,7 +109,7 @@ fn holes_leave_no_bias_and_cost_what_coverage_says() {
     for burst in [1, 20] {
         let measured = |seed: u64| {
             let mut x = signal(seed, 4096);
-            let whole = both(&x, 10, &tuning()).unwrap();
+            let whole = classical_and_robust(&x, 10, &tuning()).unwrap();
             lose(&mut x, 0.1, burst, &mut Generator::seed_from_u64(seed));
             (whole, gappy(&x, 10, &tuning()).unwrap())
         };
@@ -168,5 +168,8 @@ fn what_has_too_few_samples_is_refused_or_ends() {
     let alternate: Vec<f64> = (0..64)
         .map(|t| if t % 2 == 0 { f64::from(t) } else { f64::NAN })
         .collect();
-    assert_eq!(gappy(&alternate, 3, &tuning()).unwrap(), Gappy::default());
+    assert_eq!(
+        gappy(&alternate, 3, &tuning()).unwrap(),
+        GappyVariances::default()
+    );
 }

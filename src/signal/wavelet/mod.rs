@@ -16,9 +16,9 @@ pub mod haar;
 pub mod interval;
 pub mod robust;
 
-pub use gappy::{Gappy, gappy};
+pub use gappy::{GappyVariances, gappy};
 pub use haar::{Curve, classical};
-pub use robust::{QuantizationResponse, RobustVariance, Status, Tuning, both};
+pub use robust::{QuantizationResponse, RobustVariance, RootStatus, Tuning, classical_and_robust};
 
 /// Why there is no wavelet variance.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

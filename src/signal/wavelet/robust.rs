@@ -18,7 +18,7 @@ use std::f64::consts::{PI, SQRT_2};
 
 /// Kind of root that a robust variance is at one level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Status {
+pub enum RootStatus {
     /// The falling root.
     Ok,
     /// Quantization moved the root or zeroed half of the coefficients: the classical variance is used.
@@ -29,7 +29,7 @@ pub enum Status {
     Zero,
 }
 
-crate::named!(Status { Ok = "ok", Coarse = "coarse", NoRoot = "no_root", Zero = "zero" });
+crate::named!(RootStatus { Ok = "ok", Coarse = "coarse", NoRoot = "no_root", Zero = "zero" });
 
 /// Robust variance of one level.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +37,7 @@ pub struct RobustVariance {
     /// nu (units²).
     pub value: f64,
     /// Kind of root.
-    pub status: Status,
+    pub status: RootStatus,
     /// Share of the coefficients that are zero.
     pub zeros: f64,
 }
@@ -64,7 +64,7 @@ impl RobustVariance {
         // (1/e − 1)·2/eta is the variance of the logarithm of the two of Gaussian coefficients.
         let sigma = ((1.0 / efficiency - 1.0) * 2.0 / edof).sqrt();
         let is_moved = ratio.abs() > LEAST_MOVE.max(3.0 * sigma);
-        self.is_stepped() && (is_moved || self.status == Status::NoRoot)
+        self.is_stepped() && (is_moved || self.status == RootStatus::NoRoot)
     }
 }
 
@@ -75,7 +75,7 @@ const LEAST_MOVE: f64 = 0.02;
 ///
 /// # Errors
 /// When the signal is too short for the levels, or a sample is not finite.
-pub fn both(
+pub fn classical_and_robust(
     signal: &[f64],
     levels: u32,
     tuning: &Tuning,
@@ -106,7 +106,7 @@ pub fn both(
             edof_eta3(signal.len(), level),
             tuning.efficiency(),
         ) {
-            robust.status = Status::Coarse;
+            robust.status = RootStatus::Coarse;
         }
         (classical, robust)
     };
@@ -164,7 +164,8 @@ impl IterationStart {
         } else {
             None
         };
-        let (value, status) = near.map_or_else(|| equation.search(), |value| (value, Status::Ok));
+        let (value, status) =
+            near.map_or_else(|| equation.search(), |value| (value, RootStatus::Ok));
         // Of 4096 a share of a tenth is known to 0.5 %.
         let is_zero = |y: &&f64| **y <= ZERO * ZERO * value;
         let zeros = self.sample.iter().filter(is_zero).count() as f64;
@@ -233,19 +234,19 @@ impl Equation<'_> {
     /// The march from the squared MAD: up while g > 0; else down until g > 0, then to that region's falling
     /// edge; if nothing is positive downward, up to a positive region and on to its falling edge (where nearly half of the
     /// coefficients are many times as large as the others).
-    fn search(&self) -> (f64, Status) {
+    fn search(&self) -> (f64, RootStatus) {
         let mad = squared_mad(self.squares);
         let status = if mad > 0.0 {
-            Status::Ok
+            RootStatus::Ok
         } else {
-            Status::Coarse
+            RootStatus::Coarse
         };
         let mean = self.squares.iter().sum::<f64>() / self.squares.len() as f64;
         // More than half of the coefficients are exactly zero: the MAD says nothing, and the mean is positive
         // unless all are zero.
         let start = if mad > 0.0 { mad } else { mean };
         if mean <= 0.0 {
-            return (0.0, Status::Zero);
+            return (0.0, RootStatus::Zero);
         }
         let mut s = start;
         if self.at(s)[0] > 0.0 {
@@ -268,13 +269,13 @@ impl Equation<'_> {
         }
         // Outliers narrow the positive region (a factor of 14 for Gaussian coefficients): one narrower than a
         // step may have been marched over.
-        let (top, g) = self.summit(best);
+        let (top, g) = self.local_maximum(best);
         if g > 0.0 {
             return (self.falling_edge(top, best * STEP), status);
         }
         match self.root_above(start, mean) {
             Some(value) => (value, status),
-            None => (top, Status::NoRoot),
+            None => (top, RootStatus::NoRoot),
         }
     }
 
@@ -320,7 +321,7 @@ impl Equation<'_> {
     }
 
     /// Largest g within one step of the search around s, by golden section.
-    fn summit(&self, s: f64) -> (f64, f64) {
+    fn local_maximum(&self, s: f64) -> (f64, f64) {
         // g is flat at its maximum: 1e-7 of ln s is 1e-14 of g, and a comparison of two g tells no more.
         let (u, step) = (s.ln(), STEP.ln());
         let top = line_minimum(u - step, u + step, 1e-7, |u| -self.at(u.exp())[0]).exp();
@@ -437,7 +438,7 @@ pub struct QuantizationResponse {
 impl QuantizationResponse {
     /// For a rejection point and the consistency constant that belongs to it.
     pub(super) fn new(c: f64, a: f64) -> Self {
-        let law = MixtureLaw::new();
+        let law = MixtureDistribution::new();
         let gaussian = law.solve(0.0, c, a).1;
         let mut response = Self {
             factor: [0.0; NODES],
@@ -489,12 +490,12 @@ fn departure(series: &[f64; NODES], share: f64) -> (f64, f64) {
 }
 
 /// Law of √(1 − share)·Z + √share·Y: nodes and weights of the quadratures over Z and Y.
-struct MixtureLaw {
+struct MixtureDistribution {
     normal: Vec<(f64, f64)>,
     second_difference: Vec<(f64, f64)>,
 }
 
-impl MixtureLaw {
+impl MixtureDistribution {
     fn new() -> Self {
         // The trapezoidal rule is exact to rounding for a Gaussian weight; chi's fourth derivative jumps where that is 1e-5.
         let normal = (-64..=64).map(|i| {

@@ -62,7 +62,7 @@ fn few_coefficients_read_high_as_said() {
 fn gross_outliers_move_the_root_little_and_never_to_infinity() {
     let mut w = normals(20_001);
     let clean = m_scale(&squares(&w), &tuning());
-    assert_eq!(clean.status, Status::Ok);
+    assert_eq!(clean.status, RootStatus::Ok);
     // Standard error of an estimate of variance at efficiency 0.6: √(2/(0.6·n)); four of them.
     assert_relative_eq!(
         clean.value,
@@ -75,7 +75,7 @@ fn gross_outliers_move_the_root_little_and_never_to_infinity() {
             let bad = (fraction * w.len() as f64) as usize;
             w[..bad].fill(size);
             let contaminated = m_scale(&squares(&w), &tuning());
-            assert_eq!(contaminated.status, Status::Ok);
+            assert_eq!(contaminated.status, RootStatus::Ok);
             let ratio = contaminated.value / clean.value;
             assert!(
                 (1.0 / bound..bound).contains(&ratio),
@@ -93,7 +93,7 @@ fn without_a_root_the_closest_value_is_flagged() {
     let mut w = normals(20_000);
     w[..6000].fill(1e4);
     let result = m_scale(&squares(&w), &tuning());
-    assert_eq!(result.status, Status::NoRoot);
+    assert_eq!(result.status, RootStatus::NoRoot);
     assert!((0.1..1.5).contains(&result.value), "{}", result.value);
 }
 
@@ -109,7 +109,7 @@ fn a_root_above_is_found() {
         .collect();
     w.extend((0..4500).map(|i| if i % 2 == 0 { 8.0 } else { -8.0 }));
     let found = m_scale(&squares(&w), &tuning());
-    assert_eq!(found.status, Status::Ok);
+    assert_eq!(found.status, RootStatus::Ok);
     assert_relative_eq!(found.value, 34.9, max_relative = 3e-3);
     assert_falls_through_zero(&w, found.value);
 }
@@ -118,12 +118,15 @@ fn a_root_above_is_found() {
 fn coarse_quantisation_and_silence() {
     let mut w = vec![0.0; 1000];
     let silent = m_scale(&squares(&w), &tuning());
-    assert_eq!((silent.value.to_bits(), silent.status), (0, Status::Zero));
+    assert_eq!(
+        (silent.value.to_bits(), silent.status),
+        (0, RootStatus::Zero)
+    );
     for i in 0..450 {
         w[i] = if i % 2 == 0 { 0.05 } else { -0.05 };
     }
     let coarse = m_scale(&squares(&w), &tuning());
-    assert_eq!(coarse.status, Status::Coarse);
+    assert_eq!(coarse.status, RootStatus::Coarse);
     assert_falls_through_zero(&w, coarse.value);
     w[20..].fill(0.0);
     let nearly_silent = m_scale(&squares(&w), &tuning());
@@ -158,7 +161,7 @@ fn steps_that_move_the_variance_are_seen() {
                 .iter()
                 .map(|z| 0.05 * (bias + deviation * z).round())
                 .collect();
-            let (classical, robust) = both(&signal, 9, &tuning).unwrap();
+            let (classical, robust) = classical_and_robust(&signal, 9, &tuning).unwrap();
             for (level, (classical, robust)) in classical.iter().zip(&robust).enumerate() {
                 let off = (classical / robust.value).ln().abs();
                 if robust.is_stepped() {
@@ -187,7 +190,7 @@ fn steps_move_a_variance_by_more_than_three_deviations() {
     let moved = |zeros: f64, exponent: f64| {
         let robust = RobustVariance {
             value: 2.0,
-            status: Status::Ok,
+            status: RootStatus::Ok,
             zeros,
         };
         robust.is_moved_by_steps(2.0 * exponent.exp(), 200.0, 0.5)

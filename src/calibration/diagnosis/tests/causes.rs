@@ -61,7 +61,7 @@ fn coarse_steps_take_no_scale_from_one_recording() {
     };
     let one = measured("run".to_owned(), &signal, LEVELS);
     let groups = grouped(vec![(channel, one)], Pool::Axes);
-    let settings = Settings {
+    let settings = CalibrationSettings {
         estimators: vec![Estimator::Gmwm, Estimator::Rgmwm, Estimator::SrAwv],
         ..settings("WN")
     };

@@ -2,7 +2,7 @@
 
 use super::*;
 use approx::assert_relative_eq;
-use nav_sim_signal::noise::{Composite, Kind, Model, Process, VirtualImu};
+use nav_sim_signal::noise::{Composite, Model, Process, ProcessKind, VirtualImu};
 use nav_sim_signal::rng::Generator;
 use rand::{RngExt, SeedableRng};
 use std::fmt::Write;
@@ -410,13 +410,13 @@ fn models_of_no_unit_are_told() {
             .unwrap()
             .model
     };
-    let scaled = |model: &Model, of: [f64; 2], kind: Kind, power: f64| {
+    let scaled = |model: &Model, of: [f64; 2], kind: ProcessKind, power: f64| {
         let mut model = model.clone();
         for (axis, noise) in model.axes.iter_mut().enumerate() {
             for process in noise.processes.iter_mut().filter(|p| p.kind() == kind) {
                 let amplitude = of[axis / 3] * process.amplitude().powf(power);
                 *process = match kind {
-                    Kind::White => Process::white(amplitude).unwrap(),
+                    ProcessKind::White => Process::white(amplitude).unwrap(),
                     _ => Process::random_walk(amplitude).unwrap(),
                 };
             }
@@ -430,11 +430,11 @@ fn models_of_no_unit_are_told() {
         let mut exchanged = model.clone();
         exchanged.axes.rotate_left(3);
         assert!(said(&exchanged).contains("sensors exchanged"), "{name}");
-        let degrees = scaled(&model, [1.0, 57.3 * 57.3], Kind::White, 1.0);
+        let degrees = scaled(&model, [1.0, 57.3 * 57.3], ProcessKind::White, 1.0);
         assert!(said(&degrees).contains("deg/s named rad/s"), "{name}");
-        let root = scaled(&model, [1.0; 2], Kind::RandomWalk, 0.5);
+        let root = scaled(&model, [1.0; 2], ProcessKind::RandomWalk, 0.5);
         assert!(!said(&root).is_empty(), "{name}");
-        let louder = scaled(&model, [1e3; 2], Kind::White, 1.0);
+        let louder = scaled(&model, [1e3; 2], ProcessKind::White, 1.0);
         assert!(said(&louder).contains("accel N"), "{name}");
     }
     // a floor is noise over 1 s, too

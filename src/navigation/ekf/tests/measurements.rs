@@ -146,12 +146,12 @@ fn rows_of_body_velocity_and_yaw_agree_with_central_differences() {
 fn certain(accel: f64, gyro: f64) -> Ekf {
     let axis = |sigma2: f64| Composite::new(vec![Process::white(sigma2).unwrap()]);
     let model = Model::pooled(100.0, &axis(accel), &axis(gyro));
-    let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
+    let filter_model = FilterModel::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
     let start = NavState {
         q_b_n: DQuat::from_rotation_z(0.7),
         ..state([0.0; 3])
     };
-    ekf(&belief, &start, &certain_start())
+    ekf(&filter_model, &start, &certain_start())
 }
 
 /// One sample of white rates tilts and, while it lasts, lets the specific force drive the velocity:
@@ -199,7 +199,7 @@ fn white_noise_does_not_depend_on_how_time_is_cut() {
             filter.set_interval(dt);
             predict(&mut filter, DVec3::ZERO, DVec3::ZERO);
         }
-        settle(&mut filter);
+        apply_pending_earth_step(&mut filter);
         for i in 3..9 {
             let variance = filter.p.get::<Lanes>(i, i)[0];
             let expected = if i < 6 { 4e-5 * 0.01 } else { 1e-6 * 0.01 };

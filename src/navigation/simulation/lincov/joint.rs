@@ -5,7 +5,7 @@
 //! step, of 9 × 9 and 9 × signals, meet rows without a gap.
 
 use super::pass::add_scaled;
-use super::track::{NAV, Nav, Row, SIGNALS, Sides, Step};
+use super::track::{AugmentedStates, NAV, Nav, SIGNALS, ScalarMeasurement, Step};
 use crate::lanes::{Kernel, LANES, Lanes, Level, Wide, dispatch};
 use crate::simulation::BIASES;
 use std::ops::Range;
@@ -17,8 +17,8 @@ use std::ops::Range;
 /// error of a bias is estimate less truth, so both enter the navigation error alike. States t are independent
 /// of one another and stay so.
 #[derive(Clone)]
-pub(super) struct Joint<'a> {
-    pub sides: &'a Sides,
+pub(super) struct JointCovariance<'a> {
+    pub sides: &'a AugmentedStates,
     pub xx: [Nav; NAV],
     /// A row for each of x: covariances with the states b, then t.
     xs: Vec<Lanes>,
@@ -31,12 +31,12 @@ pub(super) struct Joint<'a> {
     /// Intermediate results of a step, and of a measurement.
     means: Vec<Lanes>,
     scratch: Vec<Lanes>,
-    measured: Measured,
+    measured: UpdateScratch,
 }
 
 /// A scalar measurement on the way into the covariance.
 #[derive(Clone, Default)]
-struct Measured {
+struct UpdateScratch {
     /// Its coefficients of the states b and t that are not zero.
     form: Vec<(usize, f64)>,
     /// Its covariance with b and t, and the gains of b (zero for t).
@@ -54,14 +54,14 @@ fn at_mut(row: &mut [Lanes], i: usize) -> &mut f64 {
     &mut row[i / LANES].0[i % LANES]
 }
 
-impl<'a> Joint<'a> {
-    pub(super) fn new(xx: [Nav; NAV], sides: &'a Sides) -> Self {
+impl<'a> JointCovariance<'a> {
+    pub(super) fn new(xx: [Nav; NAV], sides: &'a AugmentedStates) -> Self {
         let (states, nb, width) = (&sides.states, sides.estimated, sides.width());
         let mut bs = vec![Lanes::ZERO; nb * width];
         for (i, source) in states[..nb].iter().enumerate() {
             *at_mut(&mut bs[i * width..], i) = source.initial;
         }
-        let measured = Measured {
+        let measured = UpdateScratch {
             form: Vec::new(),
             with: vec![Lanes::ZERO; width],
             gain: vec![Lanes::ZERO; width],
@@ -109,7 +109,7 @@ impl<'a> Joint<'a> {
 
     /// Corrects by a measurement as the filter does whose own covariance this is; adds its gains to `gains`, and returns the
     /// variance that it states for the innovation.
-    pub(super) fn measure(&mut self, row: &Row, gains: &mut Vec<f64>) -> f64 {
+    pub(super) fn measure(&mut self, row: &ScalarMeasurement, gains: &mut Vec<f64>) -> f64 {
         self.set_form(row);
         let correction = Correction {
             joint: self,
@@ -125,7 +125,7 @@ impl<'a> Joint<'a> {
 
     /// Corrects by a measurement with white noise of variance `r`, with the gains of a filter that need not be right;
     /// returns the variance of the innovation.
-    pub(super) fn correct(&mut self, row: &Row, r: f64, gains: &[f64]) -> f64 {
+    pub(super) fn correct(&mut self, row: &ScalarMeasurement, r: f64, gains: &[f64]) -> f64 {
         self.set_form(row);
         let correction = Correction {
             joint: self,
@@ -136,7 +136,7 @@ impl<'a> Joint<'a> {
         dispatch(correction.joint.level, correction).0
     }
 
-    fn set_form(&mut self, row: &Row) {
+    fn set_form(&mut self, row: &ScalarMeasurement) {
         self.measured.form.clear();
         // Most measurements are of the navigation error alone.
         if row.is_of_states(self.sides) {
@@ -151,7 +151,7 @@ impl<'a> Joint<'a> {
     }
 
     /// A linear form of a mean of x and of the states, at the row that was measured last.
-    pub(super) fn value_of_mean(&self, row: &Row, x: &Nav, states: &[f64]) -> f64 {
+    pub(super) fn value_of_mean(&self, row: &ScalarMeasurement, x: &Nav, states: &[f64]) -> f64 {
         let of_x: f64 = x.iter().zip(&row.h).map(|(x, h)| x * h).sum();
         of_x + self
             .measured
@@ -164,7 +164,7 @@ impl<'a> Joint<'a> {
 
 /// A P Aᵀ + Q in blocks.
 struct Propagation<'j, 'a> {
-    joint: &'j mut Joint<'a>,
+    joint: &'j mut JointCovariance<'a>,
     step: &'j Step,
 }
 
@@ -376,8 +376,8 @@ fn square<W: Wide>(step: &Step, rows: &[Lanes], width: usize, signals: usize) ->
 
 /// z ← z − k y for an innovation y, with the filter's own best gain or with those that are given.
 struct Correction<'j, 'a, 'r> {
-    joint: &'j mut Joint<'a>,
-    row: &'r Row,
+    joint: &'j mut JointCovariance<'a>,
+    row: &'r ScalarMeasurement,
     /// Variance of the measurement's white noise.
     r: f64,
     gains: Option<&'r [f64]>,
@@ -396,7 +396,7 @@ impl Kernel for Correction<'_, '_, '_> {
             gains,
         } = self;
         let (width, nb) = (joint.sides.width(), joint.sides.estimated);
-        let Measured { form, with, gain } = &mut joint.measured;
+        let UpdateScratch { form, with, gain } = &mut joint.measured;
         // Covariance of everything with the measurement.
         let mut with_x = [0.0; NAV];
         for k in 0..NAV {

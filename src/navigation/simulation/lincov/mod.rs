@@ -37,12 +37,15 @@ mod truth;
 mod tune;
 
 pub use pass::{
-    AssessedInstant, Assessment, Consistency, ErrorLaw, FilterPass, Instant, assess,
+    AssessedInstant, Assessment, Consistency, ErrorDistribution, FilterPass, Instant, assess,
     strapdown_over_sigma,
 };
 pub(crate) use pass::{Moments, errors_in_outages};
 pub use reduce::{AxisGrouping, drive, reduced_belief};
 pub use track::Track;
-pub use truth::{DRIFT, NamedSource, STRAPDOWN, TrueErrors, TruthSide, weak_heading};
-pub(crate) use tune::Crossing;
-pub use tune::{Aim, Departure, Factor, Filter, FilterConsistency, Task, aiding_factor, scaled};
+pub use truth::{DRIFT, NamedSource, STRAPDOWN, TrueErrors, TruthModel, weak_heading};
+pub(crate) use tune::RootSearch;
+pub use tune::{
+    ConsistencyCriterion, Factor, Filter, FilterConsistency, TuningProblem, WorstRatio,
+    aiding_factor, scaled,
+};

@@ -1,9 +1,11 @@
 //! One filter along a track, and what makes its true errors.
 
-use super::joint::Joint;
-use super::track::{Mark, NAV, Nav, Row, SIGNALS, Sides, Sources, Step, Track};
-use super::truth::{TrueErrors, TruthSide};
-use crate::ekf::Belief;
+use super::joint::JointCovariance;
+use super::track::{
+    AugmentedStates, ErrorSources, NAV, Nav, SIGNALS, ScalarMeasurement, Step, Track, TrackEpoch,
+};
+use super::truth::{TrueErrors, TruthModel};
+use crate::ekf::FilterModel;
 use crate::ekf::covariance::PSI;
 use crate::linalg::mean;
 use crate::noise::Model;
@@ -16,7 +18,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Yaw error over attitude error, 1/cos(80°), above which roll and yaw are not separable.
-const STEEP: f64 = 5.76;
+const MAX_YAW_GAIN: f64 = 5.76;
 
 /// Ratio of a filter's covariance to that of its true errors, at one instant.
 #[derive(Debug, Clone, Copy)]
@@ -66,21 +68,23 @@ impl Assessment {
 /// Takes a filter along a track with its own covariance and that of its true errors, where `truth` makes the
 /// inertial errors, turn-on biases and scale factors are as the filter expects them, and the receiver is as the filter
 /// believes. A drift (DR) is taken as the filter takes it: of that magnitude, either sign, each axis by itself; where
-/// the same drift is in every run, [`super::TruthSide`] adds the errors instead of their variances.
-pub fn assess(track: &Track, belief: &Belief, truth: &Model) -> Assessment {
-    FilterPass::new(track, belief).assess(belief, truth)
+/// the same drift is in every run, [`super::TruthModel`] adds the errors instead of their variances.
+pub fn assess(track: &Track, filter_model: &FilterModel, truth: &Model) -> Assessment {
+    FilterPass::new(track, filter_model).assess(filter_model, truth)
 }
 
 /// Largest error of any reported state that the strapdown alone makes at the IMU's rate, over the standard deviation that the
 /// filter states of it; 0 where the closure along the track is good.
-pub fn strapdown_over_sigma(track: &Track, belief: &Belief) -> f64 {
+pub fn strapdown_over_sigma(track: &Track, filter_model: &FilterModel) -> f64 {
     if track.is_closed() {
         return 0.0;
     }
-    let law = FilterPass::new(track, belief).errors(&TruthSide::of_strapdown());
+    let law = FilterPass::new(track, filter_model).errors(&TruthModel::of_strapdown());
     // At the start there is no error yet, and perhaps no standard deviation.
     let instants = law.reports.iter().skip(1).chain(&law.outage_ends);
-    let ratios = instants.flat_map(|judged| std::iter::zip(judged.errors.rmse(), judged.sigma()));
+    let ratios = instants.flat_map(|assess_instant| {
+        std::iter::zip(assess_instant.errors.rmse(), assess_instant.sigma())
+    });
     ratios
         .map(|(error, sigma)| error / sigma)
         .fold(0.0, f64::max)
@@ -116,7 +120,7 @@ pub struct AssessedInstant {
 
 /// The law of a filter's errors along a track.
 #[derive(Debug, Clone, Default)]
-pub struct ErrorLaw {
+pub struct ErrorDistribution {
     /// At every report (1 Hz), after the measurements.
     pub reports: Vec<AssessedInstant>,
     /// Just before the first fix after each outage (or at the end).
@@ -130,7 +134,7 @@ pub struct ErrorLaw {
 #[derive(Debug, Clone)]
 pub struct FilterPass<'a> {
     track: &'a Track,
-    believed: Sources,
+    believed: ErrorSources,
     /// The gains of every scalar measurement, in sequence: of x, then of its bias states.
     gains: Vec<f64>,
     /// The variances that the filter states for their innovations.
@@ -144,10 +148,10 @@ pub struct FilterPass<'a> {
 
 impl<'a> FilterPass<'a> {
     /// Takes a filter along a track.
-    pub fn new(track: &'a Track, belief: &Belief) -> Self {
-        let believed = Sources::of_belief(belief);
-        let own = Sides::of_filter(believed.clone(), track);
-        let mut filter = Joint::new(track.start, &own);
+    pub fn new(track: &'a Track, filter_model: &FilterModel) -> Self {
+        let believed = ErrorSources::of_belief(filter_model);
+        let own = AugmentedStates::of_filter(believed.clone(), track);
+        let mut filter = JointCovariance::new(track.start, &own);
         let (mut gains, mut innovations) = (Vec::new(), Vec::new());
         let (mut reports, mut biases) = (Vec::new(), Vec::new());
         let mut ends = vec![[[0.0; NAV]; NAV]; track.outages];
@@ -177,15 +181,15 @@ impl<'a> FilterPass<'a> {
     }
 
     /// The reports, and what the filter states there.
-    fn stated(&self) -> impl Iterator<Item = (&Mark, &[Nav; NAV])> {
+    fn stated(&self) -> impl Iterator<Item = (&TrackEpoch, &[Nav; NAV])> {
         let marks = self.track.marks.iter();
         marks.filter(|mark| mark.report).zip(&self.reports)
     }
 
     /// Times from the start (s) of the reports at which something is measured, and the standard deviations of yaw there (degrees).
-    pub fn yaw_while_measured(&self) -> Vec<(f64, f64)> {
+    pub fn yaw_sigma_at_updates(&self) -> Vec<(f64, f64)> {
         // Near the vertical roll and yaw are no separate angles: yaw is uncertain there however well the attitude is known.
-        let is_separate = |mark: &Mark| mark.jacobian[2].length() < STEEP;
+        let is_separate = |mark: &TrackEpoch| mark.jacobian[2].length() < MAX_YAW_GAIN;
         self.stated()
             .filter(|(mark, _)| !mark.rows.is_empty() && is_separate(mark))
             .map(|(mark, p)| (mark.after_s, deviations(&mark.jacobian, p)[REPORTED - 1]))
@@ -222,28 +226,44 @@ impl<'a> FilterPass<'a> {
     }
 
     /// Runs [`assess`] for the filter's own belief.
-    pub fn assess(&self, belief: &Belief, truth: &Model) -> Assessment {
-        self.errors_as_expected(belief, truth).assessment()
+    pub fn assess(&self, filter_model: &FilterModel, truth: &Model) -> Assessment {
+        self.errors_as_expected(filter_model, truth).assessment()
     }
 
     /// The same where settings state more of the true errors than a noise model.
-    pub(super) fn assess_stated(&self, belief: &Belief, truth: &TrueErrors) -> Assessment {
-        self.errors(&TruthSide::as_stated(belief, truth, !self.track.perfect))
-            .assessment()
+    pub(super) fn assess_stated(
+        &self,
+        filter_model: &FilterModel,
+        truth: &TrueErrors,
+    ) -> Assessment {
+        self.errors(&TruthModel::as_stated(
+            filter_model,
+            truth,
+            !self.track.perfect,
+        ))
+        .assessment()
     }
 
     /// The errors of which [`assess`] tells.
-    pub(super) fn errors_as_expected(&self, belief: &Belief, truth: &Model) -> ErrorLaw {
-        self.errors(&TruthSide::as_expected(belief, truth, !self.track.perfect))
+    pub(super) fn errors_as_expected(
+        &self,
+        filter_model: &FilterModel,
+        truth: &Model,
+    ) -> ErrorDistribution {
+        self.errors(&TruthModel::as_expected(
+            filter_model,
+            truth,
+            !self.track.perfect,
+        ))
     }
 
     /// The true errors of the filter.
-    pub fn errors(&self, truth: &TruthSide) -> ErrorLaw {
+    pub fn errors(&self, truth: &TruthModel) -> ErrorDistribution {
         self.errors_until(self.track.marks.len(), truth)
     }
 
     /// The same at the ends of outages alone: what comes after the last is not computed.
-    pub fn errors_at_ends(&self, truth: &TruthSide) -> Vec<AssessedInstant> {
+    pub fn errors_at_ends(&self, truth: &TruthModel) -> Vec<AssessedInstant> {
         let last = self
             .track
             .marks
@@ -254,18 +274,18 @@ impl<'a> FilterPass<'a> {
     }
 
     /// Along the first `marks` marks.
-    fn errors_until(&self, marks: usize, truth: &TruthSide) -> ErrorLaw {
-        let sides = Sides::of_errors(&self.believed, &truth.inertial, self.track);
-        let mut errors = Errors::at_start(self.track, &sides, truth);
+    fn errors_until(&self, marks: usize, truth: &TruthModel) -> ErrorDistribution {
+        let sides = AugmentedStates::of_errors(&self.believed, &truth.inertial, self.track);
+        let mut errors = TrueErrorState::at_start(self.track, &sides, truth);
         let gains = self.gains.chunks_exact(NAV + self.believed.states.len());
         let mut gains = gains.zip(&self.innovations);
         let mut reports = self.reports.iter();
-        let (mut law, mut ends) = (ErrorLaw::default(), vec![None; self.track.outages]);
+        let (mut law, mut ends) = (ErrorDistribution::default(), vec![None; self.track.outages]);
         for (steps, mark) in self.track.legs(0..marks) {
             errors.follow(steps, mark);
             mark.outages
                 .iter()
-                .for_each(|o| ends[*o] = Some(errors.judged(mark, &self.ends[*o])));
+                .for_each(|o| ends[*o] = Some(errors.assess_instant(mark, &self.ends[*o])));
             law.nis.1 += u64::from(mark.fix);
             for (row, (gains, believed)) in mark.rows.iter().zip(&mut gains) {
                 let square = errors.measure(row, gains);
@@ -275,8 +295,11 @@ impl<'a> FilterPass<'a> {
                 }
             }
             if mark.report {
-                law.reports
-                    .extend(reports.next().map(|believed| errors.judged(mark, believed)));
+                law.reports.extend(
+                    reports
+                        .next()
+                        .map(|believed| errors.assess_instant(mark, believed)),
+                );
             }
         }
         law.outage_ends = ends.into_iter().flatten().collect();
@@ -284,7 +307,7 @@ impl<'a> FilterPass<'a> {
     }
 }
 
-impl ErrorLaw {
+impl ErrorDistribution {
     pub(super) fn assessment(&self) -> Assessment {
         let consistency =
             |all: &[AssessedInstant]| all.iter().map(AssessedInstant::consistency).collect();
@@ -414,8 +437,8 @@ pub(crate) enum Moments {
 /// The outages may overlap: no branch knows of another.
 pub(crate) fn errors_in_outages(
     track: &Track,
-    belief: &Belief,
-    truth: &TruthSide,
+    filter_model: &FilterModel,
+    truth: &TruthModel,
     outages: &[Outage],
     moments: Moments,
 ) -> Vec<Vec<Instant>> {
@@ -425,17 +448,19 @@ pub(crate) fn errors_in_outages(
         .collect();
     let mut order: Vec<usize> = (0..ways.len()).collect();
     order.sort_by_key(|place| ways[*place].start);
-    let believed = Sources::of_belief(belief);
-    let sides = Sides::of_errors(&believed, &truth.inertial, track);
-    let own = Sides::of_filter(believed, track);
-    let mut filter = Joint::new(track.start, &own);
-    let mut errors = Errors::at_start(track, &sides, truth);
-    let measure = |filter: &mut Joint<'_>, errors: &mut Errors<'_>, row: &Row| {
+    let believed = ErrorSources::of_belief(filter_model);
+    let sides = AugmentedStates::of_errors(&believed, &truth.inertial, track);
+    let own = AugmentedStates::of_filter(believed, track);
+    let mut filter = JointCovariance::new(track.start, &own);
+    let mut errors = TrueErrorState::at_start(track, &sides, truth);
+    let measure = |filter: &mut JointCovariance<'_>,
+                   errors: &mut TrueErrorState<'_>,
+                   row: &ScalarMeasurement| {
         let mut gains = Vec::with_capacity(NAV + sides.estimated);
         filter.measure(row, &mut gains);
         errors.measure(row, &gains);
     };
-    let goes_on = |row: &&Row| !row.of_gnss;
+    let goes_on = |row: &&ScalarMeasurement| !row.of_gnss;
     let mut found = vec![Vec::new(); ways.len()];
     let mut at = 0;
     for together in order.chunks(TOGETHER) {
@@ -451,32 +476,33 @@ pub(crate) fn errors_in_outages(
             at = at.max(way.start);
             begun.push((*place, filter.clone(), errors.clone()));
         }
-        let branch = |(place, mut filter, mut errors): (usize, Joint<'_>, Errors<'_>)| {
-            let (way, mut instants) = (&ways[place], Vec::new());
-            // Without a measurement nobody asks for a gain: of the filter's own covariance nothing is needed then.
-            let is_blind = !track.marks[way.clone()]
-                .iter()
-                .flat_map(|mark| mark.rows.iter())
-                .any(|row| goes_on(&row));
-            let mut next = way.start;
-            while next < way.end {
-                let long = is_blind.then(|| track.through(&outages[place], next, way.end));
-                let (steps, index) = long.unwrap_or_else(|| (track.leg(next), next));
-                let mark = &track.marks[index];
-                next = index + 1;
-                if !is_blind {
-                    steps.iter().for_each(|step| filter.step(step));
+        let branch =
+            |(place, mut filter, mut errors): (usize, JointCovariance<'_>, TrueErrorState<'_>)| {
+                let (way, mut instants) = (&ways[place], Vec::new());
+                // Without a measurement nobody asks for a gain: of the filter's own covariance nothing is needed then.
+                let is_blind = !track.marks[way.clone()]
+                    .iter()
+                    .flat_map(|mark| mark.rows.iter())
+                    .any(|row| goes_on(&row));
+                let mut next = way.start;
+                while next < way.end {
+                    let long = is_blind.then(|| track.through(&outages[place], next, way.end));
+                    let (steps, index) = long.unwrap_or_else(|| (track.leg(next), next));
+                    let mark = &track.marks[index];
+                    next = index + 1;
+                    if !is_blind {
+                        steps.iter().for_each(|step| filter.step(step));
+                    }
+                    errors.follow(steps, mark);
+                    // Before the measurements, as the end of an outage in the runs: each report could be one.
+                    let is_end = next == way.end;
+                    let is_looked_at = is_end || moments == Moments::Reports && mark.report;
+                    instants.extend(is_looked_at.then(|| errors.instant(mark)));
+                    let rows = mark.rows.iter().filter(|_| !is_end).filter(goes_on);
+                    rows.for_each(|row| measure(&mut filter, &mut errors, row));
                 }
-                errors.follow(steps, mark);
-                // Before the measurements, as the end of an outage in the runs: each report could be one.
-                let is_end = next == way.end;
-                let is_looked_at = is_end || moments == Moments::Reports && mark.report;
-                instants.extend(is_looked_at.then(|| errors.instant(mark)));
-                let rows = mark.rows.iter().filter(|_| !is_end).filter(goes_on);
-                rows.for_each(|row| measure(&mut filter, &mut errors, row));
-            }
-            (place, instants)
-        };
+                (place, instants)
+            };
         for (place, instants) in begun.into_par_iter().map(branch).collect::<Vec<_>>() {
             found[place] = instants;
         }
@@ -523,23 +549,23 @@ pub(super) fn add_scaled(to: &mut Nav, factor: f64, x: &Nav) {
 
 /// The true errors at an instant.
 #[derive(Clone)]
-struct Errors<'a> {
-    truth: &'a TruthSide,
-    joint: Joint<'a>,
+struct TrueErrorState<'a> {
+    truth: &'a TruthModel,
+    joint: JointCovariance<'a>,
     /// Mean of the true errors, which is the same in every run.
-    mean: Option<Mean>,
+    mean: Option<ErrorMean>,
 }
 
 /// A number for each state: of the navigation error, and of the states b, then t.
 #[derive(Clone)]
-struct Mean {
+struct ErrorMean {
     x: Nav,
     s: Vec<f64>,
 }
 
-impl<'a> Errors<'a> {
+impl<'a> TrueErrorState<'a> {
     /// Covariances at the start.
-    fn at_start(track: &Track, sides: &'a Sides, truth: &'a TruthSide) -> Self {
+    fn at_start(track: &Track, sides: &'a AugmentedStates, truth: &'a TruthModel) -> Self {
         let begin = if truth.starts_off {
             track.start
         } else {
@@ -549,19 +575,19 @@ impl<'a> Errors<'a> {
         let levels = || sides.states.iter().map(|s| s.level);
         let drifts = levels().any(|level| level != 0.0);
         let is_off = truth.integrates && !track.is_closed();
-        let mean = (drifts || is_off).then(|| Mean {
+        let mean = (drifts || is_off).then(|| ErrorMean {
             x: [0.0; NAV],
             s: levels().collect(),
         });
         Self {
             truth,
-            joint: Joint::new(begin, sides),
+            joint: JointCovariance::new(begin, sides),
             mean,
         }
     }
 
     /// Over the steps that lead to a mark.
-    fn follow(&mut self, steps: &[Step], mark: &Mark) {
+    fn follow(&mut self, steps: &[Step], mark: &TrackEpoch) {
         for step in steps {
             if let Some(mean) = &mut self.mean {
                 let (inputs, elapsed) = (self.joint.sides.over(step), self.joint.elapsed);
@@ -581,7 +607,7 @@ impl<'a> Errors<'a> {
     }
 
     /// Corrects by a measurement with the filter's gains; returns the expected square of the innovation.
-    fn measure(&mut self, row: &Row, gains: &[f64]) -> f64 {
+    fn measure(&mut self, row: &ScalarMeasurement, gains: &[f64]) -> f64 {
         // Without its noise where the source under study is another one: covariances of independent sources
         // add.
         let noise = if self.truth.has_noise(row.what) {
@@ -590,7 +616,7 @@ impl<'a> Errors<'a> {
             0.0
         };
         let variance = self.joint.correct(row, noise, gains);
-        let Some(Mean { x, s }) = &mut self.mean else {
+        let Some(ErrorMean { x, s }) = &mut self.mean else {
             return variance;
         };
         let value = self.joint.value_of_mean(row, x, s);
@@ -599,14 +625,14 @@ impl<'a> Errors<'a> {
         variance + value * value
     }
 
-    fn judged(&self, mark: &Mark, believed: &[Nav; NAV]) -> AssessedInstant {
+    fn assess_instant(&self, mark: &TrackEpoch, believed: &[Nav; NAV]) -> AssessedInstant {
         AssessedInstant {
             errors: self.instant(mark),
             believed: *believed,
         }
     }
 
-    fn instant(&self, mark: &Mark) -> Instant {
+    fn instant(&self, mark: &TrackEpoch) -> Instant {
         Instant {
             after_s: mark.after_s,
             t_s: mark.t_s,

@@ -6,14 +6,14 @@
 //! largest expected log density under the filter's own covariance, and that this covariance is closest to that of the true
 //! errors along the drive, in the sense of the Kullback-Leibler divergence.
 
-use super::pass::{AssessedInstant, Assessment, Consistency, ErrorLaw, FilterPass};
+use super::pass::{AssessedInstant, Assessment, Consistency, ErrorDistribution, FilterPass};
 use super::track::{NAV, Track};
 use crate::earth::GravityModel;
-use crate::ekf::{Belief, FixUpdate, InitialSettings};
+use crate::ekf::{FilterModel, FixUpdate, InitialSettings};
 use crate::imu::{Axis, Channel};
 use crate::linalg::mean;
 use crate::minimise::{Descent, MOST, Minimum};
-use crate::noise::practical::{AllanCurve, Bias, Horizon, Pair, Policy};
+use crate::noise::practical::{AllanCurve, BiasModel, Horizon, NoiseDensities, Policy};
 use crate::noise::{Composite, Model, Process, reduction};
 use crate::sensors::aiding::AidingSettings;
 use crate::sensors::defects::ImuSettings;
@@ -40,10 +40,10 @@ type Factors = [f64; FACTORS];
 /// sensor are reduced as `alike` says. Axes that are white noise and one bias already stay as they are.
 pub fn reduced_belief(
     model: &Model,
-    wavelet: Belief,
+    wavelet: FilterModel,
     track: &Track,
     alike: AxisGrouping,
-) -> Belief {
+) -> FilterModel {
     let exact = Channel::ALL.map(|c| reduction::is_exact(model.axis(c)));
     let is_free = |i: &usize| {
         Channel::ALL
@@ -63,7 +63,7 @@ pub fn reduced_belief(
         alike,
         free,
     };
-    search.belief(&search.minimise())
+    search.filter_model(&search.minimise())
 }
 
 /// Which axes of a sensor are reduced alike.
@@ -86,7 +86,7 @@ impl AxisGrouping {
 /// The choice of the factors.
 struct Search<'a> {
     model: &'a Model,
-    base: Belief,
+    base: FilterModel,
     track: Track,
     /// Axes that are left as they are.
     exact: [bool; 6],
@@ -96,13 +96,13 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn belief(&self, ln: &Factors) -> Belief {
-        let mut belief = self.base.clone();
+    fn filter_model(&self, ln: &Factors) -> FilterModel {
+        let mut filter_model = self.base.clone();
         for channel in Channel::ALL.into_iter().filter(|c| !self.exact[c.index()]) {
             let (s, i) = (channel.sensor as usize, channel.axis as usize);
             // a factor needs something to act on: the wavelet fit may have put all white noise into the bias
             let first = self.alike.first_factor(channel);
-            let white = belief.white[s][i].max(
+            let white = filter_model.white[s][i].max(
                 self.model
                     .axis(channel)
                     .processes
@@ -110,21 +110,22 @@ impl Search<'_> {
                     .map(Process::white_variance)
                     .sum(),
             );
-            belief.white[s][i] = white * ln[first].exp();
-            let group = &mut belief.groups[s][0];
+            filter_model.white[s][i] = white * ln[first].exp();
+            let group = &mut filter_model.groups[s][0];
             group.innovation[i] *= ln[first + 1].exp();
             // A factor on the correlation time T is 1/factor on κ = dt/T; in phi itself 0.9999 and 0.99999
             // would hardly differ.
             let kappa = -(group.phi[i] - 1.0).ln_1p() * (-ln[first + 2]).exp();
             group.phi[i] = (-kappa).exp();
         }
-        belief
+        filter_model
     }
 
     /// The cost and what it is made of.
-    fn value(&self, ln: &Factors) -> Value {
-        let belief = self.belief(ln);
-        let law = FilterPass::new(&self.track, &belief).errors_as_expected(&belief, self.model);
+    fn value(&self, ln: &Factors) -> CostValue {
+        let filter_model = self.filter_model(ln);
+        let law = FilterPass::new(&self.track, &filter_model)
+            .errors_as_expected(&filter_model, self.model);
         let assessment = law.assessment();
         let steep = steep(&assessment);
         // Small errors that are stated as they are have the largest density.
@@ -133,13 +134,13 @@ impl Search<'_> {
         let parts = shape(&law)
             .chain(steep.iter().map(QuarticCost::part))
             .collect();
-        Value { cost, parts }.with_ridge(RIDGE, ln)
+        CostValue { cost, parts }.with_ridge(RIDGE, ln)
     }
 
     /// Factors to the pair of N and Gauss-Markov bias that is exported.
     fn of_pair(&self) -> Option<Factors> {
         let (mut ln, rate_hz) = ([0.0; FACTORS], self.model.rate_hz);
-        let mut known: Vec<(&Composite, Pair)> = Vec::new();
+        let mut known: Vec<(&Composite, NoiseDensities)> = Vec::new();
         for channel in Channel::ALL.into_iter().filter(|c| !self.exact[c.index()]) {
             let noise = self.model.axis(channel);
             let of_alike = known.iter().find(|(axis, _)| *axis == noise);
@@ -147,7 +148,7 @@ impl Search<'_> {
                 Some((_, pair)) => *pair,
                 None => AllanCurve::largest(&[noise], rate_hz, Horizon::default())
                     .ok()?
-                    .pair(Policy::Matched, Bias::Markov),
+                    .pair(Policy::Matched, BiasModel::Markov),
             };
             known.push((noise, pair));
             let (s, i) = (channel.sensor as usize, channel.axis as usize);
@@ -223,9 +224,9 @@ impl QuarticCost {
         self.weight * (self.x / self.scale).powi(4)
     }
 
-    fn part(&self) -> Part {
+    fn part(&self) -> CostTerm {
         // The square of (x/scale)², whose slope is 2 x/scale²: as Gauss and Newton have it, so that a step halves x.
-        Part {
+        CostTerm {
             value: self.x,
             curvature: 8.0 * self.weight * self.x.powi(2) / self.scale.powi(4),
         }
@@ -270,7 +271,7 @@ fn steep(assessment: &Assessment) -> Vec<QuarticCost> {
 /// Parts of the divergence: P⁻¹ P_true as L⁻¹ P_true L⁻ᵀ. Near the identity the divergence is half
 /// the sum of squares of the deviations of its elements, so that its second derivative with respect
 /// to each is the weight of the instant.
-fn shape(law: &ErrorLaw) -> impl Iterator<Item = Part> {
+fn shape(law: &ErrorDistribution) -> impl Iterator<Item = CostTerm> {
     let reports = law.reports.get(1..).unwrap_or_default();
     let of_ends = if law.outage_ends.is_empty() {
         0.0
@@ -288,7 +289,7 @@ fn shape(law: &ErrorLaw) -> impl Iterator<Item = Part> {
         .chain(weighted(reports, 1.0 - of_ends));
     all.flat_map(|(m, weight)| {
         // An element off the diagonal is there twice.
-        let part = move |(i, j): (usize, usize)| Part {
+        let part = move |(i, j): (usize, usize)| CostTerm {
             value: m[(i, j)],
             curvature: if i == j { weight } else { 2.0 * weight },
         };
@@ -351,7 +352,7 @@ pub fn drive(
         rate_hz,
         gravity: GravityModel::default(),
         truth: Truth::Model(model),
-        beliefs: &[],
+        filter_models: &[],
         gnss: &gnss,
         initial: &InitialSettings::default(),
         defects,
@@ -430,17 +431,17 @@ fn path(duration_s: f64) -> Option<Trajectory> {
 const DIFFERENCE: f64 = 0.02;
 
 /// A value of the cost.
-pub(super) struct Value {
+pub(super) struct CostValue {
     pub cost: f64,
-    pub parts: Vec<Part>,
+    pub parts: Vec<CostTerm>,
 }
 
-impl Value {
+impl CostValue {
     /// With a cost of the squares of the variables.
     pub(super) fn with_ridge(mut self, ridge: f64, x: &[f64]) -> Self {
         self.cost += ridge * x.iter().map(|x| x * x).sum::<f64>();
         let curvature = 2.0 * ridge;
-        let part = |&value: &f64| Part { value, curvature };
+        let part = |&value: &f64| CostTerm { value, curvature };
         self.parts.extend(x.iter().map(part));
         self
     }
@@ -448,31 +449,31 @@ impl Value {
 
 /// A number that the variables change, and the second derivative of the cost with respect to it.
 #[derive(Clone, Copy)]
-pub(super) struct Part {
+pub(super) struct CostTerm {
     pub value: f64,
     pub curvature: f64,
 }
 
 /// Minimum of a cost near `start`, the same on any number of threads; the start where its cost is not finite.
 pub(super) fn minimum(
-    value: impl Fn(&[f64]) -> Value + Sync,
+    value: impl Fn(&[f64]) -> CostValue + Sync,
     start: &[f64],
     bounds: (f64, f64),
     enough: fn(f64) -> f64,
-) -> Minimum<Value> {
+) -> Minimum<CostValue> {
     // Half the gradient, and half of Gauss and Newton's Hessian Σ c ∂f ∂fᵀ of the parts f.
-    let quadratic = |x: &[f64], here: &Value| {
+    let quadratic = |x: &[f64], here: &CostValue| {
         let beside = |i: usize| {
             let mut beside = x.to_vec();
             beside[i] += DIFFERENCE;
             value(&beside)
         };
         // One-sided: half the evaluations of central differences, each of which is a pass along the whole track.
-        let beside: Vec<Value> = (0..x.len()).into_par_iter().map(beside).collect();
-        let slope = |(here, there): (&Part, &Part)| {
+        let beside: Vec<CostValue> = (0..x.len()).into_par_iter().map(beside).collect();
+        let slope = |(here, there): (&CostTerm, &CostTerm)| {
             (0.5 * here.curvature).sqrt() * (there.value - here.value) / DIFFERENCE
         };
-        let slopes = |there: &Value| here.parts.iter().zip(&there.parts).map(slope).collect();
+        let slopes = |there: &CostValue| here.parts.iter().zip(&there.parts).map(slope).collect();
         let jacobian: Vec<Vec<f64>> = beside.iter().map(slopes).collect();
         let mut hessian = [[0.0; MOST]; MOST];
         for (i, a) in jacobian.iter().enumerate() {
@@ -481,7 +482,7 @@ pub(super) fn minimum(
             }
         }
         // A forward difference is the slope half a step further on: the Hessian, which is known, takes it back.
-        let slope = |(i, there): (usize, &Value)| {
+        let slope = |(i, there): (usize, &CostValue)| {
             0.5 * ((there.cost - here.cost) / DIFFERENCE - DIFFERENCE * hessian[i][i])
         };
         (beside.iter().enumerate().map(slope).collect(), hessian)
@@ -505,10 +506,10 @@ mod damped_tests {
     fn a_curved_valley_is_followed_to_its_end_or_to_a_bound() {
         let valley = |x: &[f64]| {
             let parts = [10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
-            Value {
+            CostValue {
                 cost: parts.iter().map(|f| f * f).sum(),
                 parts: parts
-                    .map(|value| Part {
+                    .map(|value| CostTerm {
                         value,
                         curvature: 2.0,
                     })
@@ -525,7 +526,7 @@ mod damped_tests {
             (found[0] - 1.5).abs() < 1e-9 && (found[1] - 2.25).abs() < 0.02,
             "{found:?}"
         );
-        let nan = |_: &[f64]| Value {
+        let nan = |_: &[f64]| CostValue {
             cost: f64::NAN,
             parts: Vec::new(),
         };

@@ -4,21 +4,21 @@ use super::pass::add_scaled;
 use super::truth::defects;
 use crate::closure::Bounds;
 use crate::earth::ned_difference;
-use crate::ekf::belief::{BiasGroup, psi_of_angles};
 use crate::ekf::covariance::{
     EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavError, PSI, R, Sample, V,
 };
-use crate::ekf::{Belief, UnknownKind, body_velocity_rows, fix_rows, yaw_row};
+use crate::ekf::filter_model::{BiasGroup, psi_of_angles};
+use crate::ekf::{CoefficientKind, FilterModel, body_velocity_rows, fix_rows, yaw_row};
 use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::{Channel, ImuSample, Sensor};
 use crate::lanes::{Kernel, LANES, Lanes, Level, Mat3, Quat, Vec3, Wide, dispatch};
-use crate::noise::{Kind, Ladder, Model, Process};
-use crate::sensors::aiding::{Aid, AidPart, Law};
-use crate::sensors::defects::{ErrorInput, Surroundings};
+use crate::noise::{Ar1Bank, Model, Process, ProcessKind};
+use crate::sensors::aiding::{Aid, AidPart, ErrorProcess};
+use crate::sensors::defects::{ErrorInput, ErrorInputs};
 use crate::sensors::outage::Outage;
 use crate::simulation::BIASES;
 use crate::simulation::plan::{
-    Aided, Event, Experiment, ExperimentError, check_rotation, felt, schedule,
+    Event, Experiment, ExperimentError, TrueAid, check_rotation, error_inputs, schedule,
 };
 use crate::strapdown::{StepTrace, Strapdown};
 use crate::trajectory::ideal_imu::IdealSamples;
@@ -51,7 +51,7 @@ pub(super) struct Step {
 
 /// Measured quantity.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Measured {
+pub(super) enum MeasurementKind {
     /// This component of a fix's position.
     Position(usize),
     /// The velocity of a fix.
@@ -62,7 +62,7 @@ pub(super) enum Measured {
     Aid(Aid, usize),
 }
 
-impl Measured {
+impl MeasurementKind {
     /// Kinds: positions and velocities of fixes, heights, each aid.
     pub(super) const KINDS: usize = 3 + Aid::ALL.len();
 
@@ -83,27 +83,27 @@ impl Measured {
 
 /// A scalar measurement: nine coefficients of the navigation error, three of the gyroscope's error.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Row {
+pub(super) struct ScalarMeasurement {
     pub h: [f64; NAV + 3],
     /// Motion and temperature to which errors of the gyroscope are proportional.
-    felt: Surroundings,
+    error_inputs: ErrorInputs,
     /// Variance of its white noise, as in the filter's model.
     pub r: f64,
     /// Variance of its true white noise.
     pub noise: f64,
-    pub what: Measured,
+    pub what: MeasurementKind,
     /// Velocity of the point of the vehicle (m/s) and acceleration (m/s²), in b.
     motion: [DVec3; 2],
     /// True if outages withhold it.
     pub of_gnss: bool,
 }
 
-impl Row {
+impl ScalarMeasurement {
     /// A measurement whose true noise is as in the filter's model.
-    fn new(h: [f64; NAV + 3], felt: Surroundings, r: f64, what: Measured) -> Self {
+    fn new(h: [f64; NAV + 3], error_inputs: ErrorInputs, r: f64, what: MeasurementKind) -> Self {
         Self {
             h,
-            felt,
+            error_inputs,
             r,
             noise: r,
             what,
@@ -113,19 +113,21 @@ impl Row {
     }
 
     /// True if a state of these sides may have a coefficient of its own.
-    pub(super) fn is_of_states(&self, sides: &Sides) -> bool {
+    pub(super) fn is_of_states(&self, sides: &AugmentedStates) -> bool {
         sides.have_outer || self.h[NAV..].iter().any(|h| *h != 0.0)
     }
 
     /// The coefficient of a source's state in the measurement after `elapsed` samples, beside its part through the
     /// navigation error.
-    pub(super) fn coefficient(&self, source: &Source, elapsed: f64) -> f64 {
+    pub(super) fn coefficient(&self, source: &ErrorSourceState, elapsed: f64) -> f64 {
         match (source.outer, self.what) {
             (None, _) => {}
-            (Some(Outer::Position(of)), Measured::Position(here)) => {
+            (Some(MeasurementError::Position(of)), MeasurementKind::Position(here)) => {
                 return f64::from(u8::from(of == here));
             }
-            (Some(Outer::Vehicle(part)), Measured::Aid(aid, axis)) if part.aid() == aid => {
+            (Some(MeasurementError::Vehicle(part)), MeasurementKind::Aid(aid, axis))
+                if part.aid() == aid =>
+            {
                 return part.coefficient(axis, self.motion[0], self.motion[1]);
             }
             (Some(_), _) => return 0.0,
@@ -134,14 +136,16 @@ impl Row {
             (0, ..) => 0.0,
             // The coefficient of the lever arm's velocity is per unit of the rate's error, and this is the
             // error that the source has at the instant: a bias its value, a drift its slope times its age.
-            (_, axis, of) => source.share(elapsed) * (self.h[NAV + axis] * self.felt.value(of)),
+            (_, axis, of) => {
+                source.share(elapsed) * (self.h[NAV + axis] * self.error_inputs.value(of))
+            }
         }
     }
 }
 
 /// An instant between steps.
 #[derive(Debug, Clone)]
-pub(super) struct Mark {
+pub(super) struct TrackEpoch {
     /// Steps from the start until here.
     steps: usize,
     /// Time from the start (s).
@@ -151,7 +155,7 @@ pub(super) struct Mark {
     /// True if a fix is used.
     pub fix: bool,
     /// Scalar measurements, in sequence: the same in each copy of a track.
-    pub rows: Arc<[Row]>,
+    pub rows: Arc<[ScalarMeasurement]>,
     pub report: bool,
     /// Outages that end here, before the measurements.
     pub outages: Vec<usize>,
@@ -168,7 +172,7 @@ pub struct Track {
     steps: Arc<Vec<Step>>,
     /// Steps of [`LONG_STEP_S`] by the mark at which each begins, with the mark at which it ends.
     long: Arc<Vec<Option<(usize, Step)>>>,
-    pub(super) marks: Vec<Mark>,
+    pub(super) marks: Vec<TrackEpoch>,
     pub(super) outages: usize,
     /// Covariance of the navigation error at the start, as in the filter's model.
     pub(super) start: [Nav; NAV],
@@ -216,7 +220,7 @@ impl Track {
                 steps.push(line.step(begin..event.sample.min(begin + part))?);
             }
             done = event.sample;
-            marks.push(Mark {
+            marks.push(TrackEpoch {
                 steps: steps.len(),
                 after_s: event.sample as f64 / experiment.rate_hz,
                 t_s: event.t_s,
@@ -248,7 +252,7 @@ impl Track {
         for mark in &mut track.marks {
             if Outage::any_withholds(outages, mark.t_s) {
                 mark.fix = false;
-                let goes_on = |row: &&Row| !row.of_gnss;
+                let goes_on = |row: &&ScalarMeasurement| !row.of_gnss;
                 mark.rows = mark.rows.iter().filter(goes_on).copied().collect();
             }
         }
@@ -263,8 +267,8 @@ impl Track {
     /// unchanged.
     pub fn with_aiding_sigmas(&self, factor: f64) -> Self {
         let mut track = self.clone();
-        let believed = |row: &Row| match row.what {
-            Measured::Aid(..) => Row {
+        let believed = |row: &ScalarMeasurement| match row.what {
+            MeasurementKind::Aid(..) => ScalarMeasurement {
                 r: row.r * factor * factor,
                 ..*row
             },
@@ -282,7 +286,7 @@ impl Track {
     }
 
     /// Some marks, each with the steps that lead to it.
-    pub(super) fn legs(&self, marks: Range<usize>) -> impl Iterator<Item = (&[Step], &Mark)> {
+    pub(super) fn legs(&self, marks: Range<usize>) -> impl Iterator<Item = (&[Step], &TrackEpoch)> {
         marks.map(|mark| (self.leg(mark), &self.marks[mark]))
     }
 
@@ -302,7 +306,7 @@ struct Linearisation<'a> {
     first: ImuSample,
     ins: Strapdown<f64>,
     /// Motion and temperature of the IMU over the last sample.
-    felt: Surroundings,
+    error_inputs: ErrorInputs,
     dt: f64,
     noise_hz: f64,
     level: Level,
@@ -326,13 +330,13 @@ impl<'a> Linearisation<'a> {
         let signals = defects
             .flat_map(|s| s.side.inertial.states)
             .map(|s| s.signal + 1)
-            .fold(CROSSED, usize::max);
+            .fold(CROSS_COUPLING, usize::max);
         Self {
             experiment,
             samples,
             first,
             ins,
-            felt: Surroundings::default(),
+            error_inputs: ErrorInputs::default(),
             dt: 1.0 / experiment.rate_hz,
             noise_hz,
             level: Level::best(),
@@ -349,12 +353,12 @@ impl<'a> Linearisation<'a> {
         // The range first: `zip` would take a sample before it sees that there is no further index.
         for (index, sample) in samples.zip(&mut self.samples) {
             check_rotation(self.experiment, index, &sample)?;
-            self.felt = felt(self.experiment, index, &sample, &self.first);
-            columns.feel(&self.felt);
+            self.error_inputs = error_inputs(self.experiment, index, &sample, &self.first);
+            columns.set_error_inputs(&self.error_inputs);
             let (dtheta, dv) = (sample.omega_ib_b * self.dt, sample.f_ib_b * self.dt);
             let trace = self.ins.step(Vec3::splat(dtheta), Vec3::splat(dv), self.dt);
             age += self.dt;
-            // A measurement meets a covariance that has all of the Earth's terms, as `settle` gives it in the
+            // A measurement meets a covariance that has all of the Earth's terms, as `apply_pending_earth_step` gives it in the
             // filter.
             let is_settled = index == last || age + 0.5 * self.dt > EARTH_STEP_S;
             let earth = is_settled.then(|| EarthStep {
@@ -397,9 +401,9 @@ impl<'a> Linearisation<'a> {
         flat(&[r.to_array(), v, psi.to_array()].map(Vec3))
     }
 
-    fn rows(&self, event: &Event) -> Vec<Row> {
+    fn rows(&self, event: &Event) -> Vec<ScalarMeasurement> {
         let experiment = self.experiment;
-        let (mut rows, [_, omega_ib_b]) = (Vec::new(), self.felt.sample);
+        let (mut rows, [_, omega_ib_b]) = (Vec::new(), self.error_inputs.sample);
         if event.fix {
             let gnss = experiment.gnss;
             let h = fix_rows(&self.ins, omega_ib_b, gnss.lever_arm_m.into());
@@ -409,18 +413,28 @@ impl<'a> Linearisation<'a> {
                 .chain(gnss.vel_sigma_m_s.into_iter().flatten());
             for (i, (h, sigma)) in h.into_iter().zip(sigmas).enumerate() {
                 let what = if i < 3 {
-                    Measured::Position(i)
+                    MeasurementKind::Position(i)
                 } else {
-                    Measured::Velocity
+                    MeasurementKind::Velocity
                 };
-                rows.push(Row::new(h, self.felt, sigma * sigma, what));
+                rows.push(ScalarMeasurement::new(
+                    h,
+                    self.error_inputs,
+                    sigma * sigma,
+                    what,
+                ));
             }
         }
         if let Some(baro) = experiment.baro.filter(|_| event.baro) {
             let mut h = [0.0; NAV + 3];
             h[3 * R + 2] = 1.0;
             let r = baro.sigma_m * baro.sigma_m;
-            rows.push(Row::new(h, self.felt, r, Measured::Height));
+            rows.push(ScalarMeasurement::new(
+                h,
+                self.error_inputs,
+                r,
+                MeasurementKind::Height,
+            ));
         }
         for aided in event.aids.iter().filter(|aided| !aided.withheld) {
             self.aid(aided, &mut rows);
@@ -429,21 +443,21 @@ impl<'a> Linearisation<'a> {
     }
 
     /// The rows of what the vehicle measures of itself.
-    fn aid(&self, aided: &Aided, rows: &mut Vec<Row>) {
+    fn aid(&self, aided: &TrueAid, rows: &mut Vec<ScalarMeasurement>) {
         let experiment = self.experiment;
-        let Aided { aid, v_b, a_b, .. } = *aided;
+        let TrueAid { aid, v_b, a_b, .. } = *aided;
         let [r, noise] = experiment.aiding.sigmas(aid).map(|sigma| sigma * sigma);
-        let row = |h, axis| Row {
+        let row = |h, axis| ScalarMeasurement {
             noise,
             motion: [v_b, a_b],
             of_gnss: experiment.aiding.is_of_gnss(aid),
-            ..Row::new(h, self.felt, r, Measured::Aid(aid, axis))
+            ..ScalarMeasurement::new(h, self.error_inputs, r, MeasurementKind::Aid(aid, axis))
         };
         if aid == Aid::Heading {
             rows.push(row(yaw_row(&self.ins), 0));
             return;
         }
-        let [_, omega_ib_b] = self.felt.sample;
+        let [_, omega_ib_b] = self.error_inputs.sample;
         let h = body_velocity_rows(&self.ins, omega_ib_b, experiment.aiding.lever_arm_b(aid));
         rows.extend(aid.axes().iter().map(|axis| row(h[*axis], *axis)));
     }
@@ -451,7 +465,7 @@ impl<'a> Linearisation<'a> {
 
 /// Sets the errors of the strapdown to zero where all of them together stay below what a closure may have: beside the errors
 /// of any receiver and IMU they are nothing, and a mean need not be propagated.
-fn drop_closed(marks: &mut [Mark]) {
+fn drop_closed(marks: &mut [TrackEpoch]) {
     let bounds = Bounds::default();
     let mut sum = [0.0; NAV];
     marks
@@ -497,10 +511,10 @@ impl Columns {
     }
 
     /// Sets the factors of the signals.
-    fn feel(&mut self, felt: &Surroundings) {
-        for signal in SCALED..self.signals {
+    fn set_error_inputs(&mut self, error_inputs: &ErrorInputs) {
+        for signal in SCALE_FACTOR..self.signals {
             let (.., of) = place(signal);
-            self.set_input(signal, felt.value(of));
+            self.set_input(signal, error_inputs.value(of));
         }
     }
 
@@ -661,7 +675,7 @@ impl Track {
         let step_from = |begin: usize| {
             let from = &self.marks[begin];
             let end_s = from.after_s + LONG_STEP_S;
-            let is_end = |mark: &Mark| (mark.after_s - end_s).abs() < SLACK_S;
+            let is_end = |mark: &TrackEpoch| (mark.after_s - end_s).abs() < SLACK_S;
             let is_long = |outage: &Outage| outage.takes_long_step(from.t_s);
             let end = outages.iter().any(is_long).then_some(begin + 1)?;
             let end = end + self.marks[end..].iter().position(is_end)?;
@@ -731,7 +745,8 @@ impl Track {
         let (mut report_s, mut begin_s, mut before_s) = (f64::NEG_INFINITY, 0.0, 0.0);
         // What becomes one step, and one measurement of each kind: the last of this many, with the mean of their noise.
         let mut step: Option<Step> = None;
-        let mut measured: [(Vec<Row>, f64); Measured::KINDS] = Default::default();
+        let mut measured: [(Vec<ScalarMeasurement>, f64); MeasurementKind::KINDS] =
+            Default::default();
         for (i, (leg, mark)) in self.legs(0..self.marks.len()).enumerate() {
             if step.is_none() {
                 begin_s = before_s;
@@ -741,7 +756,7 @@ impl Track {
             step = all.reduce(|a, b| a.of_means(&b));
             for (kind, (rows, count)) in measured.iter_mut().enumerate() {
                 let own = mark.rows.iter().filter(|row| row.what.kind() == kind);
-                let own: Vec<Row> = own.copied().collect();
+                let own: Vec<ScalarMeasurement> = own.copied().collect();
                 if !own.is_empty() {
                     (*rows, *count) = (own, *count + 1.0);
                 }
@@ -756,14 +771,14 @@ impl Track {
             steps.extend(step.take());
             let report = mark.after_s - report_s >= REPORT_S - SLACK_S;
             report_s = if report { mark.after_s } else { report_s };
-            let mean = |(rows, count): (Vec<Row>, f64)| {
-                rows.into_iter().map(move |row| Row {
+            let mean = |(rows, count): (Vec<ScalarMeasurement>, f64)| {
+                rows.into_iter().map(move |row| ScalarMeasurement {
                     r: row.r / count,
                     noise: row.noise / count,
                     ..row
                 })
             };
-            marks.push(Mark {
+            marks.push(TrackEpoch {
                 steps: steps.len(),
                 rows: std::mem::take(&mut measured)
                     .into_iter()
@@ -874,52 +889,52 @@ impl Step {
 /// Signals: errors of an axis in proportion to what the IMU feels. Most filters and IMUs have the first of them alone.
 pub(super) const SIGNALS: usize = 42;
 /// The first that is multiplied by its own sample, what a scale factor adds.
-pub(super) const SCALED: usize = 6;
+pub(super) const SCALE_FACTOR: usize = 6;
 /// The first that is multiplied by the sample of another axis, what a misalignment adds.
-pub(super) const CROSSED: usize = 12;
+pub(super) const CROSS_COUPLING: usize = 12;
 /// The first of a gyroscope that is multiplied by a specific force.
-pub(super) const PUSHED: usize = 24;
+pub(super) const G_SENSITIVITY: usize = 24;
 /// The first of an accelerometer that is multiplied by its own square.
-pub(super) const RECTIFIED: usize = 33;
+pub(super) const RECTIFICATION: usize = 33;
 /// The first that is multiplied by the warming.
-pub(super) const WARMED: usize = 36;
+pub(super) const TEMPERATURE: usize = 36;
 
 /// Sensor and axis of a signal, and the quantity that multiplies it.
 const fn place(signal: usize) -> (usize, usize, ErrorInput) {
     match signal {
-        0..SCALED => (signal / 3, signal % 3, ErrorInput::Unit),
-        SCALED..CROSSED => {
-            let sensor = signal % SCALED / 3;
+        0..SCALE_FACTOR => (signal / 3, signal % 3, ErrorInput::Unit),
+        SCALE_FACTOR..CROSS_COUPLING => {
+            let sensor = signal % SCALE_FACTOR / 3;
             (
                 sensor,
                 signal % 3,
                 ErrorInput::Sample(Sensor::ALL[sensor], signal % 3),
             )
         }
-        CROSSED..PUSHED => {
-            let (sensor, pair) = ((signal - CROSSED) / 6, (signal - CROSSED) % 6);
+        CROSS_COUPLING..G_SENSITIVITY => {
+            let (sensor, pair) = ((signal - CROSS_COUPLING) / 6, (signal - CROSS_COUPLING) % 6);
             (
                 sensor,
                 pair / 2,
                 ErrorInput::Sample(Sensor::ALL[sensor], (pair / 2 + 1 + pair % 2) % 3),
             )
         }
-        PUSHED..RECTIFIED => {
-            let pair = signal - PUSHED;
+        G_SENSITIVITY..RECTIFICATION => {
+            let pair = signal - G_SENSITIVITY;
             (
                 Sensor::Gyro as usize,
                 pair / 3,
                 ErrorInput::Sample(Sensor::Accel, pair % 3),
             )
         }
-        RECTIFIED..WARMED => (
+        RECTIFICATION..TEMPERATURE => (
             Sensor::Accel as usize,
-            signal - RECTIFIED,
-            ErrorInput::Square(signal - RECTIFIED),
+            signal - RECTIFICATION,
+            ErrorInput::Square(signal - RECTIFICATION),
         ),
         _ => (
-            (signal - WARMED) / 3,
-            (signal - WARMED) % 3,
+            (signal - TEMPERATURE) / 3,
+            (signal - TEMPERATURE) % 3,
             ErrorInput::Warming,
         ),
     }
@@ -929,7 +944,7 @@ const fn place(signal: usize) -> (usize, usize, ErrorInput) {
 /// the error of a sample is `before`·s + `after`·s⁺ + `fresh`·w, and s⁺ = `decay`·s + `drive`·w with w white
 /// of variance 1.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Source {
+pub(super) struct ErrorSourceState {
     /// Which signal it is part of.
     pub signal: usize,
     before: f64,
@@ -944,12 +959,12 @@ pub(super) struct Source {
     /// Mean of s at the start.
     pub level: f64,
     /// The measurement that it is part of; such a source is no inertial error.
-    pub outer: Option<Outer>,
+    pub outer: Option<MeasurementError>,
 }
 
 /// An error of measurements that lasts.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Outer {
+pub(super) enum MeasurementError {
     /// Error of a component of a fix's position.
     Position(usize),
     /// Error of an aiding measurement.
@@ -957,7 +972,7 @@ pub(super) enum Outer {
 }
 
 /// A source that makes no error.
-const NONE: Source = Source {
+const NONE: ErrorSourceState = ErrorSourceState {
     signal: 0,
     before: 0.0,
     after: 0.0,
@@ -972,7 +987,7 @@ const NONE: Source = Source {
 
 /// Propagation of a source over a step: the mean of its samples' errors is `mean`·s + w₁, and s⁺ =
 /// `decay`·s + w₂.
-pub(super) struct StepOfSource {
+pub(super) struct SourceStep {
     pub signal: usize,
     mean: f64,
     /// Growth of `mean` with every sample before the step.
@@ -986,7 +1001,7 @@ pub(super) struct StepOfSource {
     pub q_state: f64,
 }
 
-impl StepOfSource {
+impl SourceStep {
     /// `mean` after this many samples.
     #[inline(always)]
     pub(super) fn mean_after(&self, elapsed: f64) -> f64 {
@@ -994,7 +1009,7 @@ impl StepOfSource {
     }
 }
 
-impl Source {
+impl ErrorSourceState {
     fn bias(signal: usize, [phi, innovation, initial]: [f64; 3]) -> Self {
         Self {
             signal,
@@ -1055,27 +1070,27 @@ impl Source {
             decay: phi,
             drive,
             initial: sigma * sigma,
-            outer: Some(Outer::Position(component)),
+            outer: Some(MeasurementError::Position(component)),
             ..NONE
         }
     }
 
     /// An error of what a vehicle measures of itself, at an IMU of this rate.
-    pub(super) fn of_vehicle(part: AidPart, law: Law, imu_hz: f64) -> Self {
-        let outer = Some(Outer::Vehicle(part));
+    pub(super) fn of_vehicle(part: AidPart, law: ErrorProcess, imu_hz: f64) -> Self {
+        let outer = Some(MeasurementError::Vehicle(part));
         match law {
             // The states of the truth are negated, and so is a mean.
-            Law::Known(value) => Self {
+            ErrorProcess::Known(value) => Self {
                 level: -value,
                 outer,
                 ..NONE
             },
-            Law::Constant(sigma) => Self {
+            ErrorProcess::Constant(sigma) => Self {
                 initial: sigma * sigma,
                 outer,
                 ..NONE
             },
-            Law::GaussMarkov { sigma, time_s } => {
+            ErrorProcess::GaussMarkov { sigma, time_s } => {
                 let phi = (-1.0 / (imu_hz * time_s)).exp();
                 Self {
                     outer,
@@ -1092,9 +1107,9 @@ impl Source {
     }
 
     /// Propagates the source over a step of `samples` samples, exactly.
-    fn over(&self, samples: u32) -> StepOfSource {
+    fn over(&self, samples: u32) -> SourceStep {
         let n = f64::from(samples);
-        let mut step = StepOfSource {
+        let mut step = SourceStep {
             signal: self.signal,
             mean: 0.0,
             ramp: self.ramp,
@@ -1135,12 +1150,12 @@ impl Source {
 
 /// The errors of an IMU: sources, and white noise of a sample on each signal.
 #[derive(Debug, Clone)]
-pub(super) struct Sources {
-    pub states: Vec<Source>,
+pub(super) struct ErrorSources {
+    pub states: Vec<ErrorSourceState>,
     pub white: [f64; BIASES],
 }
 
-impl Default for Sources {
+impl Default for ErrorSources {
     fn default() -> Self {
         Self {
             states: Vec::new(),
@@ -1149,7 +1164,7 @@ impl Default for Sources {
     }
 }
 
-impl Sources {
+impl ErrorSources {
     /// Adds those of another, independent.
     pub(super) fn extend(&mut self, other: &Self) {
         self.states.extend_from_slice(&other.states);
@@ -1162,48 +1177,50 @@ impl Sources {
     /// Estimates of them by a filter: zero at the start, driven by corrections only.
     fn estimates(&self) -> Self {
         Self {
-            states: self.states.iter().map(Source::estimate).collect(),
+            states: self.states.iter().map(ErrorSourceState::estimate).collect(),
             ..Self::default()
         }
     }
 
     /// Sources in a filter's model: one for each bias state.
-    pub(super) fn of_belief(belief: &Belief) -> Self {
+    pub(super) fn of_belief(filter_model: &FilterModel) -> Self {
         let of_sensor = |sensor: Sensor| {
-            let groups = belief.groups[sensor as usize].iter();
+            let groups = filter_model.groups[sensor as usize].iter();
             groups.flat_map(move |group| Self::of_group(sensor, group))
         };
         let states = Sensor::ALL.into_iter().flat_map(of_sensor);
-        let states = states.chain(Self::multiplied(belief));
+        let states = states.chain(Self::multiplied(filter_model));
         Self {
-            states: states.chain(Self::of_vehicle(belief)).collect(),
-            white: std::array::from_fn(|i| belief.white[i / 3][i % 3]),
+            states: states.chain(Self::of_vehicle(filter_model)).collect(),
+            white: std::array::from_fn(|i| filter_model.white[i / 3][i % 3]),
         }
     }
 
     /// The bias states of a group.
-    fn of_group(sensor: Sensor, group: &BiasGroup) -> Vec<Source> {
+    fn of_group(sensor: Sensor, group: &BiasGroup) -> Vec<ErrorSourceState> {
         let state = |axis: usize| {
             let (phi, q, initial) = (group.phi[axis], group.innovation[axis], group.initial[axis]);
             (initial != 0.0 || q != 0.0)
-                .then(|| Source::bias(3 * sensor as usize + axis, [phi, q, initial]))
+                .then(|| ErrorSourceState::bias(3 * sensor as usize + axis, [phi, q, initial]))
         };
         (0..3).filter_map(state).collect()
     }
 
     /// Unknown constants of a belief that are multiplied.
-    fn multiplied(belief: &Belief) -> Vec<Source> {
+    fn multiplied(filter_model: &FilterModel) -> Vec<ErrorSourceState> {
         let mut states = Vec::new();
         for (sensor, axis) in Sensor::ALL
             .into_iter()
             .flat_map(|s| (0..3).map(move |i| (s, i)))
         {
             let signal = 3 * sensor as usize + axis;
-            for unknown in belief.unknowns(sensor) {
+            for unknown in filter_model.unknowns(sensor) {
                 let sigma = unknown.sigma[axis];
                 states.extend((sigma > 0.0).then(|| match unknown.kind {
-                    UnknownKind::Drift => Source::ramp(signal, sigma),
-                    UnknownKind::ScaleFactor => Source::constant(SCALED + signal, sigma),
+                    CoefficientKind::Drift => ErrorSourceState::ramp(signal, sigma),
+                    CoefficientKind::ScaleFactor => {
+                        ErrorSourceState::constant(SCALE_FACTOR + signal, sigma)
+                    }
                 }));
             }
         }
@@ -1211,7 +1228,7 @@ impl Sources {
     }
 
     /// Wheel scale and mounting of a vehicle, as in a filter's model.
-    fn of_vehicle(belief: &Belief) -> Vec<Source> {
+    fn of_vehicle(filter_model: &FilterModel) -> Vec<ErrorSourceState> {
         let parts = [
             AidPart::WheelScale,
             AidPart::MountingPitch,
@@ -1219,26 +1236,35 @@ impl Sources {
         ];
         let states = parts
             .into_iter()
-            .zip(belief.vehicle.to_array())
+            .zip(filter_model.vehicle.to_array())
             .filter(|(_, sigma)| *sigma > 0.0);
         states
-            .map(|(part, sigma)| Source::of_vehicle(part, Law::Constant(sigma), belief.rate_hz))
+            .map(|(part, sigma)| {
+                ErrorSourceState::of_vehicle(
+                    part,
+                    ErrorProcess::Constant(sigma),
+                    filter_model.rate_hz,
+                )
+            })
             .collect()
     }
 
     /// Turn-on biases and scale factors that a belief has beside its noise model, as sources.
-    pub(super) fn beside_model(belief: &Belief) -> Vec<Source> {
+    pub(super) fn beside_model(filter_model: &FilterModel) -> Vec<ErrorSourceState> {
         // drifts are of the noise model
-        let mut states = Self::multiplied(belief);
+        let mut states = Self::multiplied(filter_model);
         states.retain(|source| source.ramp == 0.0);
-        states.extend(Self::of_vehicle(belief));
+        states.extend(Self::of_vehicle(filter_model));
         for sensor in Sensor::ALL {
-            for group in belief.groups[sensor as usize]
+            for group in filter_model.groups[sensor as usize]
                 .iter()
                 .filter(|g| g.is_constant())
             {
                 let constant = |axis| {
-                    Source::bias(3 * sensor as usize + axis, [1.0, 0.0, group.initial[axis]])
+                    ErrorSourceState::bias(
+                        3 * sensor as usize + axis,
+                        [1.0, 0.0, group.initial[axis]],
+                    )
                 };
                 states.extend((0..3).map(constant).filter(|s| s.initial > 0.0));
             }
@@ -1258,17 +1284,21 @@ impl Sources {
     }
 
     pub(super) fn add(&mut self, signal: usize, process: &Process) {
-        for part in process.parts(Ladder::FINE) {
+        for part in process.parts(Ar1Bank::FINE) {
             match part.kind() {
-                Kind::White => self.white[signal] += part.amplitude(),
-                Kind::Drift => self.states.push(Source::ramp(signal, part.amplitude())),
+                ProcessKind::White => self.white[signal] += part.amplitude(),
+                ProcessKind::Drift => self
+                    .states
+                    .push(ErrorSourceState::ramp(signal, part.amplitude())),
                 _ => {
                     // U_k − U_{k−1}: the last U is a state, because the sum over a step telescopes. As white noise it
                     // would grow.
                     let memory = part.moving_average().map(|[theta, variance]| {
-                        Source::memory(signal, variance.sqrt(), 1.0, theta)
+                        ErrorSourceState::memory(signal, variance.sqrt(), 1.0, theta)
                     });
-                    let bias = part.recursion().map(|state| Source::bias(signal, state));
+                    let bias = part
+                        .recursion()
+                        .map(|state| ErrorSourceState::bias(signal, state));
                     self.states.extend(memory.or(bias));
                 }
             }
@@ -1278,9 +1308,9 @@ impl Sources {
 
 // The states beside the navigation error, and what they do over the steps of a track.
 
-/// The states `b` of a filter and `t` of the truth, as `Joint` has them.
-pub(super) struct Sides {
-    pub states: Vec<Source>,
+/// The states `b` of a filter and `t` of the truth, as `JointCovariance` has them.
+pub(super) struct AugmentedStates {
+    pub states: Vec<ErrorSourceState>,
     /// Number of the states `b`, which come first.
     pub estimated: usize,
     /// Signals that they reach: most have neither scale factors nor what comes after them.
@@ -1291,22 +1321,22 @@ pub(super) struct Sides {
     inputs: Vec<(u32, Inputs)>,
 }
 
-impl Sides {
+impl AugmentedStates {
     /// A filter as it sees itself along a track: its biases are what makes its errors.
-    pub(super) fn of_filter(believed: Sources, track: &Track) -> Self {
+    pub(super) fn of_filter(believed: ErrorSources, track: &Track) -> Self {
         let estimated = believed.states.len();
         Self::new(believed, estimated, track)
     }
 
     /// The estimates of a filter, and what truly makes its errors.
-    pub(super) fn of_errors(believed: &Sources, truth: &Sources, track: &Track) -> Self {
+    pub(super) fn of_errors(believed: &ErrorSources, truth: &ErrorSources, track: &Track) -> Self {
         let mut sources = believed.estimates();
         let estimated = sources.states.len();
         sources.extend(truth);
         Self::new(sources, estimated, track)
     }
 
-    fn new(sources: Sources, estimated: usize, track: &Track) -> Self {
+    fn new(sources: ErrorSources, estimated: usize, track: &Track) -> Self {
         let of_white = sources.white.iter().rposition(|white| *white != 0.0);
         let signals = sources.states.iter().map(|s| s.signal).chain(of_white);
         let signals = signals.map(|last| last + 1).max().unwrap_or(0);
@@ -1351,7 +1381,7 @@ impl Sides {
 
 /// Propagation of sources over steps of one length.
 pub(super) struct Inputs {
-    pub sources: Vec<StepOfSource>,
+    pub sources: Vec<SourceStep>,
     /// Their decays.
     pub decay: Vec<Lanes>,
     /// A row for each signal: `q_cross` of its states.
@@ -1364,8 +1394,8 @@ pub(super) struct Inputs {
 }
 
 impl Inputs {
-    fn new(all: &Sources, samples: u32, signals: usize) -> Self {
-        let sources: Vec<StepOfSource> = all.states.iter().map(|x| x.over(samples)).collect();
+    fn new(all: &ErrorSources, samples: u32, signals: usize) -> Self {
+        let sources: Vec<SourceStep> = all.states.iter().map(|x| x.over(samples)).collect();
         let white = all.white;
         let mut q_mean = [[0.0; SIGNALS]; 2];
         q_mean[0]

@@ -1,10 +1,13 @@
 //! Sources of the true errors: independent, alone or together.
 
-use super::track::{CROSSED, Measured, Outer, PUSHED, RECTIFIED, SCALED, Source, Sources, WARMED};
-use crate::ekf::Belief;
+use super::track::{
+    CROSS_COUPLING, ErrorSourceState, ErrorSources, G_SENSITIVITY, MeasurementError,
+    MeasurementKind, RECTIFICATION, SCALE_FACTOR, TEMPERATURE,
+};
+use crate::ekf::FilterModel;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::linalg::by_value;
-use crate::noise::{Kind, Model};
+use crate::noise::{Model, ProcessKind};
 use crate::sensors::aiding::{Aid, AidError, AidingSettings};
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
@@ -13,12 +16,12 @@ use std::ops::Range;
 
 /// True errors along a track, independent of the filter.
 #[derive(Debug, Clone, Default)]
-pub struct TruthSide {
-    pub(super) inertial: Sources,
+pub struct TruthModel {
+    pub(super) inertial: ErrorSources,
     /// True if the start is in error by the filter's initial covariance.
     pub(super) starts_off: bool,
     /// True for each white noise that is present: positions, velocities, heights and each aid.
-    noise: [bool; Measured::KINDS],
+    noise: [bool; MeasurementKind::KINDS],
     /// True if the strapdown has its integration error at the IMU's rate.
     pub(super) integrates: bool,
 }
@@ -60,13 +63,13 @@ pub struct NamedSource {
     pub name: String,
     /// The process of a sensor's noise model that it is; none of what no noise model has, and of drifts, which are one
     /// source for both sensors.
-    pub process: Option<(Sensor, Kind)>,
+    pub process: Option<(Sensor, ProcessKind)>,
     /// Its effect.
-    pub side: TruthSide,
+    pub side: TruthModel,
 }
 
 impl NamedSource {
-    fn new(name: impl Into<String>, side: TruthSide) -> Self {
+    fn new(name: impl Into<String>, side: TruthModel) -> Self {
         Self {
             name: name.into(),
             process: None,
@@ -80,7 +83,7 @@ pub const DRIFT: &str = "drift";
 /// The name of the source that the integration error of the strapdown is.
 pub const STRAPDOWN: &str = "strapdown";
 
-impl TruthSide {
+impl TruthModel {
     /// Several independent sources together.
     pub fn together(parts: &[NamedSource]) -> Self {
         let mut all = Self::default();
@@ -123,20 +126,26 @@ impl TruthSide {
 
     /// The errors of a model, turn-on biases and scale factors as a filter expects them, start and receiver as it
     /// believes.
-    pub(super) fn as_expected(belief: &Belief, model: &Model, starts_off: bool) -> Self {
-        let mut inertial = Sources::of_model(model);
-        inertial.states.extend(Sources::beside_model(belief));
+    pub(super) fn as_expected(filter_model: &FilterModel, model: &Model, starts_off: bool) -> Self {
+        let mut inertial = ErrorSources::of_model(model);
+        inertial
+            .states
+            .extend(ErrorSources::beside_model(filter_model));
         Self {
             inertial,
             starts_off,
-            noise: [true; Measured::KINDS],
+            noise: [true; MeasurementKind::KINDS],
             integrates: false,
         }
     }
 
     /// The same, with what the settings of the true IMU and of the receiver state in the place of what the filter
     /// expects: turn-on biases (a 0 too), scale factors and other errors of the IMU, correlated errors of positions. The strapdown errs.
-    pub(super) fn as_stated(belief: &Belief, errors: &TrueErrors, starts_off: bool) -> Self {
+    pub(super) fn as_stated(
+        filter_model: &FilterModel,
+        errors: &TrueErrors,
+        starts_off: bool,
+    ) -> Self {
         let TrueErrors {
             model,
             imu,
@@ -145,16 +154,16 @@ impl TruthSide {
         } = errors;
         let mut all = Self {
             integrates: true,
-            ..Self::as_expected(belief, model, starts_off)
+            ..Self::as_expected(filter_model, model, starts_off)
         };
         let mut stated: Vec<NamedSource> = correlated(gnss, imu.rate_hz).into_iter().collect();
         // the processes of the model come first and stay; an expectation has its place in the list after them
-        let own = Sources::of_model(model).states.len();
+        let own = ErrorSources::of_model(model).states.len();
         let mut expected = all.inertial.states.split_off(own);
-        let parts: Vec<Outer> = aiding
+        let parts: Vec<MeasurementError> = aiding
             .errors()
             .into_iter()
-            .map(|error| Outer::Vehicle(error.part))
+            .map(|error| MeasurementError::Vehicle(error.part))
             .collect();
         expected.retain(|source| source.outer.is_none_or(|outer| !parts.contains(&outer)));
         stated.extend(lasting(aiding, imu.rate_hz));
@@ -165,7 +174,7 @@ impl TruthSide {
                 let is_of = |signal: usize| {
                     source.outer.is_none() && (signal..signal + 3).contains(&source.signal)
                 };
-                !(bias.is_some() && is_of(first) || ppm > 0.0 && is_of(SCALED + first))
+                !(bias.is_some() && is_of(first) || ppm > 0.0 && is_of(SCALE_FACTOR + first))
             });
             stated.extend(defects(imu, sensor));
         }
@@ -175,7 +184,7 @@ impl TruthSide {
     }
 
     /// Returns true if a measurement has its white noise.
-    pub(super) const fn has_noise(&self, measured: Measured) -> bool {
+    pub(super) const fn has_noise(&self, measured: MeasurementKind) -> bool {
         self.noise[measured.kind()]
     }
 }
@@ -183,13 +192,13 @@ impl TruthSide {
 /// Start, receiver, barometer and what the vehicle measures of itself.
 fn beside_the_imu(experiment: &Experiment<'_>) -> Vec<NamedSource> {
     // One kind of white noise at a time: a budget asks for the share of each.
-    let noise = |at: usize| TruthSide {
+    let noise = |at: usize| TruthModel {
         noise: std::array::from_fn(|i| i == at),
-        ..TruthSide::default()
+        ..TruthModel::default()
     };
-    let start = TruthSide {
+    let start = TruthModel {
         starts_off: true,
-        ..TruthSide::default()
+        ..TruthModel::default()
     };
     let has_velocity = experiment.gnss.vel_sigma_m_s.is_some();
     let all = [
@@ -205,26 +214,33 @@ fn beside_the_imu(experiment: &Experiment<'_>) -> Vec<NamedSource> {
 }
 
 /// A source of states alone; none where there are none.
-fn inertial(name: String, states: Vec<Source>) -> Option<NamedSource> {
-    let inertial = Sources {
+fn inertial(name: String, states: Vec<ErrorSourceState>) -> Option<NamedSource> {
+    let inertial = ErrorSources {
         states,
-        ..Sources::default()
+        ..ErrorSources::default()
     };
-    let side = TruthSide {
+    let side = TruthModel {
         inertial,
-        ..TruthSide::default()
+        ..TruthModel::default()
     };
     (!side.inertial.states.is_empty()).then(|| NamedSource::new(name, side))
 }
 
 /// The processes of a sensor: those of the same label are one source on all axes. Drifts are set apart.
-fn processes(model: &Model, sensor: Sensor, drifts: &mut Vec<Source>) -> Vec<NamedSource> {
+fn processes(
+    model: &Model,
+    sensor: Sensor,
+    drifts: &mut Vec<ErrorSourceState>,
+) -> Vec<NamedSource> {
     let mut found: Vec<NamedSource> = Vec::new();
     for channel in Axis::ALL.map(|axis| Channel { sensor, axis }) {
         let noise = model.axis(channel);
         for (process, label) in noise.processes.iter().zip(noise.labels()) {
-            if process.kind() == Kind::Drift {
-                drifts.push(Source::drift(channel.index(), process.amplitude()));
+            if process.kind() == ProcessKind::Drift {
+                drifts.push(ErrorSourceState::drift(
+                    channel.index(),
+                    process.amplitude(),
+                ));
                 continue;
             }
             let source = named(&mut found, &format!("{}.{label}", sensor.name()));
@@ -240,28 +256,36 @@ fn processes(model: &Model, sensor: Sensor, drifts: &mut Vec<Source>) -> Vec<Nam
 pub(super) fn defects(imu: &ImuSettings, sensor: Sensor) -> Vec<NamedSource> {
     let (bias, ppm) = imu.deviations(sensor);
     let first = 3 * sensor as usize;
-    let crossed = CROSSED + 2 * first;
+    let crossed = CROSS_COUPLING + 2 * first;
     let of_force = match sensor {
-        Sensor::Accel => ("rectification", imu.rectification_s2_m(), RECTIFIED..WARMED),
+        Sensor::Accel => (
+            "rectification",
+            imu.rectification_s2_m(),
+            RECTIFICATION..TEMPERATURE,
+        ),
         Sensor::Gyro => (
             "g_sensitivity",
             imu.g_sensitivity_rad_s_per_m_s2,
-            PUSHED..RECTIFIED,
+            G_SENSITIVITY..RECTIFICATION,
         ),
     };
     let all = [
         ("turn_on_bias", bias, first..first + 3),
-        ("scale", ppm * 1e-6, SCALED + first..SCALED + first + 3),
+        (
+            "scale",
+            ppm * 1e-6,
+            SCALE_FACTOR + first..SCALE_FACTOR + first + 3,
+        ),
         ("misalignment", imu.misalignment_rad, crossed..crossed + 6),
         of_force,
         (
             "temperature",
             imu.per_kelvin(sensor),
-            WARMED + first..WARMED + first + 3,
+            TEMPERATURE + first..TEMPERATURE + first + 3,
         ),
     ];
     let source = |(name, sigma, signals): (&str, f64, Range<usize>)| {
-        let states = signals.map(|signal| Source::constant(signal, sigma));
+        let states = signals.map(|signal| ErrorSourceState::constant(signal, sigma));
         inertial(
             format!("{}.{name}", sensor.name()),
             states.filter(|s| s.initial > 0.0).collect(),
@@ -274,7 +298,8 @@ pub(super) fn defects(imu: &ImuSettings, sensor: Sensor) -> Vec<NamedSource> {
 /// it goes on from sample to sample, which is the same at the epochs.
 fn correlated(gnss: &GnssSettings, imu_hz: f64) -> Option<NamedSource> {
     let phi = (-1.0 / (imu_hz * gnss.correlation_time_s)).exp();
-    let state = |(component, sigma): (usize, f64)| Source::of_position(component, phi, sigma);
+    let state =
+        |(component, sigma): (usize, f64)| ErrorSourceState::of_position(component, phi, sigma);
     let sigmas = gnss
         .correlated_pos_sigma_m
         .into_iter()
@@ -289,7 +314,7 @@ fn lasting(aiding: &AidingSettings, imu_hz: f64) -> Vec<NamedSource> {
     for AidError { part, law, .. } in aiding.errors() {
         let source = named(&mut found, part.names().0);
         let states = &mut source.side.inertial.states;
-        states.push(Source::of_vehicle(part, law, imu_hz));
+        states.push(ErrorSourceState::of_vehicle(part, law, imu_hz));
     }
     found
 }
@@ -298,7 +323,7 @@ fn lasting(aiding: &AidingSettings, imu_hz: f64) -> Vec<NamedSource> {
 fn named<'a>(all: &'a mut Vec<NamedSource>, name: &str) -> &'a mut NamedSource {
     let known = all.iter().position(|source| source.name == name);
     let at = known.unwrap_or_else(|| {
-        all.push(NamedSource::new(name, TruthSide::default()));
+        all.push(NamedSource::new(name, TruthModel::default()));
         all.len() - 1
     });
     &mut all[at]

@@ -6,22 +6,22 @@
 //! on all of them makes the filter exactly consistent.
 
 use super::pass::{Assessment, Consistency, FilterPass};
-use super::reduce::{ENDS, Part, Value, average, minimum};
+use super::reduce::{CostTerm, CostValue, ENDS, average, minimum};
 use super::track::Track;
 use super::truth::TrueErrors;
-use crate::ekf::{Belief, BeliefError};
+use crate::ekf::{FilterModel, FilterModelError};
 use crate::imu::{Channel, Sensor};
 use crate::linalg::mean;
-use crate::noise::{Kind, Model, Process};
+use crate::noise::{Model, Process, ProcessKind};
 use crate::simulation::{NEES_DOF, REPORTED};
 use rayon::prelude::*;
 
 /// Makes a filter of a model.
-pub type Filter<'a> = dyn Fn(&Model) -> Result<Belief, BeliefError> + Sync + 'a;
+pub type Filter<'a> = dyn Fn(&Model) -> Result<FilterModel, FilterModelError> + Sync + 'a;
 
 /// Condition under which a filter counts as consistent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Aim {
+pub enum ConsistencyCriterion {
     /// The expected NEES, averaged over time and truths, is what it should be.
     Mean,
     /// In no truth is an error larger than stated, in any state at the end of any outage or over the whole run.
@@ -29,10 +29,10 @@ pub enum Aim {
     Worst,
 }
 
-nav_sim_signal::named!(Aim { Worst = "worst", Mean = "mean" });
+nav_sim_signal::named!(ConsistencyCriterion { Worst = "worst", Mean = "mean" });
 
 /// A model, and the truths that its filter is to be consistent with.
-pub struct Task<'a> {
+pub struct TuningProblem<'a> {
     /// The noise model that the filter is made of.
     pub model: &'a Model,
     /// Candidate truths; at least one.
@@ -44,7 +44,7 @@ pub struct Task<'a> {
     /// The filter that is made consistent in the end.
     pub filter: &'a Filter<'a>,
     /// Condition under which it is consistent.
-    pub aim: Aim,
+    pub aim: ConsistencyCriterion,
 }
 
 /// A step that gains less divergence is the last.
@@ -62,12 +62,12 @@ const EXACT: f64 = 1e-3;
 /// Tolerance of the logarithm of the factors.
 const RESOLUTION: f64 = 0.005;
 
-impl Task<'_> {
+impl TuningProblem<'_> {
     /// The factors, 1 for all where the filter is consistent already.
     ///
     /// # Errors
     /// When the model has no such filter.
-    pub fn factors(&self) -> Result<Vec<Factor>, BeliefError> {
+    pub fn factors(&self) -> Result<Vec<Factor>, FilterModelError> {
         let factors = multiplied(self.model);
         // Asked for its error alone: inside the search a model without a filter is only an infinite cost.
         (self.full)(self.model)?;
@@ -93,7 +93,7 @@ impl Task<'_> {
     }
 
     /// The factors for all truths.
-    fn search(&self, factors: &[Factor]) -> Result<Vec<Factor>, BeliefError> {
+    fn search(&self, factors: &[Factor]) -> Result<Vec<Factor>, FilterModelError> {
         let track = self.track.coarse();
         let value = |ln: &[f64]| self.value(&set(factors, ln), &track).with_ridge(RIDGE, ln);
         let minimum = |start: &[f64]| minimum(value, start, (0.0, MAX_LN), |_| ENOUGH);
@@ -106,14 +106,14 @@ impl Task<'_> {
         let (near, far) = (minimum(&unchanged), minimum(&alike));
         let is_better = far.value.cost < near.value.cost - VISIBLE;
         let mut best = exact(&if is_better { far } else { near }.at)?;
-        if self.aim == Aim::Worst {
+        if self.aim == ConsistencyCriterion::Worst {
             self.lower_alone(&mut best, &at)?;
         }
         Ok(set(factors, &best))
     }
 
     /// Lowers each factor whose noise binds no error, until it does.
-    fn lower_alone(&self, ln: &mut [f64], at: &At<'_>) -> Result<(), BeliefError> {
+    fn lower_alone(&self, ln: &mut [f64], at: &At<'_>) -> Result<(), FilterModelError> {
         for i in 0..ln.len() {
             let moved = |by: f64| {
                 let mut moved = ln.to_vec();
@@ -137,10 +137,10 @@ impl Task<'_> {
         &self,
         filter: &Filter<'_>,
         factors: &[Factor],
-    ) -> Result<FilterConsistency, BeliefError> {
-        let belief = filter(&scaled(self.model, factors))?;
+    ) -> Result<FilterConsistency, FilterModelError> {
+        let filter_model = filter(&scaled(self.model, factors))?;
         Ok(FilterConsistency::of(
-            &self.assessments(&belief, self.track),
+            &self.assessments(&filter_model, self.track),
         ))
     }
 
@@ -148,40 +148,40 @@ impl Task<'_> {
     ///
     /// # Errors
     /// When a truth has no such filter.
-    pub fn informed(
+    pub fn consistency_of_matched(
         &self,
-        knows: impl Fn(&TrueErrors) -> Result<Belief, BeliefError> + Sync,
-    ) -> Result<FilterConsistency, BeliefError> {
+        knows: impl Fn(&TrueErrors) -> Result<FilterModel, FilterModelError> + Sync,
+    ) -> Result<FilterConsistency, FilterModelError> {
         let assessed = |truth: &TrueErrors| {
-            let belief = knows(truth)?;
-            Ok(FilterPass::new(self.track, &belief).assess_stated(&belief, truth))
+            let filter_model = knows(truth)?;
+            Ok(FilterPass::new(self.track, &filter_model).assess_stated(&filter_model, truth))
         };
-        let assessments: Result<Vec<Assessment>, BeliefError> =
+        let assessments: Result<Vec<Assessment>, FilterModelError> =
             self.truths.par_iter().map(assessed).collect();
         Ok(FilterConsistency::of(&assessments?))
     }
 
-    fn assessments(&self, belief: &Belief, track: &Track) -> Vec<Assessment> {
+    fn assessments(&self, filter_model: &FilterModel, track: &Track) -> Vec<Assessment> {
         // No truth changes the filter: its gains are found once.
-        let pass = FilterPass::new(track, belief);
+        let pass = FilterPass::new(track, filter_model);
         self.truths
             .par_iter()
-            .map(|truth| pass.assess_stated(belief, truth))
+            .map(|truth| pass.assess_stated(filter_model, truth))
             .collect()
     }
 
     /// Mean divergence over the truths and the cost of errors that are larger than stated; infinite where the model has no
     /// filter.
-    fn value(&self, factors: &[Factor], track: &Track) -> Value {
-        let Ok(belief) = (self.full)(&scaled(self.model, factors)) else {
-            return Value {
+    fn value(&self, factors: &[Factor], track: &Track) -> CostValue {
+        let Ok(filter_model) = (self.full)(&scaled(self.model, factors)) else {
+            return CostValue {
                 cost: f64::INFINITY,
                 parts: Vec::new(),
             };
         };
         let overconfident = match self.aim {
-            Aim::Mean => 0.0,
-            Aim::Worst => OVERCONFIDENT,
+            ConsistencyCriterion::Mean => 0.0,
+            ConsistencyCriterion::Worst => OVERCONFIDENT,
         };
         // One-sided: an error smaller than stated costs nothing here, the divergence alone speaks of caution.
         let overconfidence = |ratios: [f64; REPORTED]| -> f64 {
@@ -190,7 +190,7 @@ impl Task<'_> {
                 .map(|r| overconfident * r.ln().max(0.0).powi(2))
                 .sum()
         };
-        let assessments = self.assessments(&belief, track);
+        let assessments = self.assessments(&filter_model, track);
         let share = 1.0 / assessments.len() as f64;
         let (mut cost, mut parts) = (0.0, Vec::new());
         for assessment in &assessments {
@@ -200,7 +200,7 @@ impl Task<'_> {
                     end.divergence + overconfidence(end.ratio())
                 }) + overconfidence(of_run));
             // The divergence of one state, (r² − 1)/2 − ln r, has the second derivative 2r² with respect to ln r.
-            let part = |weight: f64, of_divergence: f64, r: f64| Part {
+            let part = |weight: f64, of_divergence: f64, r: f64| CostTerm {
                 value: r.ln(),
                 curvature: share
                     * (2.0 * of_divergence * r * r
@@ -211,33 +211,33 @@ impl Task<'_> {
             parts.extend(at_ends.map(|r| part(of_end, of_end, r)));
             parts.extend(of_run.map(|r| part(1.0, 1.0 - ENDS, r)));
         }
-        Value { cost, parts }
+        CostValue { cost, parts }
     }
 
     /// Logarithm of what should be 1: above 0 the filter is overconfident.
     fn excess(&self, consistency: &FilterConsistency) -> f64 {
         match self.aim {
-            Aim::Mean => (consistency.nees / NEES_DOF as f64).ln(),
-            Aim::Worst => consistency.largest.ratio.ln(),
+            ConsistencyCriterion::Mean => (consistency.nees / NEES_DOF as f64).ln(),
+            ConsistencyCriterion::Worst => consistency.largest.ratio.ln(),
         }
     }
 
     /// The logarithms with one number added to all, none below the lowest: the filter is consistent in the mean, or the least
     /// cautious that covers the worst.
-    fn exact(&self, ln: &[f64], at: &At<'_>) -> Result<Vec<f64>, BeliefError> {
+    fn exact(&self, ln: &[f64], at: &At<'_>) -> Result<Vec<f64>, FilterModelError> {
         let moved =
             |by: f64| -> Vec<f64> { ln.iter().map(|x| (x + by).clamp(0.0, MAX_LN)).collect() };
         // Down to where the largest factor meets the lowest bound: below that nothing changes any more.
         let highest = ln.iter().copied().fold(0.0, f64::max);
         let bounds = (-highest, MAX_LN);
-        if self.aim == Aim::Mean {
-            let crossing = Crossing {
+        if self.aim == ConsistencyCriterion::Mean {
+            let crossing = RootSearch {
                 bounds,
                 step: 0.1,
                 exact: EXACT,
             };
             let (by, _) = crossing.from(0.0, |by| {
-                Ok::<_, BeliefError>(self.excess(&at(&moved(by))?))
+                Ok::<_, FilterModelError>(self.excess(&at(&moved(by))?))
             })?;
             return Ok(moved(by));
         }
@@ -248,10 +248,10 @@ impl Task<'_> {
 
 /// The smallest factor on the standard deviations that a filter assumes of a vehicle's own measurements with which it states
 /// its errors, at the ends of outages and over the run; 1 where it does already, none where a factor of a thousand does not help.
-pub fn aiding_factor(track: &Track, belief: &Belief, truth: &TrueErrors) -> Option<f64> {
+pub fn aiding_factor(track: &Track, filter_model: &FilterModel, truth: &TrueErrors) -> Option<f64> {
     let largest = |ln: f64| {
         let track = track.with_aiding_sigmas(ln.exp());
-        let assessment = FilterPass::new(&track, belief).assess_stated(belief, truth);
+        let assessment = FilterPass::new(&track, filter_model).assess_stated(filter_model, truth);
         FilterConsistency::of(&[assessment]).largest.ratio
     };
     let covers = |ln: f64| Ok(largest(ln) <= 1.0 + TOLERANCE);
@@ -260,14 +260,14 @@ pub fn aiding_factor(track: &Track, belief: &Belief, truth: &TrueErrors) -> Opti
 }
 
 /// The consistency of the tuned filter for logarithms of the factors.
-type At<'a> = dyn Fn(&[f64]) -> Result<FilterConsistency, BeliefError> + 'a;
+type At<'a> = dyn Fn(&[f64]) -> Result<FilterConsistency, FilterModelError> + 'a;
 
 /// The smallest number within bounds for which a condition holds that goes on holding above; the upper bound where it holds for
 /// none. A bracket from 0 first, then halves of it.
 fn smallest(
     (low, high): (f64, f64),
-    holds: impl Fn(f64) -> Result<bool, BeliefError>,
-) -> Result<f64, BeliefError> {
+    holds: impl Fn(f64) -> Result<bool, FilterModelError>,
+) -> Result<f64, FilterModelError> {
     let start = 0.0_f64.clamp(low, high);
     let (mut fails, mut fits, mut step) = (start, start, 2.0 * RESOLUTION);
     if holds(start)? {
@@ -309,7 +309,7 @@ pub struct FilterConsistency {
     pub nees: f64,
     /// Largest ratio of true to stated errors, at an outage's end or over the whole run (without
     /// outages: at any time).
-    pub largest: Departure,
+    pub largest: WorstRatio,
     /// Smallest and largest ratio of any state and of all together: what `run` calls the filter by.
     pub range: [f64; 2],
     /// When the outages end (s from the start).
@@ -320,7 +320,7 @@ pub struct FilterConsistency {
 
 /// An error over what the filter states of it.
 #[derive(Debug, Clone, Copy)]
-pub struct Departure {
+pub struct WorstRatio {
     /// Largest true RMSE over stated standard deviation in the truths.
     pub ratio: f64,
     /// The reported state.
@@ -358,7 +358,7 @@ impl FilterConsistency {
         let together = std::iter::once(nees)
             .chain(at_ends)
             .map(|nees| (nees / NEES_DOF as f64).sqrt());
-        let largest = Departure::largest(&departures);
+        let largest = WorstRatio::largest(&departures);
         let places = if end_s.is_empty() {
             over_run_of(assessments).to_vec()
         } else {
@@ -383,7 +383,7 @@ impl FilterConsistency {
     }
 }
 
-impl Departure {
+impl WorstRatio {
     fn largest(all: &[Self]) -> Self {
         let none = Self {
             ratio: 0.0,
@@ -398,7 +398,7 @@ impl Departure {
 
 /// Every state at every place where a filter is judged: at the ends of outages and then over the whole run; without outages
 /// wherever it reports.
-fn departures(assessments: &[Assessment]) -> Vec<Departure> {
+fn departures(assessments: &[Assessment]) -> Vec<WorstRatio> {
     let at = |outage: Option<usize>, instants: fn(&Assessment) -> &[Consistency], k: usize| {
         states(assessments, outage, &|a| instants(a)[k].ratio())
     };
@@ -413,7 +413,7 @@ fn departures(assessments: &[Assessment]) -> Vec<Departure> {
     }
 }
 
-fn over_run_of(assessments: &[Assessment]) -> [Departure; REPORTED] {
+fn over_run_of(assessments: &[Assessment]) -> [WorstRatio; REPORTED] {
     states(assessments, None, &Assessment::ratio_over_run)
 }
 
@@ -422,14 +422,14 @@ fn states(
     assessments: &[Assessment],
     outage: Option<usize>,
     ratios: &dyn Fn(&Assessment) -> [f64; REPORTED],
-) -> [Departure; REPORTED] {
+) -> [WorstRatio; REPORTED] {
     let of_truths: Vec<[f64; REPORTED]> = assessments.iter().map(ratios).collect();
     std::array::from_fn(|state| {
         let ratios = of_truths.iter().map(|of_truth| of_truth[state]);
         let largest = ratios
             .enumerate()
             .fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
-        Departure {
+        WorstRatio {
             ratio: largest.1,
             state,
             outage,
@@ -477,7 +477,7 @@ fn multiplied(model: &Model) -> Vec<Factor> {
 
 /// True if a filter models the process and its amplitude is not zero.
 fn is_felt(process: &Process) -> bool {
-    process.amplitude() != 0.0 && process.kind() != Kind::Quantization
+    process.amplitude() != 0.0 && process.kind() != ProcessKind::Quantization
 }
 
 fn set(factors: &[Factor], ln: &[f64]) -> Vec<Factor> {
@@ -511,7 +511,7 @@ pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
 // Where a function that falls crosses zero.
 
 /// Settings of the search for a crossing.
-pub(crate) struct Crossing {
+pub(crate) struct RootSearch {
     /// Range of the variable.
     pub bounds: (f64, f64),
     /// First step away from the start; it doubles until there is a bracket.
@@ -523,7 +523,7 @@ pub(crate) struct Crossing {
 /// Evaluations within a bracket. The Illinois rule gains a digit in two of them.
 const TRIALS: usize = 40;
 
-impl Crossing {
+impl RootSearch {
     /// The variable and its value: within `exact` of zero, or at a bound where there is no crossing. From a value
     /// above zero the variable goes up. A bracket first, then regula falsi with the Illinois rule, which
     /// keeps it.
@@ -577,7 +577,7 @@ mod root_tests {
     use std::convert::Infallible;
 
     fn found(start: f64, f: impl Fn(f64) -> f64) -> f64 {
-        let crossing = Crossing {
+        let crossing = RootSearch {
             bounds: (-5.0, 5.0),
             step: 0.1,
             exact: 1e-9,

@@ -15,10 +15,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use super::filter::{KINDS, Unknown, UnknownKind};
+use super::filter::{CoefficientKind, ErrorCoefficient, KINDS};
 use crate::frames::RollPitchYaw;
 use crate::imu::{Axis, Channel, Sensor};
-use crate::noise::{Composite, Kind, Ladder, Model, Process, reduction};
+use crate::noise::{Ar1Bank, Composite, Model, Process, ProcessKind, reduction};
 use crate::sensors::check_bounds;
 use crate::units::{NonNegative, Positive, SettingError};
 use glam::{DQuat, DVec3};
@@ -34,7 +34,7 @@ pub(super) const MAX_BLOCKS: usize = MAX_GROUPS + 1 + KINDS;
 
 /// A model that cannot be made into filter states.
 #[derive(Debug, Clone, thiserror::Error)]
-pub enum BeliefError {
+pub enum FilterModelError {
     /// More bias states than the filter carries.
     #[error("{channel}: more than {MAX_GROUPS} correlated processes; use the 15-state filter")]
     TooManyStates {
@@ -113,7 +113,7 @@ impl BiasGroup {
 /// Noise model of the filter: white noise of a sample, bias states and unknown constants, for each
 /// sensor.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Belief {
+pub struct FilterModel {
     /// Rate the parameters belong to (Hz).
     pub rate_hz: f64,
     /// White variance of a sample on the three axes, accelerometer ((m/s²)²) and gyroscope ((rad/s)²).
@@ -121,20 +121,20 @@ pub struct Belief {
     /// Bias groups of the accelerometer and of the gyroscope, at least one each.
     pub groups: [Vec<BiasGroup>; 2],
     /// Unknown constants that act on the samples of each sensor multiplied, each kind at most once, in order.
-    pub(super) unknowns: [Vec<Unknown>; 2],
+    pub(super) unknowns: [Vec<ErrorCoefficient>; 2],
     /// Standard deviations of a wheel's scale (1), and of pitch and yaw of the vehicle's axes in those of the IMU (rad).
     pub(crate) vehicle: DVec3,
     /// Stochastic states carried, navigation included (15 for the reduced filter).
     pub states: usize,
 }
 
-impl Belief {
+impl FilterModel {
     /// The filter's states for a model.
     ///
     /// The reduction is made for a GNSS interval and a longest time scale (s; [`reduction::window_s`]).
     /// Quantization noise is left out of the filter: its integral is bounded, so it is not white noise to a
-    /// filter that integrates. A drift has a state of its own in any filter, [`UnknownKind::Drift`]. What is
-    /// expected beside the model comes by [`Belief::with_initial`].
+    /// filter that integrates. A drift has a state of its own in any filter, [`CoefficientKind::Drift`]. What is
+    /// expected beside the model comes by [`FilterModel::with_initial`].
     ///
     /// # Errors
     /// When the model has too many processes for the full filter, or the reduction fails.
@@ -143,8 +143,8 @@ impl Belief {
         states: FilterStates,
         interval_s: f64,
         window_s: f64,
-    ) -> Result<Self, BeliefError> {
-        let mut belief = Self {
+    ) -> Result<Self, FilterModelError> {
+        let mut filter_model = Self {
             rate_hz: model.rate_hz,
             white: [DVec3::ZERO; 2],
             groups: [vec![], vec![]],
@@ -159,11 +159,11 @@ impl Belief {
                 AxisBelief::full(model.axis(channel))
             };
             if axis.biases.len() > MAX_GROUPS {
-                return Err(BeliefError::TooManyStates { channel });
+                return Err(FilterModelError::TooManyStates { channel });
             }
-            belief.add(channel, &axis);
+            filter_model.add(channel, &axis);
         }
-        for groups in &mut belief.groups {
+        for groups in &mut filter_model.groups {
             if groups.is_empty() {
                 // The step of the covariance expects a bias block for each sensor: one that is zero for all
                 // time costs nothing else.
@@ -173,14 +173,14 @@ impl Belief {
         for sensor in Sensor::ALL {
             // A drift is deterministic in the truth. Believed as an unknown slope, its sign need not be known
             // to the filter.
-            belief.set_unknown(sensor, UnknownKind::Drift, drift(model, sensor));
-            belief.set_unknown(
+            filter_model.set_unknown(sensor, CoefficientKind::Drift, drift(model, sensor));
+            filter_model.set_unknown(
                 sensor,
-                UnknownKind::ScaleFactor,
+                CoefficientKind::ScaleFactor,
                 DVec3::splat(states.scale_sigma()),
             );
         }
-        Ok(belief)
+        Ok(filter_model)
     }
 
     /// With the turn-on biases and scale factors that the settings of the start expect; the attitude, position
@@ -189,7 +189,11 @@ impl Belief {
         for sensor in Sensor::ALL {
             self.add_constant(sensor, initial.bias_sigma(sensor).unwrap_or(0.0));
             if let Some(ppm) = initial.scale_sigma_ppm(sensor) {
-                self.set_unknown(sensor, UnknownKind::ScaleFactor, DVec3::splat(ppm * 1e-6));
+                self.set_unknown(
+                    sensor,
+                    CoefficientKind::ScaleFactor,
+                    DVec3::splat(ppm * 1e-6),
+                );
             }
         }
         self
@@ -222,7 +226,7 @@ impl Belief {
     }
 
     /// The unknown constants of a sensor that are multiplied.
-    pub(crate) fn unknowns(&self, sensor: Sensor) -> &[Unknown] {
+    pub(crate) fn unknowns(&self, sensor: Sensor) -> &[ErrorCoefficient] {
         &self.unknowns[sensor as usize]
     }
 
@@ -256,7 +260,7 @@ impl Belief {
     }
 
     /// Sets the deviations of an unknown on the three axes; without any, it has no states.
-    pub(crate) fn set_unknown(&mut self, sensor: Sensor, kind: UnknownKind, sigma: DVec3) {
+    pub(crate) fn set_unknown(&mut self, sensor: Sensor, kind: CoefficientKind, sigma: DVec3) {
         let unknowns = &mut self.unknowns[sensor as usize];
         let axes = |sigma: DVec3| sigma.to_array().iter().filter(|s| **s > 0.0).count();
         self.states -= unknowns
@@ -267,7 +271,7 @@ impl Belief {
         unknowns.retain(|u| u.kind != kind);
         if sigma != DVec3::ZERO {
             self.states += axes(sigma);
-            unknowns.push(Unknown { kind, sigma });
+            unknowns.push(ErrorCoefficient { kind, sigma });
             unknowns.sort_by_key(|u| u.kind);
         }
     }
@@ -287,7 +291,7 @@ impl Belief {
 fn drift(model: &Model, sensor: Sensor) -> DVec3 {
     let of_axis = |axis| {
         let noise = model.axis(Channel { sensor, axis });
-        noise.amplitude_of(Kind::Drift).abs()
+        noise.amplitude_of(ProcessKind::Drift).abs()
     };
     DVec3::from_array(Axis::ALL.map(of_axis))
 }
@@ -308,7 +312,7 @@ impl AxisBelief {
         };
         for process in &noise.processes {
             // quantization is left out, a drift has a state of its own
-            let parts = process.parts(Ladder::FILTER);
+            let parts = process.parts(Ar1Bank::FILTER);
             axis.white += parts.iter().map(Process::white_variance).sum::<f64>();
             let mut biases: Vec<_> = parts.iter().filter_map(Process::recursion).collect();
             // what is slower still of flicker noise is as constant as the slowest
@@ -327,7 +331,7 @@ impl AxisBelief {
         channel: Channel,
         interval_s: f64,
         window_s: f64,
-    ) -> Result<Self, BeliefError> {
+    ) -> Result<Self, FilterModelError> {
         let noise = model.axis(channel);
         if reduction::is_exact(noise) {
             let mut axis = Self::full(noise);
@@ -337,7 +341,7 @@ impl AxisBelief {
             return Ok(axis);
         }
         let reduced = reduction::reduce(noise, model.rate_hz, interval_s, window_s)
-            .map_err(|source| BeliefError::Reduction { channel, source })?;
+            .map_err(|source| FilterModelError::Reduction { channel, source })?;
         let bias = [
             reduced.bias.shape(),
             reduced.bias.amplitude(),
@@ -525,7 +529,7 @@ mod tests {
             for channel in Channel::ALL {
                 model.axes[channel.index()] = axis(channel.axis as usize);
             }
-            let made = |states| Belief::new(&model, states, 1.0, 800.0).unwrap();
+            let made = |states| FilterModel::new(&model, states, 1.0, 800.0).unwrap();
             assert_eq!(made(FilterStates::Reduced15), made(FilterStates::Full));
         }
     }

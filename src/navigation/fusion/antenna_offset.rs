@@ -8,8 +8,8 @@
 
 use super::gate::Gate;
 use super::outcome::total_nis;
-use super::{FixRecord, FusionError, Recorded, Settings, Solution, Start, earlier, fuse};
-use crate::ekf::Belief;
+use super::{DriveData, FixRecord, FusionError, FusionSettings, Solution, Start, earlier, fuse};
+use crate::ekf::FilterModel;
 use crate::gnss::GnssFix;
 use crate::linalg::median;
 use crate::trajectory::reference::Reference;
@@ -38,7 +38,7 @@ const FARTHEST: (f64, f64) = (10.0, 2.0);
 
 /// Lever arm and delay at which the fixes agree with the IMU.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Displaced {
+pub struct AntennaOffset {
     /// Antenna from IMU: front, right, down (m), and standard deviations; none where it is as given.
     pub lever_arm_b: Option<[DVec3; 2]>,
     /// Delay of the fixes (s), and its standard deviation; none where it is not significant.
@@ -48,16 +48,16 @@ pub struct Displaced {
 }
 
 /// Finds where the antenna is and how late the fixes are, where that makes the innovations smaller.
-pub fn displaced(
-    recorded: &Recorded<'_>,
-    belief: &Belief,
+pub fn antenna_offset(
+    recorded: &DriveData<'_>,
+    filter_model: &FilterModel,
     start: &Start,
-    settings: &Settings,
-) -> Option<Displaced> {
+    settings: &FusionSettings,
+) -> Option<AntennaOffset> {
     let to_s = start.t_s + MOST_S;
     let scene = OffsetSearch {
         recorded: recorded.until(to_s),
-        belief,
+        filter_model,
         start,
         settings,
     };
@@ -88,7 +88,7 @@ pub fn displaced(
         return None;
     }
     let sigma = covariance.diagonal().map(|v| (v * scale).sqrt());
-    Some(Displaced {
+    Some(AntennaOffset {
         lever_arm_b: kept.contains(&ANTENNA).then(|| {
             [
                 settings.lever_arm_b + antenna_b,
@@ -102,22 +102,22 @@ pub fn displaced(
 
 /// Input of the repeated filter runs.
 struct OffsetSearch<'a> {
-    recorded: Recorded<'a>,
-    belief: &'a Belief,
+    recorded: DriveData<'a>,
+    filter_model: &'a FilterModel,
     start: &'a Start,
-    settings: &'a Settings,
+    settings: &'a FusionSettings,
 }
 
 impl OffsetSearch<'_> {
     /// The innovations of each fix that is used, with the antenna and the delay off by `x`.
     fn innovations(&self, x: &Vector4<f64>) -> Option<Vec<Option<FixRecord>>> {
         let gnss = earlier(self.recorded.gnss, x[3]);
-        let settings = Settings {
+        let settings = FusionSettings {
             lever_arm_b: self.settings.lever_arm_b + DVec3::new(x[0], x[1], x[2]),
             ..self.settings.trial()
         };
         let recorded = self.recorded.with_gnss(&gnss);
-        let solution = fuse(&recorded, self.belief, self.start, &settings, None).ok()?;
+        let solution = fuse(&recorded, self.filter_model, self.start, &settings, None).ok()?;
         let first = gnss.partition_point(|f| f.t_s <= self.start.t_s);
         let mut of_fix = vec![None; gnss.len()];
         for (fix, record) in of_fix[first..].iter_mut().zip(solution.fixes) {
@@ -356,17 +356,17 @@ impl WeightedSolution {
 /// # Errors
 /// Those of [`fuse`].
 pub fn fuse_correlated(
-    recorded: &Recorded<'_>,
-    belief: &Belief,
+    recorded: &DriveData<'_>,
+    filter_model: &FilterModel,
     start: &Start,
-    settings: &Settings,
+    settings: &FusionSettings,
     (reference, correlation): (Option<&Reference>, Correlation),
 ) -> Result<WeightedSolution, FusionError> {
-    let ungated = Settings {
+    let ungated = FusionSettings {
         gate: None,
         ..settings.clone()
     };
-    let stated = fuse(recorded, belief, start, &ungated, reference)?;
+    let stated = fuse(recorded, filter_model, start, &ungated, reference)?;
     let whiteness = PARTS.map(|first| Whiteness::of_part(&stated.fixes, first));
     let lag_1 = match correlation {
         Correlation::Auto => {
@@ -388,7 +388,7 @@ pub fn fuse_correlated(
             .collect();
         fuse(
             &recorded.with_gnss(&gnss),
-            belief,
+            filter_model,
             start,
             settings,
             reference,
