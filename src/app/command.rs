@@ -84,7 +84,7 @@ pub trait Command: clap::Args + Send + Sync + 'static {
     /// Refuses `--out` where the request has nothing to write.
     ///
     /// # Errors
-    /// Why nothing can be written.
+    /// Refusal to write.
     fn check_out(&self) -> Result<()> {
         Ok(())
     }
@@ -157,7 +157,7 @@ impl PlainAnswer {
         }
     }
 
-    /// The same with its JSON as its file and a page beside it; `text` for stdout, where it is not the document.
+    /// The answer with its JSON as its file and a page beside it; `text` for stdout, where it is not the document.
     pub(crate) fn with_page(self, text: Option<String>) -> Self {
         let files = [("", json(&self)), (".html", self.document.html())];
         Self {
@@ -166,7 +166,7 @@ impl PlainAnswer {
         }
     }
 
-    /// The same with files: names or endings, and texts.
+    /// The answer with files: names or endings, and texts.
     pub(crate) fn with<N: Into<String>>(
         self,
         files: impl IntoIterator<Item = (N, String)>,
@@ -178,7 +178,7 @@ impl PlainAnswer {
         }
     }
 
-    /// The same with a bound that may not be met.
+    /// The answer with a limit that is not met, if there is one.
     pub(crate) fn with_unmet(self, unmet: Option<Failure>) -> Self {
         Self { unmet, ..self }
     }

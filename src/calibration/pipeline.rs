@@ -25,7 +25,7 @@ pub fn calibrate(
 /// since its last call, of [`ModelChoice::steps`] per fit.
 ///
 /// # Errors
-/// The same as [`calibrate`].
+/// Runs [`calibrate`] and reports progress.
 pub fn calibrate_with_progress(
     groups: &[Group],
     settings: &CalibrationSettings,

@@ -345,7 +345,7 @@ pub struct Comparison {
     /// Start and end of each outage (s).
     #[serde(skip)]
     outages: Vec<(f64, f64)>,
-    /// Why runs are not paired with the reference.
+    /// Reason that runs are not paired with the reference.
     #[serde(skip)]
     doubts: Vec<String>,
     /// Runs of which, as of the reference, no calibration has draws.

@@ -689,7 +689,7 @@ impl Requirements {
         })
     }
 
-    /// The same limits without aiding, with what every car has, and with its wheel.
+    /// The limits without aiding, with what every car has, and with its wheel.
     ///
     /// # Errors
     /// When the model has no filter.

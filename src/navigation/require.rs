@@ -139,7 +139,7 @@ impl HardestLimit {
     }
 }
 
-/// Why there is no answer.
+/// Reason that there is no answer.
 #[derive(Debug, thiserror::Error)]
 pub enum RequireError {
     /// Not even an IMU without errors keeps a limit.
@@ -372,7 +372,7 @@ impl<'a> OutagePlacements<'a> {
         Ok(hardest(limits, &self.drifts(scenario, model)?))
     }
 
-    /// The same for other outages.
+    /// Drifts in other outages.
     ///
     /// # Errors
     /// When the model has no such filter.
@@ -768,7 +768,7 @@ pub struct Margins {
     /// The hardest limit.
     #[serde(flatten)]
     pub worst: HardestLimit,
-    /// The same for an IMU without errors: what GNSS and start leave.
+    /// Hardest limit of an IMU without errors: what GNSS and start leave.
     pub without_imu_errors: HardestLimit,
 }
 

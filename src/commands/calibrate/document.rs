@@ -528,7 +528,7 @@ fn fit_notes(outcome: &Outcome, settings: &CalibrationSettings) -> Vec<String> {
     notes
 }
 
-/// Why parameters have no interval.
+/// Reasons that parameters have no interval.
 fn without_interval(outcome: &Outcome) -> impl Iterator<Item = String> {
     let labels = outcome.fit.composite.labels();
     intervals(outcome)

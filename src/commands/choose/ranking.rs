@@ -26,7 +26,7 @@ pub struct RecordingMean {
 pub struct Difference {
     /// Its log score less the winner's (nats an outage end); negative is worse.
     pub log_score: RecordingMean,
-    /// The same interval, true of all candidates together at 95 % (Bonferroni).
+    /// Its interval, simultaneous for all candidates together at 95 % (Bonferroni).
     pub joint95: (f64, f64),
 }
 

@@ -839,7 +839,7 @@ impl CauseSearch<'_> {
 }
 
 impl InnovationCause {
-    /// The same where the fixes were delayed already (s).
+    /// The cause, with a delay of the fixes that was given already (s).
     fn after(mut self, given_s: f64) -> Self {
         match &mut self {
             Self::Clocks(clocks) => clocks.delay_s += given_s,

@@ -170,7 +170,7 @@ const GEODETIC: [[&str; 3]; 4] = [
     ["v_n_m_s", "v_e_m_s", "v_d_m_s"],
     ["sd_vn_m_s", "sd_ve_m_s", "sd_vd_m_s"],
 ];
-/// The same in axes fixed to the Earth.
+/// Names of the columns in axes fixed to the Earth.
 const ECEF: [[&str; 3]; 4] = [
     ["x_ecef_m", "y_ecef_m", "z_ecef_m"],
     ["sd_x_m", "sd_y_m", "sd_z_m"],

@@ -93,7 +93,7 @@ const DISAGREEING: f64 = 0.01;
 /// Share of gaps, and of samples lost in them, up to which gaps are those of lost samples: coarse stamps jump more often.
 const MOST_LOST: f64 = 0.1;
 
-/// The same where stamps stray from even ones, which coarse stamps do not.
+/// The limit where stamps stray from even ones, which coarse stamps do not.
 const MOST_STRAYED: f64 = 0.4;
 
 /// Samples of a stretch from which on it is a recording.

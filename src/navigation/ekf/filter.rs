@@ -137,12 +137,12 @@ impl Ekf {
         }
     }
 
-    /// The same filter with another update by fixes.
+    /// The filter with another update by fixes.
     pub(crate) fn with_update(self, fix_update: FixUpdate) -> Self {
         Self { fix_update, ..self }
     }
 
-    /// The same filter with other vector units, for comparison; portable where the machine lacks them.
+    /// The filter with other vector units, for comparison; portable where the machine lacks them.
     pub fn at_level(self, level: Level) -> Self {
         Self { level, ..self }
     }

@@ -97,7 +97,7 @@ pub struct FusionFigures {
 pub struct FromReference {
     /// Root mean square in each state.
     pub rmse: PerState<f64>,
-    /// The same of the horizontal distance (m).
+    /// RMSE of the horizontal distance (m).
     pub horizontal_rmse_m: f64,
     /// Largest horizontal distance (m).
     pub horizontal_max_m: f64,
@@ -119,7 +119,7 @@ pub struct FromReference {
 pub struct SmoothedOutcome {
     /// Root mean square of the smoothed horizontal standard deviation (m).
     pub horizontal_sigma_rms_m: f64,
-    /// The same of the filter's (m).
+    /// Root mean square of the filter's horizontal standard deviation (m).
     horizontal_sigma_rms_filter_m: f64,
     /// Differences of the smoothed rows from the reference.
     pub reference: Option<FromReference>,
@@ -359,7 +359,7 @@ pub enum Finding {
         lag_1: f64,
         /// Factor on the stated standard deviation of position in the filter.
         pos_sigma_factor: f64,
-        /// The same of velocity.
+        /// Factor on the standard deviation of velocity.
         vel_sigma_factor: f64,
     },
     /// Mean NIS of the fixes used.

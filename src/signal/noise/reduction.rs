@@ -28,7 +28,7 @@ pub struct ReducedModel {
     pub misfit: f64,
 }
 
-/// Why a model could not be reduced.
+/// Reason that a model could not be reduced.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ReductionError {
     /// A parameter left its domain.

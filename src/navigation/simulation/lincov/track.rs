@@ -66,7 +66,7 @@ impl MeasurementKind {
     /// Kinds: positions and velocities of fixes, heights, each aid.
     pub(super) const KINDS: usize = 3 + Aid::ALL.len();
 
-    /// Which of them.
+    /// Index among the kinds.
     pub(super) const fn kind(self) -> usize {
         match self {
             Self::Position(_) => 0,
@@ -580,7 +580,7 @@ impl Kernel for Maps<'_> {
     }
 }
 
-/// The same matrix in every lane.
+/// A matrix in every lane.
 #[inline(always)]
 fn wide<W: Wide>(m: &Mat3<f64>) -> Mat3<W> {
     let mut wide = Mat3([[W::from(0.0); 3]; 3]);
@@ -660,7 +660,7 @@ impl Track {
         track
     }
 
-    /// The same with one step from mark to mark, at most a second: a few times faster. White noise is exact; a bias is
+    /// The track with one step from mark to mark, at most a second: a few times faster. White noise is exact; a bias is
     /// its mean over the step, which leaves up to 1e-4 of an error after ten seconds without fixes, 1.2e-3 after five.
     pub fn merged(&self) -> Self {
         self.with_legs(|leg| Step {
@@ -669,7 +669,7 @@ impl Track {
         })
     }
 
-    /// The same with a step of five seconds wherever one of these outages has lasted for a minute: a bias is its mean over the
+    /// The track with a step of five seconds wherever one of these outages has lasted for a minute: a bias is its mean over the
     /// step, which leaves up to 7e-4 of an attitude error where it changes within one, in turns.
     pub(crate) fn merged_for(&self, outages: &[Outage]) -> Self {
         let step_from = |begin: usize| {
@@ -861,7 +861,7 @@ impl Step {
         white
     }
 
-    /// The same with white noise through its mean over the step, as that of a bias.
+    /// The step with white noise through its mean over the step, as that of a bias.
     fn of_means(&self, next: &Self) -> Self {
         let none = [0.0; SIGNALS];
         let mut b: Vec<Nav> = self
@@ -945,7 +945,7 @@ const fn place(signal: usize) -> (usize, usize, ErrorInput) {
 /// of variance 1.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ErrorSourceState {
-    /// Which signal it is part of.
+    /// Signal that it is part of.
     pub signal: usize,
     before: f64,
     after: f64,
