@@ -407,7 +407,7 @@ impl<C: Command> Invocation<C> {
                 let known = command.get_arguments().map(|arg| arg.get_id().as_str());
                 let message = format!("{}: there is no option {key}", C::NAME);
                 return Err(Failure::input(message).or_hint_if(
-                    suggest::nearest(key, known).map(|name| format!("did you mean \"{name}\"?")),
+                    suggest::nearest(key, known).map(|meant| format!("did you mean \"{meant}\"?")),
                 ));
             };
             let option = arg.get_long().unwrap_or(key);

@@ -417,7 +417,7 @@ mod verdict_tests {
         );
         let few = line(8, 1.0);
         assert!(
-            few.starts_with("undecided: 8 runs miss") && few.ends_with(" would decide"),
+            few.starts_with("undecided: 8 runs may miss") && few.ends_with(" would decide"),
             "{few}"
         );
     }

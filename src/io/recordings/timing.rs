@@ -174,7 +174,7 @@ impl SampleClock {
             let (line, from, to) = step_at(i);
             let message = format!("time goes back from {from} s to {to} s");
             return Err(Failure::contents(&raw.path, line, message)
-                .or_hint("sort the rows by time, or split the file where the clock was set back"));
+                .or_hint("remove repeated rows, sort by time, or split the file where the clock was set back"));
         }
         let Some(end) = self.since.last().filter(|_| !self.steps.is_empty()) else {
             return Err(too_short(&raw.path, self.since.len(), 2));
