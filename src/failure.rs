@@ -246,7 +246,7 @@ impl Failure {
         }
     }
 
-    /// The same, where a file that was found in a directory is passed over for that reason.
+    /// The failure, where a file that was found in a directory is passed over for that reason.
     pub(crate) fn skipped_as(self, reason: &'static str) -> Self {
         Self {
             passed_over: Some(reason),
@@ -259,7 +259,7 @@ impl Failure {
         self.passed_over
     }
 
-    /// The same, of a part.
+    /// The failure with the name of a part in front.
     pub(crate) fn within(self, part: &str) -> Self {
         Self {
             message: format!("{part}: {}", self.message),
@@ -287,7 +287,7 @@ impl Failure {
         self.or(None, text)
     }
 
-    /// The same, if there is any.
+    /// Adds a hint, if there is one.
     pub(crate) fn or_hint_if(self, text: Option<String>) -> Self {
         text.into_iter().fold(self, Self::or_hint)
     }
@@ -369,7 +369,7 @@ pub(crate) trait IntoFailure<T> {
     /// Exit code 2: the input is at fault.
     fn refuse(self) -> Result<T>;
 
-    /// The same, of an option or a file.
+    /// Refuses an option or a file, whose name is put in front.
     fn refuse_within(self, part: impl fmt::Display) -> Result<T>;
 }
 

@@ -84,7 +84,7 @@ pub trait Command: clap::Args + Send + Sync + 'static {
     /// Refuses `--out` where the request has nothing to write.
     ///
     /// # Errors
-    /// Why nothing can be written.
+    /// Refusal to write.
     fn check_out(&self) -> Result<()> {
         Ok(())
     }
@@ -157,7 +157,7 @@ impl PlainAnswer {
         }
     }
 
-    /// The same with its JSON as its file and a page beside it; `text` for stdout, where it is not the document.
+    /// The answer with its JSON as its file and a page beside it; `text` for stdout, where it is not the document.
     pub(crate) fn with_page(self, text: Option<String>) -> Self {
         let files = [("", json(&self)), (".html", self.document.html())];
         Self {
@@ -166,7 +166,7 @@ impl PlainAnswer {
         }
     }
 
-    /// The same with files: names or endings, and texts.
+    /// The answer with files: names or endings, and texts.
     pub(crate) fn with<N: Into<String>>(
         self,
         files: impl IntoIterator<Item = (N, String)>,
@@ -178,7 +178,7 @@ impl PlainAnswer {
         }
     }
 
-    /// The same with a bound that may not be met.
+    /// The answer with a limit that is not met, if there is one.
     pub(crate) fn with_unmet(self, unmet: Option<Failure>) -> Self {
         Self { unmet, ..self }
     }
@@ -407,7 +407,7 @@ impl<C: Command> Invocation<C> {
                 let known = command.get_arguments().map(|arg| arg.get_id().as_str());
                 let message = format!("{}: there is no option {key}", C::NAME);
                 return Err(Failure::input(message).or_hint_if(
-                    suggest::nearest(key, known).map(|name| format!("did you mean \"{name}\"?")),
+                    suggest::nearest(key, known).map(|meant| format!("did you mean \"{meant}\"?")),
                 ));
             };
             let option = arg.get_long().unwrap_or(key);

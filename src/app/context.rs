@@ -61,19 +61,19 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// The same without a clock: an answer is the same each time.
+    /// The context without a clock, for answers that do not depend on it.
     pub(crate) fn untimed(self) -> Self {
         let is_timed = false;
         Self { is_timed, ..self }
     }
 
-    /// The same, with the files that the command reads.
+    /// The context with the files that the command reads.
     #[must_use]
     pub fn reading(self, inputs: Vec<Input>) -> Self {
         Self { inputs, ..self }
     }
 
-    /// The same, with `--out`.
+    /// The context with `--out`.
     pub(crate) fn writing(self, out: Option<PathBuf>) -> Self {
         Self { out, ..self }
     }

@@ -237,7 +237,7 @@ impl ScenarioArgs {
     }
 }
 
-/// The same, with outages in the place of those of the file.
+/// Settings of a run with outages in the place of those of the file.
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct SettingsArgs {
     /// Window without fixes, in seconds (repeatable), or "none" (default: 300:390 and 700:790)
@@ -259,7 +259,7 @@ impl SettingsArgs {
         Ok(scenario)
     }
 
-    /// The same, checked.
+    /// The scenario, checked.
     pub(crate) fn checked(&self) -> Result<Scenario> {
         let scenario = self.scenario()?;
         scenario.validate().refuse()?;
@@ -277,7 +277,7 @@ pub(crate) fn merge(into: &mut toml::Table, over: toml::Table) {
     }
 }
 
-/// Why a model has no filter: by the file that is at fault, of the model and the one with the settings; `advice` is on settings.
+/// Refusal of a model without a filter, by the file that is at fault, of the model and the one with the settings; `advice` is on settings.
 pub(crate) fn no_filter(
     e: &FilterModelError,
     model: &Path,

@@ -13,7 +13,7 @@ pub struct ModelSpec {
     kinds: Vec<ProcessKind>,
 }
 
-/// Why a specification means no model.
+/// Reason that a specification is refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("model {message}")]
 pub struct SpecError {

@@ -366,11 +366,11 @@ pub struct ParameterInterval {
     /// Share of the draws in which its process has vanished: is zero, or has its correlation time at the end of what can be
     /// searched, where it is another process by name only.
     pub lost: f64,
-    /// Why there is no interval, if there is none.
+    /// Reason that there is no interval, if there is none.
     pub absent: Option<Undetermined>,
 }
 
-/// Why a parameter has no interval.
+/// Reason that a parameter has no interval.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Undetermined {
     /// Its process is zero at the optimum.

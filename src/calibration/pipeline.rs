@@ -25,7 +25,7 @@ pub fn calibrate(
 /// since its last call, of [`ModelChoice::steps`] per fit.
 ///
 /// # Errors
-/// The same as [`calibrate`].
+/// Runs [`calibrate`] and reports progress.
 pub fn calibrate_with_progress(
     groups: &[Group],
     settings: &CalibrationSettings,
@@ -103,15 +103,15 @@ pub fn fit_curve(
     Ok(outcome)
 }
 
-/// Gives no weight to the scales outside the range of a fit.
+/// Ignores the scales outside the range of a fit.
 fn restrict_to_range(curve: &mut Curve, settings: &CalibrationSettings) {
     let outside = |level: &&u32| !settings.counts(**level) && !curve.ignored.contains(*level);
     let outside: Vec<u32> = curve.levels.iter().filter(outside).copied().collect();
     curve.ignored.extend(outside);
 }
 
-/// Counts the scales without a root at which a fit exceeds the classical variance, which bounds the noise from above; whether
-/// there are any.
+/// Includes scales without a robust root where the fit exceeds the classical variance, an upper bound. Returns true if
+/// any was added.
 fn include_exceeded(
     curve: &mut Curve,
     without_root: &[u32],
@@ -130,7 +130,7 @@ fn include_exceeded(
     curve.ignored.len() < before
 }
 
-/// Fills in the inference of every outcome from its group. The same seed gives the same numbers on any number of
+/// Bootstraps every outcome from its group: intervals and tests. The same seed gives the same numbers on any number of
 /// threads.
 pub fn add_intervals(
     groups: &[Group],

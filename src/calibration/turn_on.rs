@@ -20,7 +20,7 @@ pub const TURN_ON_LEVEL: f64 = 0.01;
 const SLOWEST: f64 = 1.58;
 /// Means of the accelerometers that differ by more (m/s², 5° of tilt) tell of another mounting: no unit's bias changes so.
 const OTHER_TILT_M_S2: f64 = 0.85;
-/// The same of the gyroscopes (rad/s, 11 °/s): the sensor turned.
+/// Difference of gyroscope means that shows a turned sensor (rad/s, 11 °/s).
 const TURNING_RAD_S: f64 = 0.2;
 /// Share of the standard deviation by the noise below which all means are taken to have been removed before.
 const REMOVED: f64 = 1e-3;

@@ -64,7 +64,7 @@ pub(crate) fn run(args: &DemoArgs, session: &Session) -> Result<(), Failure> {
     let there = std::fs::read_to_string(&study).unwrap_or_else(|_| text.clone());
     if there != text && !(force && there.starts_with(HEAD)) {
         let message = format!("{} belongs to another demo", study.display());
-        let hint = "name another --out, or replace it with --force";
+        let hint = "name another place, or replace it with --force";
         return Err(Failure::input(message).hint(hint));
     }
     atomic::write(&study, text)?;

@@ -112,7 +112,7 @@ fn command() -> clap::Command {
     with_examples(Cli::command(), "")
 }
 
-/// The same for help: each command with the common options that mean something for it; `--help` (`is_long`) has the whole
+/// The command line for help: each command with the common options that mean something for it; `--help` (`is_long`) has the whole
 /// description and every option, in the layout of `-h`.
 fn documented(is_long: bool) -> clap::Command {
     let mut command = if is_long {

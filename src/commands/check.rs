@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 
 /// Check scenario, study, model, trajectory and recording files without running anything
 ///
-/// What a file is follows from its contents. A TOML file with [accel] or [gyro] is a noise model; with segments or
+/// The kind of a file follows from its contents. A TOML file with [accel] or [gyro] is a noise model; with segments or
 /// waypoints a motion profile; with [run] beside [vary], or a trajectory in it, a study of `batch`; with operations
 /// one for `synthesize --contaminate`; with lat_deg and yaw_deg an initial state of `fuse`; with [unit] an entry of
 /// the catalogue of IMUs; any other is a scenario. A table with lat_deg or n_m is a trajectory, as are .nav, .tum

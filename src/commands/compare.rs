@@ -348,7 +348,7 @@ pub struct Comparison {
     /// Start and end of each outage (s).
     #[serde(skip)]
     outages: Vec<(f64, f64)>,
-    /// Why runs are not paired with the reference.
+    /// Reason that runs are not paired with the reference.
     #[serde(skip)]
     doubts: Vec<String>,
     /// Runs of which, as of the reference, no calibration has draws.
@@ -400,7 +400,7 @@ impl Comparison {
         (!costs.is_empty()).then(|| {
             let (reference, costs, state) =
                 (self.name_of_reference(), first_names(&costs), SPOKEN[state]);
-            format!("uncertainty of {state} against {reference}: {costs}")
+            format!("ASEE of {state}, mean over the outage, relative to {reference}: {costs}")
         })
     }
 

@@ -281,7 +281,7 @@ struct DesignedParameter {
     pub ci95: Option<[f64; 2]>,
     /// Half of its width over the value (%).
     pub half_width_pct: Option<f64>,
-    /// The same of endless recordings, where parameters vary between them: what no length takes away.
+    /// Half-width of endless recordings, where parameters vary between them: what no length takes away.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub endless_half_width_pct: Option<f64>,
 }

@@ -536,7 +536,7 @@ impl Requirements {
         let beyond_linear = self.beyond_linear(scenario, &model, outages[worst.place])?;
         let question = self.in_words(&outages);
         let lines = [
-            format!("needed for {question}"),
+            format!("required for {question}"),
             format!("an IMU {biases}"),
             format!("hardest: {}", in_words(&worst, &outages)),
         ];
@@ -579,12 +579,12 @@ impl Requirements {
             }),
             json!(worst),
         ]);
-        document.section("Figures, at most");
-        document.text("If alone: no other error of the IMU. Others 10 × better: every other figure ten times smaller.");
+        document.section("Largest figures");
+        document.text("Only error: the IMU has no other. Others 10 × better: every other figure ten times smaller.");
         let columns = [
             ("figure", "figure"),
-            ("at most, equal shares", "allocated"),
-            ("if alone", "alone"),
+            ("equal variance shares", "allocated"),
+            ("only error", "alone"),
             ("others 10 × better", "others_10_times_better"),
         ];
         document.table(Table::of(&json, "/figures/*", &columns));
@@ -689,7 +689,7 @@ impl Requirements {
         })
     }
 
-    /// The same limits without aiding, with what every car has, and with its wheel.
+    /// The limits without aiding, with what every car has, and with its wheel.
     ///
     /// # Errors
     /// When the model has no filter.

@@ -108,10 +108,10 @@ impl Command for Synthesize {
 
     fn run(&self, context: &Context<'_>) -> Result<Synthesis> {
         let file = model_file::read(&self.model)?;
-        let (shown, rate_hz) = (self.model.display(), file.model.rate_hz);
+        let (path, rate_hz) = (self.model.display(), file.model.rate_hz);
         if self.spread && file.spread.is_none() {
             return refused(
-                format!("{shown}: no [spread] to draw from"),
+                format!("{path}: no [spread] to draw from"),
                 "see calib_data/consumer_mems.toml, or leave --spread out",
             );
         }

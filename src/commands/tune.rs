@@ -408,7 +408,7 @@ impl TuneResult {
         })
     }
 
-    /// Why the factors are of no use, if they are not.
+    /// Reason that the factors are of no use, if there is one.
     fn fault(&self) -> Option<String> {
         let is_overconfident = match self.aim {
             ConsistencyCriterion::Worst => self.after.largest.ratio > 1.0 + TOLERANCE,

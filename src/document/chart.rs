@@ -29,7 +29,7 @@ impl ChartAxis {
         }
     }
 
-    /// The same, showing at least the values from `low` to `high`.
+    /// The axis, showing at least the values from `low` to `high`.
     pub fn including(self, low: f64, high: f64) -> Self {
         Self {
             include: Some((low, high)),
@@ -196,7 +196,7 @@ impl Panel {
         }
     }
 
-    /// The same of another height, as a share of the usual one.
+    /// The panel with another height, as a share of the usual one.
     pub fn of_height(self, height: f64) -> Self {
         Self { height, ..self }
     }
@@ -261,7 +261,7 @@ impl Chart {
         }
     }
 
-    /// The same in a group of charts that are zoomed together.
+    /// The chart in a group of charts that are zoomed together.
     pub fn in_group(self, group: &str) -> Self {
         Self {
             group: group.to_owned(),
@@ -269,7 +269,7 @@ impl Chart {
         }
     }
 
-    /// The same, small.
+    /// The chart, small.
     pub fn small(self) -> Self {
         Self {
             size: Size::Small,

@@ -232,7 +232,7 @@ impl AxisScale {
         self.pixels.0 + (along(value) - low) / (high - low) * (self.pixels.1 - self.pixels.0)
     }
 
-    /// The same, no farther than the ends.
+    /// Position of a value clamped to the ends.
     fn within(&self, value: f64) -> f64 {
         self.at(value.clamp(self.range.0, self.range.1))
     }
@@ -823,7 +823,7 @@ fn thinned(points: &[(f64, f64)], most: usize) -> Vec<(f64, f64)> {
     points.chunks(bucket).flat_map(extremes).collect()
 }
 
-/// The same of a band: of each bucket all that it covers.
+/// A thinned band: of each bucket all that it covers.
 fn thinned_band(points: &[(f64, f64, f64)], most: usize) -> Vec<(f64, f64, f64)> {
     if points.len() <= most {
         return points.to_vec();

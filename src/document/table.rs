@@ -64,13 +64,13 @@ impl Table {
         }
     }
 
-    /// The same with further columns.
+    /// The table with further columns.
     pub fn and(mut self, head: impl IntoIterator<Item = String>) -> Self {
         self.head.extend(head);
         self
     }
 
-    /// The same with this many columns that name a row.
+    /// The table with this many columns that name a row.
     #[must_use]
     pub fn with_keys(self, keys: usize) -> Self {
         Self { keys, ..self }
@@ -96,7 +96,7 @@ impl Table {
                 .all(|row| row.get(column).is_some_and(|c| c.is_number))
     }
 
-    /// The same without columns of which no row knows anything, for results that have no such figures.
+    /// The table without columns of which no row knows anything, for results that have no such figures.
     pub fn without_unknown(self) -> Self {
         let is_known = |cell: &Cell| cell.text.contains(|letter| !"[–, ]".contains(letter));
         let kept: Vec<bool> = (0..self.head.len())

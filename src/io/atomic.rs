@@ -351,7 +351,7 @@ impl OutputClaim {
             .is_some_and(|marker| marker.lock.is_none())
     }
 
-    /// Claims outputs in the place that `shown` names.
+    /// Claims outputs; `shown` is the path for messages.
     fn new(shown: &Path, marker: &Path, outputs: Vec<PathBuf>) -> Result<Self, Failure> {
         let mut claimed = locked(&CLAIMED);
         if outputs.iter().any(|output| claimed.contains(output)) {
@@ -382,7 +382,7 @@ impl OutputClaim {
             let at = resolved(directory);
             let outputs = files.iter().map(|name| at.join(name.as_ref()));
             let claim = Self::new(directory, &marker, outputs.chain([at.join("")]).collect())?;
-            // where the directory was made meanwhile, its writers hold the marker in it
+            // if the directory appeared meanwhile, its writers lock the marker inside it: try again there
             if directory.is_dir() == is_there {
                 return Ok(claim);
             }
@@ -443,7 +443,7 @@ pub(crate) fn claim_file<'a>(
 /// Refuses an output where what stands there is no result of its kind on its own.
 ///
 /// # Errors
-/// What is not replaced.
+/// If `output` is not a result of this command.
 pub(crate) fn guard_others(output: &Path, kind: &str) -> Result<(), Failure> {
     let is_own = |text: String| is_own(&text, kind) && !is_part(&resolved(output));
     match !output.exists() || source::head(output).is_ok_and(is_own) {
@@ -480,7 +480,7 @@ fn guard_inputs<'a>(
 /// `recognise` is given the text of the last of `files`, if it is there.
 ///
 /// # Errors
-/// Why not.
+/// If the directory holds other files, an input or another result.
 pub(crate) fn claim_directory<'a>(
     directory: &Path,
     files: &[impl AsRef<str>],
@@ -512,14 +512,13 @@ pub(crate) fn claim_directory<'a>(
     }
 }
 
-/// True of a directory that is not there, or holds nothing: files of the same names would be lost.
+/// True if the directory does not exist or holds only hidden files.
 fn is_empty(directory: &Path) -> bool {
     let mut entries = fs::read_dir(directory).into_iter().flatten().flatten();
     entries.all(|entry| entry.file_name().to_string_lossy().starts_with('.'))
 }
 
-/// Texts without blanks that tell files of nav-sim, by the ending of their kind: models, exports, pages, pictures, studies,
-/// comparisons, curves.
+/// Text (blanks removed) by which nav-sim recognises its own files, per ending.
 const SIGNATURES: [(&str, &str); 10] = [
     ("trajectory.csv", "(nav-simtrajectoryconvert)"),
     (".toml", "program=\"nav-sim"),

@@ -59,7 +59,7 @@ pub(crate) fn beside(model: &Path) -> PathBuf {
 /// The draws beside a model file, at the rate of an IMU, if there are any.
 ///
 /// # Errors
-/// Why those that are there cannot be used, in words.
+/// Reason that existing draws cannot be used, in words.
 pub(crate) fn usable(path: &Path, file: &ModelFile, rate_hz: f64) -> Result<Option<Draws>, String> {
     let Some(read) = read(path).map_err(|e| e.to_string())? else {
         return Ok(None);
@@ -160,7 +160,7 @@ impl DrawsFile {
     }
 }
 
-/// The same processes with other parameters.
+/// The processes of an axis with other parameters.
 fn with_values(axis: &Composite, values: &[f64], rate_hz: f64) -> Option<Composite> {
     let mut rest = values;
     let mut processes = Vec::new();

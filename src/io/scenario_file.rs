@@ -81,7 +81,7 @@ mod tests {
         }
     }
 
-    /// Whether a scenario with this value of one key is refused for it.
+    /// True if a scenario with this value of one key is refused for it.
     fn is_refused(key: &str, value: f64, entries: usize) -> bool {
         let (section, name) = key.rsplit_once('.').unwrap();
         let value = if ["runs", "seed"].contains(&name) {

@@ -74,7 +74,7 @@ pub(crate) fn table(path: &Path) -> io::Result<Box<dyn BufRead>> {
     Ok(Box::new(BufReader::with_capacity(BUFFER, unpacked)))
 }
 
-/// Most of a file that is examined to tell what it is (bytes).
+/// Bytes read to recognise a file.
 const HEAD: u64 = 1 << 20;
 
 /// The beginning of a file as text, unpacked when its name ends in `.gz`.
@@ -85,14 +85,14 @@ pub(crate) fn head(path: &Path) -> io::Result<String> {
     lossy(path, HEAD)
 }
 
-/// So much of a table as text.
+/// The first `most` bytes of a table as text, invalid UTF-8 replaced.
 fn lossy(path: &Path, most: u64) -> io::Result<String> {
     let mut bytes = Vec::new();
     table(path)?.take(most).read_to_end(&mut bytes)?;
     Ok(without_mark(String::from_utf8_lossy(&bytes).into_owned()))
 }
 
-/// Bytes of a packed table, of which there may be so many: a small file unpacks to any number.
+/// Limits the size of an unpacked table: a small file may unpack to any.
 struct UnpackedReader<R> {
     inner: io::Take<R>,
     largest: u64,
@@ -121,7 +121,7 @@ pub(crate) fn table_text(path: &Path) -> Result<String, Failure> {
 /// A text of at most 64 MiB, unpacked when its name ends in `.gz`.
 ///
 /// # Errors
-/// When the system refuses, it is longer, or it is not UTF-8: with the line.
+/// When the system refuses, the text is longer, or it is not UTF-8 (names the line of the first invalid byte).
 pub(crate) fn text(path: &Path) -> io::Result<String> {
     String::from_utf8(bounded(table(path)?, LARGEST_TEXT)?)
         .map(without_mark)

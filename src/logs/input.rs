@@ -553,7 +553,7 @@ impl LogError {
         self.offset.filter(|_| matches!(self.fault, LogFault::Cut))
     }
 
-    /// The same, said of a topic.
+    /// The error with the name of its topic.
     pub(crate) fn of_topic(mut self, name: &str) -> Self {
         self.topic.get_or_insert_with(|| name.to_owned());
         self

@@ -138,7 +138,7 @@ impl Log {
     /// Fixes of a receiver in order of time, up to the cut if the file has one.
     ///
     /// # Errors
-    /// Those of [`Self::imu`].
+    /// As [`Self::imu`].
     pub fn fixes(&self, channel: &LogChannel, stamp: Stamp) -> Result<Vec<LogFix>, LogError> {
         self.samples(channel, stamp, |sample| match sample {
             LogSample::Imu(_) => None,

@@ -33,7 +33,7 @@ pub(crate) const GRAVITY_EQUATOR: f64 = 9.780_325_335_9;
 const SOMIGLIANA_K: f64 = 0.001_931_852_652_41;
 /// Navigation in latitude and longitude is refused beyond this latitude (rad): 89.9°.
 pub const MAX_LATITUDE: f64 = MAX_LATITUDE_DEG * crate::units::DEG;
-/// The same in degrees.
+/// Largest latitude (degrees).
 pub const MAX_LATITUDE_DEG: f64 = 89.9;
 
 /// The functions of latitude that radii and gravity share: one square root and one division for all.

@@ -139,7 +139,7 @@ impl HardestLimit {
     }
 }
 
-/// Why there is no answer.
+/// Reason that there is no answer.
 #[derive(Debug, thiserror::Error)]
 pub enum RequireError {
     /// Not even an IMU without errors keeps a limit.
@@ -372,7 +372,7 @@ impl<'a> OutagePlacements<'a> {
         Ok(hardest(limits, &self.drifts(scenario, model)?))
     }
 
-    /// The same for other outages.
+    /// Drifts in other outages.
     ///
     /// # Errors
     /// When the model has no such filter.
@@ -768,11 +768,11 @@ pub struct Margins {
     /// The hardest limit.
     #[serde(flatten)]
     pub worst: HardestLimit,
-    /// The same for an IMU without errors: what GNSS and start leave.
+    /// Hardest limit of an IMU without errors: what GNSS and start leave.
     pub without_imu_errors: HardestLimit,
 }
 
-/// Correlation time of the biases of an IMU that has next to none (s): any would do.
+/// Correlation time of the negligible biases of the error-free IMU (s); its value has no effect.
 const ERROR_FREE_T_CORR_S: f64 = 300.0;
 
 impl Margins {
@@ -799,7 +799,7 @@ pub fn worst_without_imu_errors(
     course.worst(&without_imu_errors(scenario), &perfect, limits)
 }
 
-/// A scenario whose IMU has no constant errors, and whose filter knows it.
+/// The scenario without constant IMU errors, in truth and filter.
 fn without_imu_errors(scenario: &Scenario) -> Scenario {
     let mut scenario = scenario.clone();
     let (imu, initial) = (&mut scenario.imu, &mut scenario.initial);

@@ -233,8 +233,7 @@ impl Scenario {
         }
     }
 
-    /// The same with a filter that has a state for every process of the model; what it expects beside the model
-    /// stays.
+    /// The scenario with `--filter full`; initial sigmas are kept.
     pub fn with_full_noise(&self) -> Self {
         let mut full = self.clone();
         full.filter.states = FilterStates::Full;
@@ -284,8 +283,8 @@ impl Scenario {
         self.imu.is_ideal() && self.aiding.errors().is_empty() && self.unexpected().is_empty()
     }
 
-    /// Errors that the true IMU and receiver have and the filter does not expect, each with its remedy: the filter's own
-    /// will be larger than it says.
+    /// Errors of the true IMU and receiver that the filter does not model, each with its remedy; they make the filter
+    /// overconfident.
     pub fn unexpected(&self) -> Vec<String> {
         let mut found = Vec::new();
         for sensor in Sensor::ALL {
@@ -313,7 +312,7 @@ impl Scenario {
                     scale_remedy,
                 ),
             ] {
-                // of half of what is there, errors may be twice as large as stated
+                // below half the true sigma the errors may be twice as large as stated
                 if expected < 0.5 * is {
                     found.push(format!(
                         "the true {sensor} has a {what} of {is} {unit}, the filter expects {expected}: {remedy} adds states"
@@ -322,7 +321,8 @@ impl Scenario {
             }
         }
         for (sensor, key, sigma, unit) in self.imu.without_states() {
-            // By gravity, by steady vibration, by what a warming ends with: most of what one sensor has is a bias.
+            // Under constant gravity, vibration and final temperature these errors act mostly as a bias: a bias state
+            // absorbs them.
             let remedy = sensor.map_or("calibrate the IMU for it".to_owned(), |sensor| {
                 let key = InitialSettings::bias_key(sensor);
                 format!("initial.{key} adds states")
@@ -338,8 +338,8 @@ impl Scenario {
             correlation_time_s,
             ..
         } = self.gnss;
-        // A filter averages the white noise of so many fixes while the correlated error stays: that is felt when it is no
-        // longer small beside their mean.
+        // A filter averages the white error of `fixes` fixes during one correlation time; the correlated error matters
+        // once it exceeds half of that average.
         let fixes = (rate_hz * correlation_time_s).max(1.0);
         if (0..3).any(|i| sigma_m[i] > 0.5 * pos_sigma_m[i] / fixes.sqrt()) {
             let [n, e, d] = sigma_m;

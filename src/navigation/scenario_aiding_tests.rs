@@ -4,7 +4,7 @@ use super::Scenario;
 use crate::monte_carlo::run;
 use crate::simulation::REPORTED;
 use crate::simulation::lincov::{
-    AssessedInstant, STRAPDOWN, Track, TruthModel, strapdown_over_sigma,
+    AssessedInstant, FilterPass, STRAPDOWN, Track, TruthModel, strapdown_over_sigma,
 };
 use crate::tests::*;
 

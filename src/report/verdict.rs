@@ -89,12 +89,10 @@ fn sentence(
             )
         }
         VerdictKind::Undecided => {
-            let percent = 100.0 * (verdict.detectable_state_ratio - 1.0);
-            let is_one = verdict.basis == Basis::Drive || verdict.independent_samples == 1.0;
-            let miss = if is_one { "misses" } else { "miss" };
+            let ratio = verdict.detectable_state_ratio;
             let (samples, decides) = (samples(verdict), deciding(verdict));
             format!(
-                "undecided: {samples} {miss} errors below {percent:.0} % in one state; {decides}"
+                "undecided: {samples} may miss an error/σ of {ratio:.2} in one state; {decides}"
             )
         }
         VerdictKind::Doubtful => {
@@ -419,7 +417,7 @@ mod verdict_tests {
         );
         let few = line(8, 1.0);
         assert!(
-            few.starts_with("undecided: 8 runs miss") && few.ends_with(" would decide"),
+            few.starts_with("undecided: 8 runs may miss") && few.ends_with(" would decide"),
             "{few}"
         );
     }

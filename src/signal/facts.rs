@@ -40,8 +40,8 @@ fn log_improbability(count: usize, trials: usize, p: f64) -> f64 {
     }
 }
 
-/// The middle of some numbers, the upper one of an even number; NaN of none. They are counted by their first bits and only those about the
-/// middle are held: a copy of the column of a day costs more than a second pass.
+/// Upper median; NaN of an empty iterator. Two passes (histogram of the leading bits, then the median's bin): cheaper
+/// than copying a day-long column.
 fn median(values: impl Iterator<Item = f64> + Clone) -> f64 {
     // sign, exponent and three bits of the mantissa, in the order of the numbers
     let bin = |x: f64| {
@@ -87,7 +87,7 @@ fn step(axis: &[f64]) -> Option<f64> {
     changes(axis).reduce(f64::min)
 }
 
-/// The grain of a column; none of a constant one.
+/// Quantizer step of a column; `None` for a constant one.
 #[must_use]
 pub fn quantizer_step(axis: &[f64]) -> Option<QuantizerStep> {
     let step = step(axis)?;

@@ -261,7 +261,7 @@ impl BoundedStep {
         self.minimise_near([false; MOST])
     }
 
-    /// The same, sooner where the parameters between their bounds are those of `is_free`, the others on their lower ones.
+    /// Minimises sooner where the parameters between their bounds are those of `is_free`, the others on their lower ones.
     pub fn minimise_near(&self, is_free: [bool; MOST]) -> Vector {
         let mut x = self.lower;
         let mut places = [BoundState::Lower; MOST];

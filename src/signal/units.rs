@@ -44,13 +44,13 @@ impl SettingError {
         }
     }
 
-    /// The same with what to do about it.
+    /// The error with advice.
     pub const fn with_advice(mut self, advice: &'static str) -> Self {
         self.advice = Some(advice);
         self
     }
 
-    /// The same with the section's name before the key.
+    /// The error with the section's name before the key.
     pub fn in_section(mut self, section: &str) -> Self {
         self.key = format!("{section}.{}", self.key);
         self

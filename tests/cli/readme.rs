@@ -259,6 +259,11 @@ fn the_table_of_commands_is_complete() {
     let rows = rows.skip(2).map_while(|l| l.strip_prefix('|'));
     let names = |row: &'static str| row.split('|').next().unwrap().split('`').skip(1).step_by(2);
     let mut named: Vec<&str> = rows.flat_map(names).collect();
+    let overview = include_str!("../../src/cli/overview.txt");
+    for command in &commands {
+        let mut words = overview.split(|c: char| !c.is_alphanumeric());
+        assert!(words.any(|word| word == command), "overview: {command}");
+    }
     commands.sort_unstable();
     named.sort_unstable();
     assert_eq!(named, commands);

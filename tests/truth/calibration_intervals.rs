@@ -5,8 +5,8 @@
 use crate::shared::*;
 use nav_sim::app::Context;
 use nav_sim::calibration::{
-    Bootstrap, CalibrationSettings, ModelChoice, Pool, add_intervals, calibrate, grouped,
-    replicates,
+    Bootstrap, CalibrationSettings, Estimator, ModelChoice, Pool, add_intervals, calibrate,
+    grouped, replicates,
 };
 use nav_sim::commands::run::{NavigateInputs, TrueImu, navigate};
 use nav_sim::io::draws_file::{Draws, DrawsFile};

@@ -197,7 +197,7 @@ pub enum CalibrationFault {
     Other,
 }
 
-/// Why there is no wavelet variance, no curve or no fit.
+/// Reason that there is no wavelet variance, no curve or no fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{message}")]
 pub struct CalibrationError {
@@ -216,7 +216,7 @@ impl CalibrationError {
         Self::new(CalibrationFault::Other, message)
     }
 
-    /// The same, of a group or a signal.
+    /// The error with the name of its group or signal in front.
     pub(crate) fn within(self, part: &str) -> Self {
         Self::new(self.cause, format!("{part}: {}", self.message))
     }

@@ -133,12 +133,12 @@ impl SamplingDistribution {
             .collect()
     }
 
-    /// The same of the robust one, at least 1.
+    /// Degrees of freedom of the robust wavelet variance of `samples` samples; at least 1.
     pub(crate) fn robust_edof(&self, samples: usize, tuning: &Tuning) -> Vec<f64> {
         let robust = |((edof, share), fourth): ((f64, &f64), &f64)| {
-            // The efficiency is that of independent coefficients. In Hermite polynomials of a coefficient the robust variance has the
-            // second, by which it scatters as the classical one does, and others from the fourth on, whose covariances fall
-            // as the fourth powers of the correlations or faster.
+            // The efficiency is that of independent coefficients. Hermite expansion: the second-order term scatters as
+            // the classical variance; the excess comes from orders ≥ 4, whose covariances fall as the fourth power of
+            // the correlation or faster.
             let efficiency = 1.0 / (1.0 + (1.0 / tuning.efficiency() - 1.0) * fourth);
             edof_robust(edof, efficiency * tuning.quantization().degrees(*share))
         };

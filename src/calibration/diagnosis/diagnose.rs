@@ -325,7 +325,7 @@ fn by_axis<S: Serializer>(values: &[(Axis, f64)], to: S) -> Result<S::Ok, S::Err
     to.collect_map(values.iter().copied())
 }
 
-/// Why a recording is abnormal.
+/// Reason that a recording is abnormal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alarm {
     /// Probability that the most unusual of recordings that are alike is as unusual.
@@ -357,11 +357,11 @@ pub struct Diagnosis {
     pub sensor: Sensor,
     /// The verdict.
     pub verdict: RecordingVerdict,
-    /// Why its noise is not that of the others.
+    /// Evidence that its noise differs.
     pub noise: Option<Alarm>,
-    /// Why there are outliers within it.
+    /// Evidence of outliers.
     pub outliers: Option<Alarm>,
-    /// Why its level is said to drift.
+    /// Evidence of a drift.
     pub drift: Option<Alarm>,
     /// Findings that most signals of this sensor have in common.
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -121,7 +121,7 @@ fn lack_of_fit(curve: &Curve, fit: &Fit, quantile: f64) -> Option<f64> {
 
 /// Largest number of repeated fits until the weights are those of the model itself.
 const MOST_ROUNDS: usize = 20;
-/// The same of a curve that resembles one already fitted, whose model is where the weights begin.
+/// Rounds for a curve that resembles one already fitted, whose model is where the weights begin.
 const FEW_ROUNDS: usize = 3;
 /// Relative change of the implied curve below which no further fit is made.
 const SETTLED: f64 = 1e-6;
@@ -224,13 +224,13 @@ impl Fit {
         self.composite.parameters().filter(free).count()
     }
 
-    /// The same with its own minimum as the only one known.
+    /// The fit with its own minimum as the only one known.
     fn within_its_basin(mut self) -> Self {
         self.minima.truncate(1);
         self
     }
 
-    /// The same with its objective and residuals in standard deviations of the curve where the model holds: in the weights of
+    /// The fit with its objective and residuals in standard deviations of the curve where the model holds: in the weights of
     /// the fit a scale far above the model counts little, and a model would be the less rejected the more it misses.
     fn at_own_weights(self, curve: &Curve) -> Self {
         let nu = expected(curve, &self);
@@ -254,7 +254,7 @@ impl Fit {
     }
 }
 
-/// The same for a curve that resembles one already fitted: a coarser grid, and the minima of that one.
+/// Fits a curve that resembles one already fitted: a coarser grid, and the minima of that one.
 pub(crate) fn refit(
     curve: &Curve,
     spec: &ModelSpec,

@@ -97,8 +97,8 @@ pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<Pa
     intervals
 }
 
-/// Upper over lower quantile of the draws of an amplitude that say nothing any more; of its interval, which Student's quantile
-/// makes wider where there are few replicates, the square.
+/// Ratio of the 95 % quantiles of an amplitude above which it counts as undetermined (squared for its interval, which
+/// few recordings widen).
 pub const UNDETERMINED_RATIO: f64 = 100.0;
 
 /// Returns true if the interval of a correlation time reaches the end of the searched range: the
@@ -117,7 +117,7 @@ fn leaves_search(searched: Range, process: &Process, interval: &ParameterInterva
         .any(|kappa| beyond(kappa.ln()))
 }
 
-/// An interval that holds its estimate; none where the estimator misses its own estimate 39 times in 40.
+/// The interval, or NaN if it excludes its own estimate (all but 2.5 % of the draws on one side: a biased estimator).
 fn unless_one_sided(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
     let rounding = 1e-9 * value.abs();
     if low <= value + rounding && value - rounding <= high {
@@ -200,9 +200,8 @@ fn log_time(process: &Process) -> f64 {
     -process.kappa().unwrap_or(longest).ln()
 }
 
-/// The smallest interval that holds both. A process that is hardly told from the others is shown only where
-/// its estimate is large, and then the draws, which show it smaller than it was estimated, are mirrored to
-/// what is larger still: its interval holds them too.
+/// The smallest interval that holds both. A weak process is reported only if overestimated. Its draws are smaller, and
+/// mirroring alone would put the interval above them.
 const fn hull(mirrored: [f64; 2], quantiles: [f64; 2]) -> [f64; 2] {
     [mirrored[0].min(quantiles[0]), mirrored[1].max(quantiles[1])]
 }
@@ -263,8 +262,8 @@ impl ParameterDraws {
     }
 }
 
-/// The 95 % interval of what is positive and follows from a whole model, from what follows from the models of draws:
-/// as that of an amplitude. Such a figure is there whatever the model, not shown because it came out large.
+/// 95 % interval of a positive figure computed from the model, from its values in the draws. Mirrored only: unlike a
+/// process it is always reported, so there is no selection.
 pub fn derived_interval(estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
     ParameterDraws::new(Parameter::Sigma2, drawn, stretch).around(estimate)
 }

@@ -67,7 +67,7 @@ pub(super) fn origins(replicates: &[Replicate]) -> Vec<Origin> {
         .collect()
 }
 
-/// Which of the different values each is, by first appearance.
+/// Index of each among the different values, by first appearance.
 fn ranks<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<usize> {
     let mut known = Vec::new();
     let rank = |value| {
@@ -175,7 +175,7 @@ impl ReplicateSpread {
         self.stretch(&self.between, |_| 1.0)
     }
 
-    /// The same where replicates differ by these standard deviations, times the median of the deviation that so few replicates show,
+    /// Ratio of [`Self::student`] where replicates differ by these standard deviations, times the median of the deviation that so few replicates show,
     /// over the true one: what half of all calibrations stretch the true scatter by, or less.
     pub(crate) fn stated_where(&self, between: &[f64]) -> f64 {
         self.stretch(between, |freedom| {
@@ -551,7 +551,7 @@ impl Outcome {
 
 /// The replicates that are compared at one scale.
 struct Scale {
-    /// Which replicates, and the axis of each.
+    /// Indices of the replicates, and the axis of each.
     members: Vec<(usize, Option<Axis>)>,
     /// Variance of ln nu of each by its noise.
     noise: Vec<f64>,

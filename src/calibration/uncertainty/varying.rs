@@ -104,7 +104,7 @@ impl SingleFits<'_> {
         self.outcome.estimate_again(&curve, settings).ok()
     }
 
-    /// The models of as many curves as the bootstrap draws, of replicates as long of the model fitted to all.
+    /// Fits to bootstrap curves of one replicate of this length, drawn from the pooled model.
     fn drawn(&self, replicate: &Replicate) -> Vec<Fit> {
         let alone = std::slice::from_ref(replicate);
         let sampler = CurveSampler::new(self.group, alone, self.outcome, self.settings);
@@ -120,7 +120,7 @@ impl SingleFits<'_> {
             .collect()
     }
 
-    /// A parameter of fits, scaled; none where its process is not there.
+    /// Scaled parameter of each fit; `None` where its process vanished.
     fn scaled(&self, fits: &[Fit], of: ParameterRef) -> Vec<Option<f64>> {
         let of_fit = |fit: &Fit| {
             let processes = matched(&self.outcome.fit, fit);
@@ -136,8 +136,8 @@ impl SingleFits<'_> {
     }
 }
 
-/// Variance of the scaled parameters of draws by their quantiles a standard deviation from the middle; none where the process
-/// vanishes in more of them than an interval leaves out.
+/// Variance of the scaled parameters of draws from their 16 % and 84 % quantiles; `None` where the process vanishes in
+/// more of them than an interval leaves out.
 fn variance(drawn: &[Option<f64>]) -> Option<f64> {
     let mut there: Vec<f64> = drawn.iter().copied().flatten().collect();
     if (there.len() as f64) < (1.0 - TAIL) * drawn.len() as f64 || there.len() < 2 {

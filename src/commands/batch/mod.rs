@@ -586,7 +586,7 @@ impl RunValidator {
         Ok(())
     }
 
-    /// Returns true if a single run accepts this value of a key.
+    /// Returns true if a single run accepts this value of a key: then a list is one value, not an axis of the grid.
     fn accepts(&mut self, path: &str, value: &Value) -> bool {
         let memory = format!("{path}={value}");
         if let Some(known) = self.taken.get(&memory) {
@@ -596,7 +596,7 @@ impl RunValidator {
             _ if path == "seed" => value.as_integer().is_some_and(|seed| seed >= 0),
             Some(arg) => {
                 let list = value.as_array();
-                // any text is a path: a list is none, and a list of lists is no list of paths
+                // any text parses as a path: refuse lists for a single path, and lists of lists
                 let is_nested = list.is_some_and(|list| list.iter().any(Value::is_array));
                 let is_one_path = is_path(arg) && !is_repeated(arg);
                 let mut request = Table::from_iter(

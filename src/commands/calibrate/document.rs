@@ -101,7 +101,7 @@ impl Calibration {
             ("local minima", "starts"),
             ("of them the best", "agreeing"),
             ("J-test p", "j_p_value"),
-            ("signals alike: p", "spread_p_value"),
+            ("homogeneity p", "spread_p_value"),
         ];
         document.table(Table::of(json, "/fits/*", &columns));
         if self.diagnoses.iter().any(is_abnormal) {
@@ -166,8 +166,8 @@ impl Calibration {
             };
             note(importance, found.sensor.name(), turn_on_remark(found));
         }
-        if let Some(text) = beginnings(&self.beginnings) {
-            note(Importance::Remark, "not stationary at the beginning", text);
+        if let Some(text) = warm_ups_line(&self.warm_ups) {
+            note(Importance::Remark, "warm-up", text);
         }
         for outcome in fits {
             let reasons = outcome.ranking.iter().flat_map(reasons);
@@ -202,7 +202,7 @@ pub(crate) fn is_abnormal(diagnosis: &Diagnosis) -> bool {
     diagnosis.verdict != RecordingVerdict::Normal
 }
 
-/// A row a parameter.
+/// One row per parameter.
 fn parameters(outcome: &Outcome) -> Table {
     let model = &outcome.fit.composite;
     let mut table = Table::new(["parameter (SI, of a sample)", "value", "95 % interval"]);
@@ -405,7 +405,7 @@ pub(crate) fn recordings_line(outcomes: &[Outcome], diagnoses: &[Diagnosis]) -> 
 }
 
 /// The recordings whose beginnings change a wavelet variance notably, and what to leave out.
-fn beginnings(found: &[RecordingWarmUp]) -> Option<String> {
+fn warm_ups_line(found: &[RecordingWarmUp]) -> Option<String> {
     const NOTABLE: f64 = 0.05;
     let matters = |b: &&RecordingWarmUp| {
         let mut changes = b.signals.iter().map(|w| w.change);
@@ -528,7 +528,7 @@ fn fit_notes(outcome: &Outcome, settings: &CalibrationSettings) -> Vec<String> {
     notes
 }
 
-/// Why parameters have no interval.
+/// Reasons that parameters have no interval.
 fn without_interval(outcome: &Outcome) -> impl Iterator<Item = String> {
     let labels = outcome.fit.composite.labels();
     intervals(outcome)

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Which estimators.
+/// Choice of estimators.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EstimatorChoice {
     /// This one.
@@ -76,7 +76,7 @@ impl EstimatorChoice {
 pub(crate) struct MeasuredRecordings {
     pub report: Report,
     pub replicates: Vec<(Channel, Replicate)>,
-    pub beginnings: Vec<RecordingWarmUp>,
+    pub warm_ups: Vec<RecordingWarmUp>,
     pub settings: CalibrationSettings,
 }
 
@@ -91,7 +91,7 @@ pub struct Calibration {
     /// Settings of the fit.
     pub settings: CalibrationSettings,
     /// The recordings that do not begin as they go on.
-    pub beginnings: Vec<RecordingWarmUp>,
+    pub warm_ups: Vec<RecordingWarmUp>,
     /// Turn-on bias from the recordings' means, for each estimator and sensor.
     pub turn_on: Vec<TurnOnSpread>,
     /// Each recording against the others.
@@ -115,8 +115,8 @@ pub(crate) fn measure(
     let (looks, report) = visit(paths, &reading, &look, context)?;
     let looks = looks.into_iter().collect::<Result<Vec<_>, _>>()?;
     let rate_hz = report.files[0].rate_hz;
-    let beginnings = beginnings(&looks, reading.skip_s, rate_hz);
-    shortest(&report, scales, context);
+    let warm_ups = warm_ups(&looks, reading.skip_s, rate_hz);
+    warn_of_short_recording(&report, scales, context);
     // a file for each sensor, as phones write them, is no more than one recording of each
     let of = |channel: &Channel| {
         let has = |look: &&MeasuredRecording| look.replicates.iter().any(|(own, _)| own == channel);
@@ -129,11 +129,11 @@ pub(crate) fn measure(
         ..settings.clone()
     };
     let mut measured: Vec<_> = looks.into_iter().flat_map(|look| look.replicates).collect();
-    one_switching_on(&report, &mut measured);
+    keep_first_mean_per_file(&report, &mut measured);
     Ok(MeasuredRecordings {
         report,
         replicates: measured,
-        beginnings,
+        warm_ups,
         settings,
     })
 }
@@ -157,7 +157,7 @@ impl Calibration {
         Self {
             turn_on: settings.estimators.iter().flat_map(of_estimator).collect(),
             diagnoses: diagnose(&groups, &outcomes, &settings),
-            beginnings: Vec::new(),
+            warm_ups: Vec::new(),
             note: CalibrationNote::default(),
             groups,
             outcomes,
@@ -228,8 +228,8 @@ impl MeasuredRecording {
     }
 }
 
-/// The stretches of one file are of one switching-on: the mean of the first of them counts.
-fn one_switching_on(report: &Report, measured: &mut [(Channel, Replicate)]) {
+/// Stretches of a file share a power-on: only the first counts for the turn-on bias.
+fn keep_first_mean_per_file(report: &Report, measured: &mut [(Channel, Replicate)]) {
     let later: Vec<String> = report
         .files
         .iter()
@@ -242,25 +242,25 @@ fn one_switching_on(report: &Report, measured: &mut [(Channel, Replicate)]) {
         .for_each(|(_, replicate)| replicate.mean = f64::NAN);
 }
 
-/// The recordings that do not begin as they go on after what was skipped.
-fn beginnings(looks: &[MeasuredRecording], skipped_s: f64, rate_hz: f64) -> Vec<RecordingWarmUp> {
-    let beginning = |look: &MeasuredRecording| RecordingWarmUp {
+/// Recordings that warm up beyond the time skipped.
+fn warm_ups(looks: &[MeasuredRecording], skipped_s: f64, rate_hz: f64) -> Vec<RecordingWarmUp> {
+    let warm_up = |look: &MeasuredRecording| RecordingWarmUp {
         recording: look.recording.clone(),
         signals: look.warm_ups.clone(),
-        skip_s: longest(&look.warm_ups).map(|n| (skipped_s + n as f64 / rate_hz).ceil()),
+        skip_s: warm_up_samples(&look.warm_ups).map(|n| (skipped_s + n as f64 / rate_hz).ceil()),
     };
     let found = looks.iter().filter(|look| !look.warm_ups.is_empty());
-    found.map(beginning).collect()
+    found.map(warm_up).collect()
 }
 
-/// Samples to leave out of a recording for all its signals; none where that does not help one of them.
-fn longest(signals: &[WarmUp]) -> Option<usize> {
+/// Samples to leave out of a recording for all its signals; `None` if that does not help one of them.
+fn warm_up_samples(signals: &[WarmUp]) -> Option<usize> {
     let helps = signals.iter().all(|w| w.change.is_some());
     signals.iter().map(|w| w.samples).max().filter(|_| helps)
 }
 
-/// Remarks which recording is so much shorter than the others that it lacks scales, or costs all of them scales.
-fn shortest(report: &Report, scales: Option<u32>, context: &Context<'_>) {
+/// Warns of a recording so short that it lacks scales of the others, or costs the average scales.
+fn warn_of_short_recording(report: &Report, scales: Option<u32>, context: &Context<'_>) {
     let levels = |samples: usize| scales.unwrap_or(u32::MAX).min(default_levels(samples));
     let recordings = report.files.iter().flat_map(FileReport::recordings);
     let Some((recording, samples)) = recordings
@@ -272,14 +272,11 @@ fn shortest(report: &Report, scales: Option<u32>, context: &Context<'_>) {
     let mut found: Vec<u32> = recordings.map(|(_, samples)| levels(samples)).collect();
     found.sort_unstable();
     // Scales are averaged up to the last that more than half of the recordings have ([`calibration::average`]).
-    let (scales, used, usual) = (
-        found[0],
-        found[(found.len() - 1) / 2],
-        found[found.len() / 2],
-    );
-    if scales < usual {
+    let (scales, used) = (found[0], found[(found.len() - 1) / 2]);
+    if scales < found[found.len() / 2] {
+        let most = found[found.len() - 1];
         context.warn(format!(
-            "{recording}: {samples} samples have {scales} scales, most recordings {usual}; the average has {used}"
+            "{recording}: {samples} samples have {scales} scales, the longest recording {most}; the average has {used}"
         ));
     }
 }
@@ -289,8 +286,8 @@ fn shortest(report: &Report, scales: Option<u32>, context: &Context<'_>) {
 /// Curves of a file, each with what it is for.
 pub(crate) type Curves = Vec<(Scope, Estimator, Curve)>;
 
-/// Reads curves, and the settings with their estimators and rate; whether one does not say its sensor. A rate (Hz)
-/// and a sensor are for those that do not say theirs.
+/// Reads curves, and returns the settings with their estimators and rate, and true if a sensor was assumed. `rate_hz`
+/// and `sensor` apply to curves that state none.
 ///
 /// # Errors
 /// When the file cannot be read, says nothing of rate or sensor where nothing is given, or has two curves for one model.
@@ -356,7 +353,7 @@ pub(crate) fn read_curves(
     ))
 }
 
-/// The models of curves.
+/// Fits a model to each curve.
 ///
 /// # Errors
 /// When a curve is too short for the model.

@@ -162,7 +162,7 @@ impl Command for Calibrate {
                 let estimators = self.estimator;
                 let MeasuredRecordings {
                     replicates,
-                    beginnings,
+                    warm_ups,
                     settings,
                     ..
                 } = measure(
@@ -194,7 +194,7 @@ impl Command for Calibrate {
                 let outcomes = calibrate_with_progress(&groups, &settings, &advance)?;
                 let made = Calibration::new(groups, outcomes, settings, bootstrap, &advance);
                 context.end();
-                Calibration { beginnings, ..made }
+                Calibration { warm_ups, ..made }
             }
         };
         calibration.note = CalibrationNote {

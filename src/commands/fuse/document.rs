@@ -416,7 +416,7 @@ fn cause(cause: &InnovationCause) -> String {
 const UNEVEN: f64 = 0.5;
 
 const POSITION: &str = "Dashed: horizontal 1 σ stated. Line: distance from the reference.";
-const ERRORS: &str = "Lines: estimate minus reference. Bands: ± 3 σ as stated.";
+const ERRORS: &str = "Lines: solution minus reference. Bands: ± 3 σ as stated.";
 const FIXES: &str = "A consistent filter has 95 % of the used fixes in the band.";
 
 /// Colour of what is smoothed.

@@ -847,7 +847,7 @@ impl CauseSearch<'_> {
 }
 
 impl InnovationCause {
-    /// The same where the fixes were delayed already (s).
+    /// The cause, with a delay of the fixes that was given already (s).
     fn after(mut self, given_s: f64) -> Self {
         match &mut self {
             Self::Clocks(clocks) => clocks.delay_s += given_s,
@@ -1002,7 +1002,7 @@ const STATE: [&str; 9] = [
 pub struct FuseSummary {
     schema_version: u32,
     method: &'static str,
-    /// VerdictKind, evidence and cause.
+    /// Verdict, the findings it rests on and their cause.
     pub verdict: FuseVerdict,
     /// IMU samples used.
     pub imu_samples: usize,

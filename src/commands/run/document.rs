@@ -71,7 +71,7 @@ pub(super) fn document(answer: &RunAnswer) -> Document {
     page
 }
 
-/// Sentences beside the verdict: what helps a filter that is overconfident, where errors come from, what is left to know.
+/// Notes after the verdict: remedies, unmodelled errors, the largest error sources.
 fn notes(summary: &Summary, answer: &RunAnswer, page: &mut Document) {
     let scenario = &answer.origin.configuration;
     let mut unexpected = scenario.unexpected();
@@ -146,11 +146,11 @@ fn sources(outage: &OutageSummary) -> Option<String> {
         .take(SOURCES)
         .map(|(name, share)| format!("{name} {:.0} %", 100.0 * share))
         .collect();
-    let place = window(outage.start_s, outage.end_s);
-    Some(format!(
-        "sources of the horizontal error at the end of {place}: {}",
-        shares.join(", ")
-    ))
+    let window = window(outage.start_s, outage.end_s);
+    (!shares.is_empty()).then(|| {
+        let shares = shares.join(", ");
+        format!("sources of the horizontal error at the end of {window}: {shares}")
+    })
 }
 
 /// Positions of the outages with the largest errors, in time order.
@@ -192,7 +192,7 @@ fn outages(answer: &RunAnswer, shown: &[usize], page: &mut Document) {
         ("RMSE pos_e_m", "rmse_end/pos_e_m"),
         ("ASEE pos_e_m", "asee_end/pos_e_m"),
         ("error/σ", "verdict/ratio"),
-        ("in", "verdict/worst_state"),
+        ("state", "verdict/worst_state"),
     ];
     page.table(Table::of(answer, "/outages/*", &columns).without_unknown());
     let columns = [

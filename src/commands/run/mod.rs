@@ -604,7 +604,7 @@ pub struct Navigation {
 /// Navigates along a trajectory, with these outages and this seed.
 ///
 /// # Errors
-/// What does not fit together, what the method cannot do, or a covariance that runs away.
+/// When settings contradict, the method cannot do it, or the covariance runs away.
 pub fn navigate(
     inputs: &NavigateInputs,
     scenario: &Scenario,
@@ -623,7 +623,7 @@ pub fn navigate(
     with_runs(inputs, scenario, outages, &filter, seed, None, context)
 }
 
-/// The same of a filter along its track, with runs that were made already.
+/// Result of a filter along its track, with runs that were made already.
 fn with_runs(
     inputs: &NavigateInputs,
     scenario: &Scenario,

@@ -42,7 +42,7 @@ const ASSUMED_CORRELATION_TIME_S: f64 = 300.0;
 pub struct DatasheetEntry {
     /// Whose.
     pub sensor: Sensor,
-    /// Which.
+    /// Name of the figure.
     pub figure: Figure,
     /// Its value.
     pub quantity: StatedQuantity,
@@ -106,7 +106,7 @@ impl Datasheet {
         })
     }
 
-    /// The same of both sensors, in words.
+    /// Figures that neither sensor's data state, in words.
     pub(crate) fn not_stated(&self) -> Vec<String> {
         let both = Sensor::ALL.into_iter();
         let lacking =

@@ -101,10 +101,10 @@ pub(super) fn increasing(
     t_s: impl Iterator<Item = f64> + Clone,
 ) -> Result<(), Failure> {
     let mut steps = (1..).zip(t_s.clone().zip(t_s.skip(1)));
-    let Some((k, (from, to))) = steps.find(|(_, (from, to))| to <= from) else {
+    let Some((k, (previous_s, t_s))) = steps.find(|(_, (from, to))| to <= from) else {
         return Ok(());
     };
-    let message = format!("time goes from {from} s to {to} s: it must increase");
+    let message = format!("time goes from {previous_s} s to {t_s} s: it must increase");
     Err(Failure::contents(path, line(k), message)
         .or_hint("sort the rows by time and remove repeated ones"))
 }
@@ -170,7 +170,7 @@ const GEODETIC: [[&str; 3]; 4] = [
     ["v_n_m_s", "v_e_m_s", "v_d_m_s"],
     ["sd_vn_m_s", "sd_ve_m_s", "sd_vd_m_s"],
 ];
-/// The same in axes fixed to the Earth.
+/// Names of the columns in axes fixed to the Earth.
 const ECEF: [[&str; 3]; 4] = [
     ["x_ecef_m", "y_ecef_m", "z_ecef_m"],
     ["sd_x_m", "sd_y_m", "sd_z_m"],
@@ -929,8 +929,9 @@ pub(crate) fn read_imu(
         remarks.push(remark(format!("{text}{odometer}")));
     }
     let t_s: Vec<f64> = time.values.iter().map(|t| t * unit_s).collect();
-    if t_s.len() < 3 {
-        let message = format!("{} samples, but 3 are needed", t_s.len());
+    let (samples, needed) = (t_s.len(), 3);
+    if samples < needed {
+        let message = format!("{samples} samples, but {needed} are needed");
         return Err(Error::contents(&table.path, Place::Within, message));
     }
     increasing(&table.path, |k| table.line(k), t_s.iter().copied())?;

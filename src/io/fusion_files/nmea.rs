@@ -35,7 +35,8 @@ struct Epoch {
 #[derive(Default)]
 struct NmeaLog {
     epochs: Vec<Epoch>,
-    /// The midnight before the first sentence (Unix s) by the last date: before it has found the time, a receiver states any.
+    /// Midnight before the first sentence (Unix s), from the last date seen: before time is acquired receivers output
+    /// arbitrary dates.
     midnight_s: Option<f64>,
     has_separation: bool,
 }
@@ -121,8 +122,8 @@ impl NmeaLog {
     }
 }
 
-/// The fixes of a log, and what is to be said of it. `default_sigma` are the standard deviations where `GST` states none;
-/// `imu_s` is when the IMU begins and ends.
+/// Fixes of a log, and its notes. `default_sigma`: standard deviations where `GST` states none; `imu_s` is when the IMU
+/// begins and ends.
 ///
 /// # Errors
 /// A damaged sentence, no position at all.
@@ -196,7 +197,7 @@ fn body(line: &str) -> Result<&str, &'static str> {
         .ok_or("not a sentence: no $")
 }
 
-/// The fields of a sentence whose checksum is right: what is between `$` and `*`, a XOR of its bytes; of logs without any, all.
+/// Fields of a sentence after checking its checksum (XOR of the bytes between `$` and `*`), unless the log has none.
 fn fields(line: &str, has_checksums: bool) -> Result<Vec<&str>, &'static str> {
     if !has_checksums {
         return Ok(body(line)?.split(',').collect());
@@ -236,7 +237,7 @@ fn midnight(text: &str) -> Option<f64> {
     Some(date.and_time(NaiveTime::MIN).and_utc().timestamp() as f64)
 }
 
-/// Speed and course as north and east; without a course, as receivers have none at rest, nothing but as slow as that.
+/// North and east velocity, and its sigma. Receivers state no course at rest: then zero, with the speed as sigma.
 fn horizontal(knots: f64, course_deg: Option<f64>) -> (DVec2, f64) {
     let speed = knots * KNOT;
     course_deg.map_or((DVec2::ZERO, speed), |course| {

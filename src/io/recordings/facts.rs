@@ -29,7 +29,7 @@ fn axes(table: &InputTable, is: impl Fn(Channel) -> bool) -> Vec<&[f64]> {
         .collect()
 }
 
-/// Rows of a table that are no measurements.
+/// Rows removed or to be removed from a table.
 #[derive(Default)]
 pub(super) struct Repair {
     /// Rows of a sample where a sensor is slower than the file, else 1.
@@ -202,7 +202,7 @@ fn missing(table: &InputTable, row: usize, text: &str) -> Failure {
 }
 
 impl Repair {
-    /// Takes what is missing out of a table: NaN where gaps are kept, else whole rows.
+    /// Removes missing samples: NaN with `Gaps::Keep`, else the whole row.
     fn apply(&mut self, table: &mut InputTable, gaps: Gaps) {
         let missing = std::mem::take(&mut self.missing);
         if gaps != Gaps::Keep {
@@ -226,8 +226,8 @@ impl Repair {
         }
     }
 
-    /// Takes the samples of a file whose sensors are slower than its rows at their own rate; rows that are repeated now and
-    /// then are missing samples.
+    /// Keeps one row per sample if the sensors are slower than the file. Isolated repeated rows become missing
+    /// samples.
     fn resample_held_rows(
         &mut self,
         table: &mut InputTable,

@@ -253,8 +253,7 @@ fn load_signals(
 /// Fewer samples than are needed.
 fn too_short(path: &str, samples: usize, needed: usize) -> Failure {
     let message = format!("{samples} samples, but {needed} are needed");
-    Failure::contents(path, Place::Within, message)
-        .or_hint("record for longer, or use fewer scales")
+    Failure::contents(path, Place::Within, message).or_hint("fewer --scales, or record for longer")
 }
 
 /// Reads recordings; those of a directory in name order (numbers in names by value). All are held.

@@ -93,7 +93,7 @@ const DISAGREEING: f64 = 0.01;
 /// Share of gaps, and of samples lost in them, up to which gaps are those of lost samples: coarse stamps jump more often.
 const MOST_LOST: f64 = 0.1;
 
-/// The same where stamps stray from even ones, which coarse stamps do not.
+/// The limit where stamps stray from even ones, which coarse stamps do not.
 const MOST_STRAYED: f64 = 0.4;
 
 /// Samples of a stretch from which on it is a recording.
@@ -174,7 +174,7 @@ impl SampleClock {
             let (line, from, to) = step_at(i);
             let message = format!("time goes back from {from} s to {to} s");
             return Err(Failure::contents(&raw.path, line, message)
-                .or_hint("sort the rows by time, or split the file where the clock was set back"));
+                .or_hint("remove repeated rows, sort by time, or split the file where the clock was set back"));
         }
         let Some(end) = self.since.last().filter(|_| !self.steps.is_empty()) else {
             return Err(too_short(&raw.path, self.since.len(), 2));

@@ -156,7 +156,7 @@ pub(crate) fn read(path: &Path, dictionary: &Dictionary<'_>) -> Result<InputTabl
 /// Reads a table from a text that is held.
 ///
 /// # Errors
-/// Those of [`read`].
+/// As [`read`].
 pub(crate) fn parse(
     name: &str,
     text: &str,
@@ -559,7 +559,7 @@ impl InputTable {
     /// Columns of quantities that are needed.
     ///
     /// # Errors
-    /// Those of [`Self::require`].
+    /// As [`Self::require`].
     pub(crate) fn columns<const N: usize>(
         &self,
         needed: [&str; N],

@@ -136,7 +136,7 @@ impl Quantity {
         }
     }
 
-    /// The same between such ends (degrees).
+    /// The quantity limited to a range (degrees).
     pub(crate) const fn within(self, (low, high, reason): Range) -> Self {
         Self {
             range: Some((low * DEG - 1e-9, high * DEG + 1e-9, reason)),
@@ -144,7 +144,7 @@ impl Quantity {
         }
     }
 
-    /// The same where it is above 0, as a standard deviation is; the squares of smaller ones are no numbers to divide by.
+    /// The quantity, above 0, as a standard deviation is; the squares of smaller ones are no numbers to divide by.
     pub(crate) const fn positive(self) -> Self {
         const REASON: &str = "is not a standard deviation > 0";
         Self {
@@ -153,7 +153,7 @@ impl Quantity {
         }
     }
 
-    /// The same where no unit may be left out.
+    /// The quantity, whose unit must be stated.
     pub(crate) const fn with_unit(self) -> Self {
         Self {
             bare: DefaultUnit::Not,
@@ -161,7 +161,7 @@ impl Quantity {
         }
     }
 
-    /// The same in the other direction.
+    /// The quantity in the other direction.
     pub(crate) const fn reversed(self, stems: &'static str) -> Self {
         Self {
             sign: -1.0,

@@ -61,7 +61,7 @@ pub fn load(path: &Path, origin: Option<[f64; 3]>) -> Result<(Trajectory, Vec<St
 /// among the warnings.
 ///
 /// # Errors
-/// What cannot be read at all, with its line; rows of which no stretch is usable.
+/// A file that cannot be read, with its line; rows of which no stretch is usable.
 pub(crate) fn load_reference(
     path: &Path,
     origin: Option<[f64; 3]>,

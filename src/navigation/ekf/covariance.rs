@@ -1,8 +1,8 @@
 //! The covariance of eight runs.
 //!
 //! States by threes: [`R`] position error (m, n), [`V`] velocity error (m/s, n), `PSI` attitude error
-//! (rad, n), then one triple of axes for each bias group, accelerometer groups first (`BIAS`), and for each
-//! unknown constant that acts multiplied, in the same order, and at last wheel scale and mounting of a vehicle.
+//! (rad, n), then three per bias group (`BIAS`, accelerometer groups first), three per constant error coefficient
+//! (scale factor, drift slope; same order), and last the wheel scale and the mounting angles.
 //!
 //! The lower triangle is the matrix. Inside the square of the navigation states and inside that of the
 //! biases the upper triangle repeats it, so that a column can be read as a row.
@@ -46,11 +46,11 @@ pub(crate) struct SharedCovariance(Box<[f64]>);
 const CONSTANT_BIASES: [BiasGroup; 2 * MAX_BLOCKS + 1] =
     [BiasGroup::constant(0.0); 2 * MAX_BLOCKS + 1];
 
-/// The blocks behind the navigation's: what makes the errors of a sample.
+/// States after the navigation block, biases and error coefficients, with the transition of each.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BiasBlocks<'a> {
-    /// The step of each block: biases of the accelerometer, of the gyroscope, unknowns of both, and what the vehicle's
-    /// own measurements have, which moves nothing.
+    /// Transition of each block, in state order: accelerometer biases, gyroscope biases, coefficients of both, vehicle
+    /// states (constant).
     steps: &'a [BiasGroup],
     /// Bias groups of each sensor.
     pub biases: [usize; 2],
@@ -84,7 +84,7 @@ impl<'a> BiasBlocks<'a> {
         self.biases[0] + self.biases[1] + before
     }
 
-    /// The same blocks with transition 1 and no noise: for a map between samples, which moves no bias.
+    /// Blocks with transition 1 and no noise: for a map between samples, which moves no bias.
     pub(super) fn with_identity_transition(self) -> Self {
         Self {
             steps: &CONSTANT_BIASES[..self.steps.len()],
@@ -169,18 +169,19 @@ impl Covariance {
     }
 
     /// P⁺ = A P Aᵀ + Q for a map A of the navigation error and the transition of the biases; the biases
-    /// take their step first: `b_k = phi b_{k−1} + w`, and the map uses `b_k`.
+    /// take their step first: `b_k = phi b_{k−1} + w`, and the map uses `b_k`. Q holds the
+    /// innovations of the biases only; `Ekf::add_white_noise` adds the sensors' white noise.
     #[inline(always)]
     pub(super) fn step<W: Wide>(&mut self, map: &impl ErrorMap<W>, sources: &BiasBlocks<'_>) {
         self.step_biases::<W>(sources.steps);
         let n = self.dim;
-        // A P, the navigation columns apart: they are read again below.
+        // A P: navigation columns into scratch, since P is still read.
         for j in 0..NAV {
             let [accel, gyro] = self.column_errors(j, sources);
             let after = map.apply(load_error(&self.p[j * n..]), accel, gyro);
             store_error(&mut self.columns[j], &after);
         }
-        // Columns of the biases: among themselves they have taken their step, with the navigation not yet.
+        // Columns of the biases: P_bb is already stepped; P_nb still lacks its factor phi.
         for j in NAV..n {
             let phi = W::from(sources.steps[j / 3 - BIAS].phi[j % 3]);
             let (nav, rest) = self.p[j * n..(j + 1) * n].split_at_mut(NAV);

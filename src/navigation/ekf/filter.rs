@@ -137,12 +137,12 @@ impl Ekf {
         }
     }
 
-    /// The same filter with another update by fixes.
+    /// The filter with another update by fixes.
     pub(crate) fn with_update(self, fix_update: FixUpdate) -> Self {
         Self { fix_update, ..self }
     }
 
-    /// The same filter with other vector units, for comparison; portable where the machine lacks them.
+    /// The filter with other vector units, for comparison; portable where the machine lacks them.
     pub fn at_level(self, level: Level) -> Self {
         Self { level, ..self }
     }
@@ -310,8 +310,8 @@ fn attitude_covariance(state: &NavState, sigma_deg: [f64; 3]) -> Matrix3<f64> {
     psi * Matrix3::from_diagonal(&variances.into()) * psi.transpose()
 }
 
-/// Brings the covariance up to the time of the last sample (the Earth terms lag by up to
-/// `EARTH_STEP_S`): to be called before it is examined.
+/// Applies the Earth-rate terms not yet propagated (they lag by up to `EARTH_STEP_S`). Call before reading the
+/// covariance.
 pub fn apply_pending_earth_step(ekf: &mut Ekf) {
     dispatch(ekf.level, ApplyEarthStep(ekf));
 }

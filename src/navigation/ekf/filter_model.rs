@@ -46,7 +46,7 @@ pub enum FilterModelError {
     Reduction {
         /// The axis.
         channel: Channel,
-        /// Why.
+        /// Reason of the refusal.
         source: reduction::ReductionError,
     },
     /// A setting that leaves the model no such filter: nothing is wrong with the model.
@@ -85,7 +85,7 @@ impl BiasGroup {
         self.innovation == DVec3::ZERO && self.phi == DVec3::ONE
     }
 
-    /// The same bias with a step of `ratio` samples, which need not be whole: a Gauss-Markov process keeps its
+    /// The bias with a step of `ratio` samples, which need not be whole: a Gauss-Markov process keeps its
     /// correlation time and variance, a random walk its growth. A coefficient ≤ 0 belongs to no process in
     /// continuous time and is left as it is.
     pub(crate) fn over(&self, ratio: f64) -> Self {

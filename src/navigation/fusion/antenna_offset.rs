@@ -275,7 +275,7 @@ impl Whiteness {
         Self::of_part(fixes, PARTS[0])
     }
 
-    /// The same of three of their components.
+    /// Statistics of three components of the fixes.
     fn of_part<'a>(fixes: impl IntoIterator<Item = &'a FixRecord>, first: usize) -> Option<Self> {
         let normalised = |f: &FixRecord| -> Vec<f64> {
             let both = f.innovation.iter().zip(&f.sigma);
@@ -354,7 +354,7 @@ impl WeightedSolution {
 /// [`fuse`] with the standard deviations that the correlation of the fixes asks for.
 ///
 /// # Errors
-/// Those of [`fuse`].
+/// As [`fuse`].
 pub fn fuse_correlated(
     recorded: &DriveData<'_>,
     filter_model: &FilterModel,

@@ -105,7 +105,7 @@ pub enum SetupFault {
         cause: &'static str,
         /// Errors over standard deviations, root mean square, as they are.
         times: f64,
-        /// The same after the transformation.
+        /// Errors over standard deviations after the transformation.
         left: f64,
     },
     /// Another clock or another point of the vehicle.
@@ -119,7 +119,7 @@ pub struct Judgement {
     pub kind: VerdictKind,
     /// Verdict on the errors over their standard deviations; none without standard deviations.
     pub stated: Option<DriveVerdict>,
-    /// The same without the offset that was found.
+    /// Verdict without the offset that was found.
     pub without_offset: Option<DriveVerdict>,
     /// Other explanations of the errors.
     pub doubts: Vec<SetupFault>,
@@ -282,7 +282,7 @@ fn error(row: &StatedRow, reference: &Reference, offset: ReferenceOffset) -> Opt
     error_after(row, reference, offset, |truth| truth, |sigma| sigma)
 }
 
-/// The same with another truth and other standard deviations.
+/// Errors of a row with another truth and other standard deviations.
 fn error_after(
     row: &StatedRow,
     reference: &Reference,
@@ -374,7 +374,7 @@ const fn identity(truth: NavState) -> NavState {
     truth
 }
 
-/// The same with other roll, pitch and yaw (rad).
+/// The state with other roll, pitch and yaw (rad).
 fn with_angles(truth: NavState, map: fn([f64; 3]) -> [f64; 3]) -> NavState {
     let own = RollPitchYaw::from_quat(truth.q_b_n);
     let [roll, pitch, yaw] = map([own.roll, own.pitch, own.yaw]);

@@ -106,7 +106,7 @@ pub struct DriveData<'a> {
 }
 
 impl<'a> DriveData<'a> {
-    /// The same with other fixes.
+    /// The data with other fixes.
     const fn with_gnss(self, gnss: &'a [GnssFix]) -> Self {
         Self { gnss, ..self }
     }
@@ -264,7 +264,7 @@ pub struct FixRecord {
     pub sigma: Vec<f64>,
     /// Normalised innovation squared.
     pub nis: f64,
-    /// The same of the horizontal position alone: chi-square of two degrees if right.
+    /// NIS of the horizontal position alone: chi-square of two degrees if right.
     pub horizontal_nis: f64,
     /// Horizontal standard deviation of the IMU's position just before, by the filter alone (m).
     pub horizontal_sigma_m: f64,
@@ -277,7 +277,7 @@ pub struct FixRecord {
 pub struct Solution {
     /// States at `rows_hz`.
     pub rows: Vec<SolutionRow>,
-    /// The same rows smoothed, where that was asked for.
+    /// The smoothed rows, if requested.
     pub smoothed: Option<Vec<SolutionRow>>,
     /// Every fix from start to end of the IMU.
     pub fixes: Vec<FixRecord>,

@@ -27,7 +27,7 @@ const DETERMINED: f64 = 5.0 * DEG;
 pub struct Mounting {
     /// Takes the IMU's axes, returns front, right, down.
     pub q_s_b: DQuat,
-    /// The same angles beside the axes that the search began with: what a user gives for the next drive.
+    /// Angles relative to the axes that the search began with: what a user gives for the next drive.
     pub angles: RollPitchYaw,
     /// Standard deviations about the vehicle's front, right and down axes (rad).
     pub sigma_b: DVec3,

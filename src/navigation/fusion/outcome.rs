@@ -37,7 +37,8 @@ pub struct OutageDrift {
     pub end_from_reference: Option<EndError>,
 }
 
-/// Innovations of the fixes that end outages and gaps, all together: the only ones that the filter was not led to.
+/// Innovations of the fixes that end outages and gaps: unlike those of consecutive fixes they test the free-inertial
+/// drift.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OutageEnds {
     /// Number of outages and gaps.
@@ -96,7 +97,7 @@ pub struct FusionFigures {
 pub struct FromReference {
     /// Root mean square in each state.
     pub rmse: PerState<f64>,
-    /// The same of the horizontal distance (m).
+    /// RMSE of the horizontal distance (m).
     pub horizontal_rmse_m: f64,
     /// Largest horizontal distance (m).
     pub horizontal_max_m: f64,
@@ -118,7 +119,7 @@ pub struct FromReference {
 pub struct SmoothedOutcome {
     /// Root mean square of the smoothed horizontal standard deviation (m).
     pub horizontal_sigma_rms_m: f64,
-    /// The same of the filter's (m).
+    /// Root mean square of the filter's horizontal standard deviation (m).
     horizontal_sigma_rms_filter_m: f64,
     /// Differences of the smoothed rows from the reference.
     pub reference: Option<FromReference>,
@@ -142,7 +143,7 @@ pub struct SmoothedOutage {
     pub horizontal_max_filter_m: Option<f64>,
 }
 
-/// The figures of a solution with these outages.
+/// Figures of a solution: fixes, NIS, errors at the ends of outages and against the reference.
 pub fn outcome(solution: &Solution, outages: &[Outage]) -> FusionFigures {
     let outliers = outliers(solution);
     let rejected = outliers.as_ref().map_or(0, |outliers| outliers.t_s.len());
@@ -175,11 +176,11 @@ fn outliers(solution: &Solution) -> Option<Outliers> {
     })
 }
 
-/// Time without a fix from which one is a test of the IMU (s), and how many of their median interval.
+/// Shortest gap between fixes that counts as an outage (s), and in median fix intervals.
 pub(super) const APART: (f64, f64) = (10.0, 5.0);
 
-/// The fixes that nothing was used before for so long. Their horizontal innovations are two normal numbers each, and the
-/// sum of m of their squares, normalised, is chi-square of 2m degrees.
+/// Innovations of the fixes that end an outage or gap. Under a consistent filter the sum of m horizontal NIS is
+/// chi-square with 2m degrees of freedom.
 fn ends(solution: &Solution) -> Option<OutageEnds> {
     let known: Vec<&FixRecord> = solution.fixes.iter().filter(|f| f.used).collect();
     let steps = known.windows(2).map(|w| w[1].t_s - w[0].t_s);
@@ -199,7 +200,7 @@ fn ends(solution: &Solution) -> Option<OutageEnds> {
     })
 }
 
-/// Mean NIS of the fixes used, divided by their number of components.
+/// Mean NIS of the fixes used or rejected, divided by their number of components.
 pub(super) fn nis_per_component(solution: &Solution) -> f64 {
     let (nis, components) = total_nis(not_withheld(solution));
     nis / components as f64
@@ -321,13 +322,13 @@ fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
 
 // Worth of a solution: by its own innovations, and by a reference where there is one.
 
-/// NIS per component that is doubtful, and that is too large: innovations 1.4 times and twice as large as stated.
-/// Receivers state their standard deviations to a factor like that; right solutions of real drives have a NIS below
+/// NIS per component above which a solution is doubtful (innovations √2 times as large as stated), and overconfident
+/// (twice). The sigmas that receivers state are off by such factors; right solutions of real drives have a NIS below
 /// 1.5, most of them far below 1.
 const NIS_LIMITS: (f64, f64) = (2.0, 4.0);
-/// NIS per component below which the fixes do not tell: their standard deviations are too large.
+/// NIS per component below which the stated sigmas of the fixes are too large to decide.
 const NIS_LOW: f64 = 0.5;
-/// Components of which the mean NIS of a right filter stays below the first limit.
+/// Components with which the mean NIS of a consistent filter stays below the first limit.
 const MIN_COMPONENTS: usize = 50;
 /// Stretch in which the NIS is examined by itself (s), and the share of bad ones that is too much.
 const STRETCH_S: f64 = 60.0;
@@ -358,7 +359,7 @@ pub enum Finding {
         lag_1: f64,
         /// Factor on the stated standard deviation of position in the filter.
         pos_sigma_factor: f64,
-        /// The same of velocity.
+        /// Factor on the standard deviation of velocity.
         vel_sigma_factor: f64,
     },
     /// Mean NIS of the fixes used.
@@ -395,7 +396,7 @@ pub enum Finding {
     Withheld(WithheldWindows),
 }
 
-/// VerdictKind and evidence.
+/// Verdict and the findings it rests on.
 #[derive(Debug, Clone)]
 pub struct FusionAssessment {
     /// The gravest of the findings.
@@ -427,7 +428,7 @@ pub fn assess(
     let of_fixes = weighed.with_stated_sigmas();
     let correlated = correlated(weighed);
     findings.push(match (nis(of_fixes), correlated) {
-        // errors that last make small innovations of right standard deviations
+        // time-correlated fix errors make the NIS low even if the stated sigmas are right
         ((VerdictKind::Undecided, Finding::Nis { .. }), Some(correlated)) => correlated,
         (nis, _) => nis,
     });
@@ -442,7 +443,7 @@ pub fn assess(
     });
     let of_windows = withheld.map(|found| (found.verdict.kind, Finding::Withheld(found)));
     let errors: Vec<_> = of_windows.into_iter().chain(of_reference).collect();
-    // errors tell what innovations do not; one kind of them is enough where it finds no fault
+    // errors against a reference, or at withheld fixes, outweigh innovations: their undecided findings are dropped
     let is_told = |finding: &Finding| matches!(finding, Finding::Correlated { .. });
     if !errors.is_empty() {
         // windows show what the IMU does, and not that the fixes are better than stated
@@ -492,7 +493,7 @@ fn correlated(weighed: &WeightedSolution) -> Option<(VerdictKind, Finding)> {
     Some((verdict, found))
 }
 
-/// The fixes that were used, or would have been but for the gate.
+/// Fixes that were not withheld: used, or rejected by the gate.
 pub(super) fn not_withheld(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
     let fixes = solution.fixes.iter();
     fixes.filter(|f| f.used || f.rejected_above.is_some())
@@ -554,7 +555,7 @@ fn stretches(solution: &Solution) -> Option<(VerdictKind, Finding)> {
     Some((too_large(is_much), minutes))
 }
 
-/// Mean NIS per component of the nearest nine tenths of these fixes, where it is too large.
+/// NIS per component of these fixes without the largest tenth; `None` if it is not too large.
 fn trimmed_nis_if_too_large(fixes: &[&FixRecord]) -> Option<f64> {
     let mut sorted = fixes.to_vec();
     sorted.sort_by(|a, b| a.nis.total_cmp(&b.nis));

@@ -524,7 +524,7 @@ pub(super) fn rates(samples: &[ImuIncrement]) -> (f64, [DVec3; 2]) {
     (seconds, [mean(|s| s.dv), mean(|s| s.dtheta)])
 }
 
-/// Which samples of a recording are bridges, and how far from the truth.
+/// Interpolated samples of a recording, and how far from the truth.
 struct GapFiller<'a> {
     imu: &'a [ImuIncrement],
     step_s: f64,

@@ -73,7 +73,7 @@ fn recorded(imu: &[ImuIncrement], channel: Channel) -> f64 {
     (OF_MAD * median(fourth).unwrap_or(0.0)).powi(2) / OF_FOURTH
 }
 
-/// The same of a model, in so much of its own band, by the spectrum of its processes.
+/// White noise of a model in this share of its band, by the spectrum of its processes.
 fn stated(axis: &Composite, band: f64) -> f64 {
     const STEPS: u32 = 256;
     let power = (0..STEPS).map(|k| {

@@ -39,7 +39,7 @@ pub struct WithheldWindows {
 /// without fixes, of no windows where the drive is too short for one.
 ///
 /// # Errors
-/// Those of [`fuse`].
+/// As [`fuse`].
 pub fn withheld(
     recorded: &DriveData<'_>,
     filter_model: &FilterModel,

@@ -232,7 +232,7 @@ pub fn chi_square_band(dof: usize, count: f64) -> Band {
     chi_square_interval(dof, count, 0.025)
 }
 
-/// The same with probability `tail` on each side. `count` need not be whole: so many independent values the
+/// Interval of chi-square with probability `tail` on each side. `count` need not be whole: so many independent values the
 /// mean is worth.
 pub(crate) fn chi_square_interval(dof: usize, count: f64, tail: f64) -> Band {
     if dof == 0 || count.is_nan() || count <= 0.0 {
@@ -396,7 +396,7 @@ impl QuadraticForm {
         sums.map(|sum| 2.0 / n * sum)
     }
 
-    /// The same on the vertical line through the saddle point, where the shifts make the integrand fall as a normal
+    /// The sums on the vertical line through the saddle point, where the shifts make the integrand fall as a normal
     /// density: by the trapezoidal rule, until nothing is added.
     fn along_line(&self, x: f64) -> [f64; 2] {
         let (saddle, width) = self.saddle(x);

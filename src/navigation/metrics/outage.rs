@@ -119,7 +119,7 @@ pub struct EpochMetrics {
     /// Averaged standard estimation error: mean over runs of the filter's own standard deviation
     /// ([Minaretzis et al.](crate::bibliography::Minaretzis24), Section V).
     pub asee: PerState<Estimate>,
-    /// The same of each sensor's bias (m/s², rad/s).
+    /// ASEE of each sensor's bias (m/s², rad/s).
     pub bias_asee: [f64; BIASES],
     /// Root mean square error.
     pub rmse: PerState<Estimate>,

@@ -237,7 +237,7 @@ struct Pairing {
     paired: bool,
     /// Independent windows of noise, where they are limited.
     windows: Option<f64>,
-    /// Which side, candidate or reference, has no Monte-Carlo error.
+    /// The side, candidate or reference, has no Monte-Carlo error.
     is_expected: [bool; 2],
 }
 

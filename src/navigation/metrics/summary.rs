@@ -106,7 +106,7 @@ pub struct OutageSummary {
     /// 95 % interval of the ASEE that the calibration of the model leaves: what a filter would state whose model were
     /// known for certain, by covariance analysis; of a model that has its draws beside it.
     pub asee_end_ci95: Option<PerState<(f64, f64)>>,
-    /// The same of the mean over the outage's epochs of the ASEE.
+    /// 95 % interval of the mean over the outage's epochs of the ASEE.
     pub asee_mean_ci95: Option<PerState<(f64, f64)>>,
     /// 95 % interval of the RMSE of this filter due to the calibration of what makes the errors; as above.
     pub rmse_end_ci95: Option<PerState<(f64, f64)>>,
@@ -396,7 +396,7 @@ pub struct ReductionQuality {
     /// True RMSE over the filter's own standard deviation at the end of each outage: above 1 it is
     /// overconfident, below 1 overcautious.
     pub outage_end: Vec<PerState<f64>>,
-    /// The same, mean over all epochs after the start.
+    /// RMSE over the filter's own standard deviation, mean over all epochs after the start.
     pub mean: PerState<f64>,
     /// Expected NEES, mean over all epochs after the start; 9 is right.
     pub nees: f64,

@@ -97,7 +97,7 @@ pub struct Verdict {
     pub independent_samples: f64,
     /// The error over standard deviation, common to all states, from which on these samples would tell it.
     pub detectable_ratio: f64,
-    /// The same of the state that is known least.
+    /// Smallest error/σ that would be found in the state that is known least.
     pub detectable_state_ratio: f64,
     /// Factor on the number of samples that would decide; none (null) where the verdict is decided.
     pub times_to_decide: Option<f64>,
@@ -197,7 +197,7 @@ pub(super) fn verdicts(
     (verdict, judge.outages(outages, lost))
 }
 
-/// The same from the run whose squares are the expected ones: nothing is left to chance, and what is off by more than
+/// Verdict from the run whose squares are the expected ones: nothing is left to chance, and what is off by more than
 /// the tolerance is wrong. Where errors are beyond linear theory, finding no fault is no proof.
 pub(super) fn expected(
     record: &RunRecord,

@@ -125,7 +125,7 @@ impl AidingSettings {
         }
     }
 
-    /// The same with a wheel whose scale is off by one per cent, of which the filter has a state.
+    /// Aiding of a car with a wheel whose scale is off by one per cent, of which the filter has a state.
     pub fn car_with_odometer() -> Self {
         let truth = OdometerErrors {
             scale_sigma: 0.01,
@@ -282,7 +282,7 @@ pub(crate) struct AidError {
     is_felt: bool,
 }
 
-/// Which of them.
+/// Part of an aiding error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum AidPart {
     MountingPitch,
@@ -373,7 +373,7 @@ impl AidPart {
 /// Time behaviour of an error.
 #[derive(Clone, Copy)]
 pub(crate) enum ErrorProcess {
-    /// The same value in every run.
+    /// One value in every run.
     Known(f64),
     /// A constant of each run, of this standard deviation.
     Constant(f64),

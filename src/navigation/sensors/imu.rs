@@ -57,7 +57,7 @@ impl Truth<'_> {
     /// Checks that `samples` samples at `imu_hz` can be had.
     ///
     /// # Errors
-    /// What is missing, and by how much.
+    /// The data missing, and by how much.
     pub(crate) fn check(&self, imu_hz: f64, samples: usize) -> Result<(), TruthError> {
         let check_model = |model: &Model| match same_rate(model.rate_hz, imu_hz) {
             true => Ok(()),

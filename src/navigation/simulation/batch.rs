@@ -100,7 +100,7 @@ fn use_aid(ekf: &mut Ekf, plan: &Plan<'_>, aid: Aid, value: &Vec3) {
 /// One filter on eight runs, and what is kept of it.
 struct LaneFilter<'a> {
     ekf: Ekf,
-    /// The same along the reference, where runs share its gains.
+    /// The filter along the reference, if runs share its gains.
     shared: Option<&'a SharedFilter>,
     live: usize,
     trace: Vec<EpochLanes>,

@@ -62,7 +62,7 @@ impl Experiment<'_> {
     }
 }
 
-/// Why an experiment cannot be run.
+/// Reason that an experiment cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum ExperimentError {
     /// Trajectory, IMU and filter do not fit together.
@@ -124,7 +124,7 @@ impl<'a> Plan<'a> {
     /// Computes the ideal IMU and the schedule, and checks that everything fits together.
     ///
     /// # Errors
-    /// What does not fit, with values.
+    /// The contradiction, with values.
     pub fn new(experiment: &'a Experiment<'a>) -> Result<Self, ExperimentError> {
         let rate_hz = experiment.rate_hz;
         for filter_model in experiment.filter_models {

@@ -49,9 +49,9 @@ pub enum TrajectoryError {
     /// NaN or infinity.
     #[error("{what} = {value} is not a finite number")]
     NotFinite {
-        /// Which sample.
+        /// Index of the sample.
         index: usize,
-        /// Which quantity.
+        /// Name of the quantity.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -59,7 +59,7 @@ pub enum TrajectoryError {
     /// Time stands still or goes back.
     #[error("time goes from {previous_s} s to {t_s} s: it must increase")]
     Time {
-        /// Which sample.
+        /// Index of the sample.
         index: usize,
         /// Its time.
         t_s: f64,
@@ -69,7 +69,7 @@ pub enum TrajectoryError {
     /// Too near a pole, or not a latitude.
     #[error("latitude {lat_deg}° at {t_s} s is beyond ±89.9°")]
     Latitude {
-        /// Which sample.
+        /// Index of the sample.
         index: usize,
         /// Its time.
         t_s: f64,
@@ -79,7 +79,7 @@ pub enum TrajectoryError {
     /// More than 60° of rotation from one sample to the next.
     #[error("attitude turns {angle_deg:.1}° between {previous_s} s and {t_s} s: more than 60°")]
     Rotation {
-        /// Which sample.
+        /// Index of the sample.
         index: usize,
         /// Its time.
         t_s: f64,
@@ -178,7 +178,7 @@ impl Trajectory {
         self.curve.knots()
     }
 
-    /// The same motion as far as its first sample at or after `t_s`.
+    /// The motion as far as its first sample at or after `t_s`.
     pub fn until(&self, t_s: f64) -> Self {
         Self::of(self.origin_e, self.curve.until(t_s))
     }

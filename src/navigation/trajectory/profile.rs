@@ -247,7 +247,7 @@ impl Profile {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{}: \"{}\" {problem}", place(*segment), problem.key)]
 pub struct ProfileError {
-    /// Which segment, counted from 0; none for the profile's own keys and its start.
+    /// Index of the segment, counted from 0; none for the profile's own keys and its start.
     pub segment: Option<usize>,
     /// The problem.
     pub problem: Problem,

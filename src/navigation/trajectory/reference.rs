@@ -57,7 +57,7 @@ impl From<Trajectory> for Reference {
     }
 }
 
-/// Why samples are left out.
+/// Reason that samples are left out.
 #[derive(Debug, Clone)]
 pub enum Fault {
     /// No samples for so long (s).
@@ -105,7 +105,7 @@ impl Reference {
         Some(self.stretch(t_s)?.curve.state(t_s))
     }
 
-    /// The same of a point of the vehicle that is `arm_b` (front, right, down, m) from the reference's.
+    /// State of a point of the vehicle that is `arm_b` (front, right, down, m) from the reference's.
     pub fn state_of_point(&self, t_s: f64, arm_b: DVec3) -> Option<NavState> {
         let curve = &self.stretch(t_s)?.curve;
         let state = curve.state(t_s);

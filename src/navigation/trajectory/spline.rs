@@ -59,7 +59,7 @@ impl<const N: usize> Spline<N> {
         &self.t
     }
 
-    /// The same curve as far as the first knot at or after `t`.
+    /// The curve as far as the first knot at or after `t`.
     pub(super) fn until(&self, t: f64) -> Self {
         // The second derivatives are kept, not solved for anew: the curve before the cut is the same to the
         // last bit.

@@ -68,7 +68,7 @@ impl Lanes {
     /// All lanes zero.
     pub const ZERO: Self = Self([0.0; LANES]);
 
-    /// The same value in every lane.
+    /// One value in every lane.
     #[inline(always)]
     pub const fn splat(value: f64) -> Self {
         Self([value; LANES])
@@ -300,7 +300,7 @@ impl Vec3 {
 }
 
 impl<L: Real> Vec3<L> {
-    /// The same vector in every lane.
+    /// One vector in every lane.
     #[inline(always)]
     pub fn splat(v: glam::DVec3) -> Self {
         Self([L::from(v.x), L::from(v.y), L::from(v.z)])
@@ -488,7 +488,7 @@ impl Quat {
 }
 
 impl<L: Real> Quat<L> {
-    /// The same rotation in every lane.
+    /// One rotation in every lane.
     #[inline(always)]
     pub fn splat(q: glam::DQuat) -> Self {
         Self {

@@ -5,7 +5,7 @@ use super::{LANES, Lanes, Real};
 
 /// Eight lanes as a kernel computes with them.
 pub trait Wide: Real {
-    /// The same register as integers.
+    /// The register as integers.
     type Bits: Bits;
     /// From memory.
     fn load(lanes: &Lanes) -> Self;
@@ -23,7 +23,7 @@ pub trait Bits: Copy {
     fn load(lanes: &[u64; LANES]) -> Self;
     /// To memory.
     fn store(self, lanes: &mut [u64; LANES]);
-    /// The same value in every lane.
+    /// One value in every lane.
     #[inline(always)]
     fn splat(value: u64) -> Self {
         Self::load(&[value; LANES])

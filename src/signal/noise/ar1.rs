@@ -24,7 +24,7 @@ pub(super) fn haar_shape(phi: f64, level: u32) -> (f64, f64) {
     }
 }
 
-/// The same in kappa = −ln phi > 0, the inverse correlation time in samples: value and derivative with
+/// Haar shape in kappa = −ln phi > 0, the inverse correlation time in samples: value and derivative with
 /// respect to kappa. Keeps the digits of a kappa too small to be told from 0 in phi.
 pub(super) fn haar_shape_of_kappa(kappa: f64, level: u32) -> (f64, f64) {
     if kappa < LN_2 && level > 1 {
@@ -172,7 +172,7 @@ fn ramp(x: f64) -> (f64, f64) {
     (f, (2.0 * (1.0 - e) * (1.0 - e) / (x * x) - 3.0 * f) / x)
 }
 
-/// The same by f = Σ_{n≥3} (−1)^n (4 − 2^n) x^(n−3)/n!, for small x.
+/// The ramp by f = Σ_{n≥3} (−1)^n (4 − 2^n) x^(n−3)/n!, for small x.
 fn ramp_series(x: f64) -> (f64, f64) {
     let (mut f, mut df) = (0.0, 0.0);
     for &c in RAMP.iter().rev() {

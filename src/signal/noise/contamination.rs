@@ -112,7 +112,7 @@ pub struct Rule {
 pub struct RefusedRule {
     /// Place of the rule.
     pub place: String,
-    /// Why.
+    /// Reason of the refusal.
     pub source: Refused,
 }
 

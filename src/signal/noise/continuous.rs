@@ -40,7 +40,7 @@ impl Process {
     }
 }
 
-/// The same noise sampled at another rate.
+/// The noise model sampled at another rate.
 ///
 /// # Errors
 /// When a process is tied to its own rate: QN, MA1, an AR1 with phi ≤ 0.

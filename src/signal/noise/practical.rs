@@ -190,7 +190,7 @@ struct Point {
     samples: u32,
     /// Allan variance of the whole model.
     whole: f64,
-    /// The same without quantization noise and drift.
+    /// Allan variance without quantization noise and drift.
     carried: f64,
 }
 

@@ -660,7 +660,7 @@ impl Process {
         }
     }
 
-    /// The same process sampled at another rate: white noise keeps its density, a random walk its growth per second, a
+    /// The process sampled at another rate: white noise keeps its density, a random walk its growth per second, a
     /// Gauss-Markov process its correlation time and variance.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use super::{Composite, ParameterError, Process, ProcessKind};
 use crate::minimise::{Descent, MOST, Matrix};
 
 /// Longest time scale that matters to a filter whose longest outage is given (s): eight times the outage,
-/// at least 800 s. A window that ends with the outage makes the filter trust itself too much.
+/// at least 800 s. A window no longer than the outage makes the filter overconfident.
 #[must_use]
 pub fn window_s(longest_outage_s: f64) -> f64 {
     (8.0 * longest_outage_s).max(800.0)
@@ -28,7 +28,7 @@ pub struct ReducedModel {
     pub misfit: f64,
 }
 
-/// Why a model could not be reduced.
+/// Reason that a model could not be reduced.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ReductionError {
     /// A parameter left its domain.
@@ -182,7 +182,7 @@ impl WaveletFit {
 
     fn refine(&self, start: [f64; 3]) -> [f64; 3] {
         let descent = Descent {
-            // The logarithms of all numbers there are.
+            // Range of ln x for any f64.
             ranges: &[(-700.0, 700.0); 3],
             damping: 1e-3,
             enough: |cost| 1e-15 * cost,
@@ -196,7 +196,7 @@ impl WaveletFit {
         std::array::from_fn(|i| found.at[i])
     }
 
-    /// Half the gradient of the cost and half of Gauss and Newton's second derivatives.
+    /// Half the gradient and half the Gauss–Newton Hessian of the cost.
     fn normal_equations(&self, x: &[f64]) -> (Vec<f64>, Matrix) {
         let (white, variance, kappa) = (x[0].exp(), x[1].exp(), x[2].exp());
         let (mut normal, mut gradient) = ([[0.0; MOST]; MOST], vec![0.0; 3]);

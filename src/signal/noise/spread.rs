@@ -276,9 +276,9 @@ pub struct VirtualImu<'a> {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{source} (replicate {replicate})")]
 pub struct ReplicateError {
-    /// Which replicate, counted from 1.
+    /// Index of the replicate, counted from 1.
     pub replicate: u64,
-    /// Why.
+    /// Reason of the refusal.
     pub source: RefusedRule,
 }
 

@@ -40,7 +40,7 @@ impl Synthesizer {
 }
 
 impl Synthesizer<LaneGenerator> {
-    /// The same of at most eight runs; the composites have the same processes, with parameters of their own. Lanes
+    /// The noise of at most eight runs; the composites have the same processes, with parameters of their own. Lanes
     /// beyond the runs are zero.
     pub fn lanes(runs: &[(&Composite, StreamKey<'_>)]) -> Self {
         Self::of(runs)
@@ -293,7 +293,7 @@ pub enum UnitDistribution {
 pub trait Streams: std::fmt::Debug + Clone {
     /// A number of each stream.
     type Sample: Real + std::fmt::Debug;
-    /// The same in a register.
+    /// The recursion in a register.
     type Register<W: Wide>: Real;
     /// The streams at their beginning.
     fn new(keys: &[StreamKey<'_>]) -> Self;
@@ -482,7 +482,7 @@ mod tests {
         source: "accel.x",
         process: "",
     };
-    /// How many standard deviations a statistic may be off: 2·Φ(−5) = 6e-7 a comparison.
+    /// Standard deviations that a statistic may be off: 2·Φ(−5) = 6e-7 a comparison.
     const SIGMAS: f64 = 5.0;
 
     fn white() -> Process {

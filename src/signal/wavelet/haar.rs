@@ -203,7 +203,7 @@ impl Curve {
     /// Degrees of freedom that are accepted.
     pub const EDOF_RANGE: (f64, f64) = (1e-15, 1e15);
 
-    /// The same of recordings that differ by another variance of ln nu besides.
+    /// The curve of recordings that differ by another variance of ln nu besides.
     pub fn widened(&self, variance: f64) -> Self {
         Self {
             differing: self.differing + variance,

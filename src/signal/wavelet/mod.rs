@@ -20,7 +20,7 @@ pub use gappy::{GappyVariances, gappy};
 pub use haar::{Curve, classical};
 pub use robust::{QuantizationResponse, RobustVariance, RootStatus, Tuning, classical_and_robust};
 
-/// Why there is no wavelet variance.
+/// Reason that there is no wavelet variance.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum WaveletError {
     /// The last level has no coefficient.

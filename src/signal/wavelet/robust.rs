@@ -16,13 +16,12 @@ use multiversion::multiversion;
 use statrs::function::erf::erf;
 use std::f64::consts::{PI, SQRT_2};
 
-/// Kind of root that a robust variance is.
+/// Kind of root that a robust variance is at one level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RootStatus {
     /// The falling root.
     Ok,
-    /// The steps of a quantiser move it, or leave more than half of the coefficients at zero: the classical variance is
-    /// the better known one.
+    /// Quantization moved the root or zeroed half of the coefficients: the classical variance is used.
     Coarse,
     /// No admissible root (too many gross outliers, or too few coefficients): the value that comes closest.
     NoRoot,
@@ -43,9 +42,9 @@ pub struct RobustVariance {
     pub zeros: f64,
 }
 
-/// Share of zeros from which the steps of a quantiser count. By the exact law of rounded Gaussian numbers (0.15 to 1.5 steps, any
-/// offset, differences of up to 512 of them, efficiencies from 0.4) the variance is within 1.3 % of the truth where fewer are zero,
-/// and up to 50 % off where half are: a mean of numbers that rarely leave their step is no Gaussian number.
+/// Share of zero coefficients above which quantization biases the robust variance. Exact computation for rounded
+/// Gaussian samples (0.15 to 1.5 steps, any offset, differences of up to 512 of them, efficiencies from 0.4): bias ≤
+/// 1.3 % below a tenth, up to 50 % at a half.
 const MOST_ZEROS: f64 = 0.1;
 /// A coefficient below so many standard deviations is zero but for rounding; of Gaussian ones 0.08 % are.
 const ZERO: f64 = 1e-3;
@@ -92,7 +91,7 @@ pub fn classical_and_robust(
         let begin = IterationStart::new(count, |t| (sums[t + half] - sums[t]).powi(2), tuning);
         squares.resize(count, 0.0);
         let mut first = [0.0; 3];
-        // The first sums of the equation in the pass that makes the squares: of long records memory costs more than numbers.
+        // The first sums of the equation in the pass that makes the squares: long records are memory-bound.
         let classical = pyramid.advance(|sums, half| {
             let k = 1.0 / (tuning.c() * tuning.c() * begin.start);
             step_measuring(sums, half, &mut squares, k, &mut first)
@@ -321,7 +320,7 @@ impl Equation<'_> {
         u.exp()
     }
 
-    /// The largest g within a step of the march around s, by golden section.
+    /// Largest g within one step of the search around s, by golden section.
     fn local_maximum(&self, s: f64) -> (f64, f64) {
         // g is flat at its maximum: 1e-7 of ln s is 1e-14 of g, and a comparison of two g tells no more.
         let (u, step) = (s.ln(), STEP.ln());

@@ -17,7 +17,7 @@ use nalgebra::SMatrix;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Yaw error over that of attitude at a pitch of 80°: 1/cos(pitch).
+/// Yaw error over attitude error, 1/cos(80°), above which roll and yaw are not separable.
 const MAX_YAW_GAIN: f64 = 5.76;
 
 /// Ratio of a filter's covariance to that of its true errors, at one instant.
@@ -208,7 +208,7 @@ impl<'a> FilterPass<'a> {
         sigmas
     }
 
-    /// Their means over the reports within each of some outages.
+    /// Mean sigmas over the reports within each outage.
     pub fn sigma_means(&self, outages: &[Outage]) -> Vec<[f64; REPORTED]> {
         let of_outage = |outage: &Outage| {
             let within = self.stated().filter(|(mark, _)| outage.withholds(mark.t_s));
@@ -230,7 +230,7 @@ impl<'a> FilterPass<'a> {
         self.errors_as_expected(filter_model, truth).assessment()
     }
 
-    /// The same where settings state more of the true errors than a noise model.
+    /// Assesses the filter where settings state more of the true errors than a noise model.
     pub(super) fn assess_stated(
         &self,
         filter_model: &FilterModel,
@@ -262,7 +262,7 @@ impl<'a> FilterPass<'a> {
         self.errors_until(self.track.marks.len(), truth)
     }
 
-    /// The same at the ends of outages alone: what comes after the last is not computed.
+    /// Assesses the filter at the ends of outages alone: what comes after the last is not computed.
     pub fn errors_at_ends(&self, truth: &TruthModel) -> Vec<AssessedInstant> {
         let last = self
             .track
@@ -422,7 +422,7 @@ fn in_degrees(all: [f64; REPORTED], unit: f64) -> [f64; REPORTED] {
 /// Branches that are followed at a time: what they begin from is kept until then.
 const TOGETHER: usize = 256;
 
-/// Which moments of an outage are examined.
+/// Moments of an outage to examine.
 #[derive(PartialEq)]
 pub(crate) enum Moments {
     /// Its end: just before the first fix after it, or at the end of the track.

@@ -66,7 +66,7 @@ pub fn reduced_belief(
     search.filter_model(&search.minimise())
 }
 
-/// Which axes of a sensor are reduced alike.
+/// Axes of a sensor are reduced alike.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AxisGrouping {
     /// Front and right; down apart, whose gyroscope shows in the heading alone.
@@ -207,7 +207,7 @@ const OFF: f64 = 0.08;
 const OFF_WEIGHT: f64 = 0.4;
 /// Weight in the cost of the states whose ratio is off over the whole drive.
 const WAY: f64 = 0.3;
-/// The same for the mean NEES: the logarithm at which it begins to count, and its weight.
+/// Penalty on the mean NEES: the logarithm at which it begins to count, and its weight.
 const NEES_OFF: f64 = 0.03;
 const NEES_WEIGHT: f64 = 0.1;
 

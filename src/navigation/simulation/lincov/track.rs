@@ -66,7 +66,7 @@ impl MeasurementKind {
     /// Kinds: positions and velocities of fixes, heights, each aid.
     pub(super) const KINDS: usize = 3 + Aid::ALL.len();
 
-    /// Which of them.
+    /// Index among the kinds.
     pub(super) const fn kind(self) -> usize {
         match self {
             Self::Position(_) => 0,
@@ -89,7 +89,7 @@ pub(super) struct ScalarMeasurement {
     error_inputs: ErrorInputs,
     /// Variance of its white noise, as in the filter's model.
     pub r: f64,
-    /// The same in truth.
+    /// Variance of its true white noise.
     pub noise: f64,
     pub what: MeasurementKind,
     /// Velocity of the point of the vehicle (m/s) and acceleration (m/s²), in b.
@@ -244,8 +244,9 @@ impl Track {
         Ok(track.with_outages(experiment.outages))
     }
 
-    /// A track without outages, with some.
+    /// Copy of a track without outages, with these.
     pub fn with_outages(&self, outages: &[Outage]) -> Self {
+        debug_assert_eq!(self.outages, 0, "the track has outages already");
         let mut track = self.clone();
         track.outages = outages.len();
         for mark in &mut track.marks {
@@ -262,7 +263,8 @@ impl Track {
         track
     }
 
-    /// The same where a filter assumes the vehicle's own measurements to be so much worse; in truth they are as they were.
+    /// Copy in which the filter inflates the sigmas of the aiding measurements by `factor`; their true noise is
+    /// unchanged.
     pub fn with_aiding_sigmas(&self, factor: f64) -> Self {
         let mut track = self.clone();
         let believed = |row: &ScalarMeasurement| match row.what {
@@ -296,7 +298,7 @@ impl Track {
     }
 }
 
-/// The reference as the strapdown passes through it.
+/// State of the linearisation along the reference.
 struct Linearisation<'a> {
     experiment: &'a Experiment<'a>,
     /// The ideal IMU, and its first sample.
@@ -578,7 +580,7 @@ impl Kernel for Maps<'_> {
     }
 }
 
-/// The same matrix in every lane.
+/// A matrix in every lane.
 #[inline(always)]
 fn wide<W: Wide>(m: &Mat3<f64>) -> Mat3<W> {
     let mut wide = Mat3([[W::from(0.0); 3]; 3]);
@@ -658,7 +660,7 @@ impl Track {
         track
     }
 
-    /// The same with one step from mark to mark, at most a second: a few times faster. White noise is exact; a bias is
+    /// The track with one step from mark to mark, at most a second: a few times faster. White noise is exact; a bias is
     /// its mean over the step, which leaves up to 1e-4 of an error after ten seconds without fixes, 1.2e-3 after five.
     pub fn merged(&self) -> Self {
         self.with_legs(|leg| Step {
@@ -667,7 +669,7 @@ impl Track {
         })
     }
 
-    /// The same with a step of five seconds wherever one of these outages has lasted for a minute: a bias is its mean over the
+    /// The track with a step of five seconds wherever one of these outages has lasted for a minute: a bias is its mean over the
     /// step, which leaves up to 7e-4 of an attitude error where it changes within one, in turns.
     pub(crate) fn merged_for(&self, outages: &[Outage]) -> Self {
         let step_from = |begin: usize| {
@@ -859,7 +861,7 @@ impl Step {
         white
     }
 
-    /// The same with white noise through its mean over the step, as that of a bias.
+    /// The step with white noise through its mean over the step, as that of a bias.
     fn of_means(&self, next: &Self) -> Self {
         let none = [0.0; SIGNALS];
         let mut b: Vec<Nav> = self
@@ -943,7 +945,7 @@ const fn place(signal: usize) -> (usize, usize, ErrorInput) {
 /// of variance 1.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ErrorSourceState {
-    /// Which signal it is part of.
+    /// Signal that it is part of.
     pub signal: usize,
     before: f64,
     after: f64,

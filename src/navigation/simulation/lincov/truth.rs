@@ -139,7 +139,7 @@ impl TruthModel {
         }
     }
 
-    /// The same, with what the settings of the true IMU and of the receiver state in the place of what the filter
+    /// The truth with what the settings of the true IMU and of the receiver state in the place of what the filter
     /// expects: turn-on biases (a 0 too), scale factors and other errors of the IMU, correlated errors of positions. The strapdown errs.
     pub(super) fn as_stated(
         filter_model: &FilterModel,
