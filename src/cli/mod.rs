@@ -113,12 +113,12 @@ fn command() -> clap::Command {
 }
 
 /// The command line for help: each command with the common options that mean something for it; `--help` (`is_long`) has the whole
-/// description and every option, in the layout of `-h`.
-fn documented(is_long: bool) -> clap::Command {
-    let mut command = if is_long {
-        in_full(command())
-    } else {
-        command()
+/// description and every option, in the layout of `-h`. Without a command named they are listed by their first sentences.
+fn documented(is_long: bool, names_command: bool) -> clap::Command {
+    let mut command = match (is_long, names_command) {
+        (true, true) => in_full(command()),
+        (true, false) => command().mut_subcommands(|inner| inner.long_about(Resettable::Reset)),
+        (false, _) => command(),
     };
     command.build(); // hands the common options down
     of_use(command, "")
@@ -277,7 +277,12 @@ pub fn run(given: impl IntoIterator<Item = OsString>) -> u8 {
     };
     let is_long = has(&["--help"]) || words.get(1).is_some_and(|word| word == "help");
     let known = if is_long || has(&["-h"]) {
-        documented(is_long)
+        let all = command();
+        let is_command = |word: &OsString| {
+            word.to_str()
+                .is_some_and(|w| all.find_subcommand(w).is_some())
+        };
+        documented(is_long, words.iter().skip(1).any(is_command))
     } else {
         command()
     };
@@ -374,7 +379,7 @@ struct ManArgs {
 
 fn man(args: &ManArgs) -> Result<String, Failure> {
     let mut page = Vec::new();
-    let root = documented(true);
+    let root = documented(true, true);
     let of_command = match &args.command {
         None => root,
         Some(name) => {

@@ -691,9 +691,13 @@ impl RunValidator {
         }
         let mut options = asked.options.clone();
         options.insert("seed".to_owned(), vec![seed.to_string()]);
+        // A cell says whether it keeps the limits: under others it is another.
+        let limits = run.get("require").map(ToString::to_string);
+        options.extend(limits.map(|limits| ("require".to_owned(), vec![limits])));
         let manifest = Manifest::new(Run::NAME, options.clone(), inputs.clone());
         // What the filter states: its states, and its model where something else makes the errors.
         options.remove("states");
+        options.remove("require");
         if let Some(set) = options.get_mut("set") {
             set.retain(|setting| !setting.starts_with("filter.states="));
         }
