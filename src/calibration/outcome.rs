@@ -48,7 +48,7 @@ pub struct Outcome {
     pub fit: Fit,
     /// Difference of the pooled axes, where there is one.
     pub axes_differ: Option<AxesDiffer>,
-    /// Intervals of its parameters and goodness of fit, once [`add_intervals`](crate::infer) was asked for them.
+    /// Intervals of its parameters and goodness of fit, once [`add_intervals`](crate::add_intervals) was asked for them.
     pub inference: Option<Inference>,
     /// White noise, quantization noise, flicker noise and random walk read off the curve, where the model does not describe it.
     pub reading: Option<Box<Outcome>>,

@@ -526,10 +526,7 @@ const SIGNATURES: [(&str, &str); 10] = [
     (".html", "<metaname=\"generator\"content=\"nav-sim\">"),
     (".svg", "class=\"chartwide\""),
     (".png", "Software\0nav-sim"),
-    (
-        "results.csv",
-        ",method,filter,runs,diverged,outage,start_s,end_s,",
-    ),
+    ("results.csv", ",asee_mean,"),
     ("summary.json", "{\"schema_version\":1,\"complete\""),
     ("comparison.json", "{\"schema_version\":1,\"reference\""),
     (".json", "{\"schema_version\":1,\"rate_hz\""),

@@ -588,7 +588,7 @@ pub(crate) fn score(ratio: f64, edof: f64) -> f64 {
 /// A fitted model. That the iterations did not converge is reported, not an error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
-    /// The model: processes in the order of [`ProcessKind::ALL`](crate::noise::Kind::ALL), alike ones by ascending correlation time.
+    /// The model: processes in the order of [`ProcessKind::ALL`](crate::noise::ProcessKind::ALL), alike ones by ascending correlation time.
     pub composite: Composite,
     /// Σ Omega_j (nu_j − nu_j(theta))² at theta.
     pub objective: f64,

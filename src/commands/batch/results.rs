@@ -137,6 +137,30 @@ impl StudyAnswer {
             let summary = &found.summary;
             let outages = summary["outages"].as_array().into_iter().flatten();
             let mut ends = Vec::new();
+            let mut labelled = flat(&json!({ "cell": cell.name }));
+            let labels = cell.labels.iter().cloned();
+            labelled.extend(labels.map(|(axis, label)| (axis, label.into())));
+            if candidate.outages.is_empty() {
+                // What there is of a drive with all fixes: means over the run.
+                for state in REPORTED_NAMES {
+                    let [asee, rmse] = ["asee_mean", "rmse_mean"];
+                    let own = json!({
+                        "method": summary["method"],
+                        "filter": summary["filter_states"],
+                        "runs": summary["runs"],
+                        "diverged": summary["diverged"],
+                        "state": state,
+                        asee: summary["accuracy"][asee][state],
+                        rmse: summary["accuracy"][rmse][state],
+                        "nees_mean": summary["nees"]["mean"],
+                        "coverage": summary["coverage"]["mean"],
+                        "verdict": summary["verdict"]["kind"],
+                    });
+                    let mut row = labelled.clone();
+                    row.extend(flat(&own));
+                    self.rows.push(row);
+                }
+            }
             for (i, (outage, own)) in outages.zip(&candidate.outages).enumerate() {
                 let horizontal = &outage["horizontal_error_end_m"];
                 let [start_s, end_s] = [&outage["start_s"], &outage["end_s"]];
@@ -176,13 +200,7 @@ impl StudyAnswer {
                         "log_density_end": outage["log_density_end"],
                         "verdict": outage["verdict"]["kind"],
                     });
-                    let mut row = flat(&json!({ "cell": cell.name }));
-                    row.extend(
-                        cell.labels
-                            .iter()
-                            .cloned()
-                            .map(|(axis, label)| (axis, label.into())),
-                    );
+                    let mut row = labelled.clone();
                     for (key, value) in flat(&own).into_iter().chain(
                         (!candidate.is_reference)
                             .then(|| flat(ratio))

@@ -2,14 +2,14 @@
 //!
 //! [`Calibrate`] goes from a directory of recordings to models. From signals in memory:
 //! ```
-//! use nav_sim::calibration::{ModelChoice, Pool, Settings, calibrate, grouped, replicates};
+//! use nav_sim::calibration::{ModelChoice, Pool, CalibrationSettings, calibrate, grouped, replicates};
 //! use nav_sim::signal::imu::Channel;
 //! use nav_sim::signal::noise::{Composite, Model, Process, VirtualImu};
 //!
 //! let white = Composite::new(vec![Process::white(4e-6)?]);
 //! let model = Model::pooled(100.0, &white, &white);
 //! let imu = VirtualImu { model: &model, spread: None, contamination: None, seed: 1 };
-//! let settings = Settings { model: ModelChoice::Given("WN".parse()?), rate_hz: 100.0, ..Settings::default() };
+//! let settings = CalibrationSettings { model: ModelChoice::Given("WN".parse()?), rate_hz: 100.0, ..CalibrationSettings::default() };
 //! let mut signals = Vec::new();
 //! for replicate in 1..=5 {
 //!     signals.extend(replicates(&imu.recording(replicate, &Channel::ALL, 4096)?, None, &settings.tuning)?);

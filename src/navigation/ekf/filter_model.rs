@@ -1,14 +1,14 @@
 //! Noise model of the filter: inertial noise in the form of filter states.
 //!
 //! ```
-//! use nav_sim_navigation::ekf::{Belief, FilterStates};
+//! use nav_sim_navigation::ekf::{FilterModel, FilterStates};
 //! use nav_sim_signal::imu::Sensor;
 //! use nav_sim_signal::noise::{Composite, Model, Process};
 //!
 //! // A bias of 1e-4 rad/s with a correlation time of 100 s at 100 Hz.
 //! let bias = Process::ar1(0.9999, 1e-8 * (1.0 - 0.9999 * 0.9999))?;
 //! let axis = Composite::new(vec![Process::white(1e-6)?, bias]);
-//! let belief = Belief::new(&Model::pooled(100.0, &axis, &axis), FilterStates::Full, 1.0, 800.0)?;
+//! let belief = FilterModel::new(&Model::pooled(100.0, &axis, &axis), FilterStates::Full, 1.0, 800.0)?;
 //! // Position, velocity, attitude, and a bias for each of six axes.
 //! assert_eq!(belief.states, 15);
 //! assert!((belief.initial_bias_sigma(Sensor::Gyro) / 1e-4 - 1.0).abs() < 1e-9);

@@ -8,8 +8,8 @@
 //! # use nav_sim_navigation::trajectory::profile::{Bank, SegmentKind, Length, Profile, Segment, ProfileStart};
 //! use glam::{DQuat, DVec3};
 //! use nav_sim_navigation::earth::GravityModel;
-//! use nav_sim_navigation::ekf::{Belief, FilterStates};
-//! use nav_sim_navigation::fusion::{Recorded, Settings, Start, fuse};
+//! use nav_sim_navigation::ekf::{FilterModel, FilterStates};
+//! use nav_sim_navigation::fusion::{DriveData, FusionSettings, Start, fuse};
 //! use nav_sim_navigation::scenario::Scenario;
 //! use nav_sim_navigation::sensors::imu::Truth;
 //! use nav_sim_navigation::simulation::{Plan, record};
@@ -24,10 +24,10 @@
 //! let beliefs = [FilterModel::new(&model, FilterStates::Full, 1.0, 800.0)?.with_initial(&scenario.initial)];
 //! let experiment = scenario.experiment(&drive, Truth::Model(&model), &beliefs, &[], 1);
 //! let recording = record(&Plan::new(&experiment)?, 0);
-//! let recorded = Recorded { imu: &recording.imu, gnss: &recording.gnss, aids: &[] };
+//! let recorded = DriveData { imu: &recording.imu, gnss: &recording.gnss, aids: &[] };
 //! let sigma = scenario.initial.clone();
 //! let start = Start { t_s: 0.0, state: recording.start, sigma, found: None };
-//! let settings = Settings {
+//! let settings = FusionSettings {
 //!     q_s_b: DQuat::IDENTITY,
 //!     mounting_sigma_b: DVec3::ZERO,
 //!     lever_arm_b: DVec3::ZERO,

@@ -6,7 +6,7 @@
 //!
 //! ```
 //! # use nav_sim_navigation::trajectory::profile::{Bank, SegmentKind, Length, Profile, Segment, ProfileStart};
-//! use nav_sim_navigation::ekf::{Belief, FilterStates};
+//! use nav_sim_navigation::ekf::{FilterModel, FilterStates};
 //! use nav_sim_navigation::metrics::{chi_square_band, epochs};
 //! use nav_sim_navigation::monte_carlo;
 //! use nav_sim_navigation::scenario::Scenario;

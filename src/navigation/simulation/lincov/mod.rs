@@ -10,7 +10,7 @@
 //!
 //! ```
 //! # use nav_sim_navigation::trajectory::profile::{Bank, SegmentKind, Length, Profile, Segment, ProfileStart};
-//! use nav_sim_navigation::ekf::{Belief, FilterStates};
+//! use nav_sim_navigation::ekf::{FilterModel, FilterStates};
 //! use nav_sim_navigation::scenario::Scenario;
 //! use nav_sim_navigation::simulation::lincov::assess;
 //! use nav_sim_signal::noise::{Composite, Model, Process};
@@ -22,7 +22,7 @@
 //! let model = Model::pooled(100.0, &axis, &axis);
 //! let scenario = Scenario::default();
 //! let track = scenario.track(&drive, &model, &[])?;
-//! let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0)?.with_initial(&scenario.initial);
+//! let belief = FilterModel::new(&model, FilterStates::Full, 1.0, 800.0)?.with_initial(&scenario.initial);
 //! let assessment = assess(&track, &belief, &model);
 //! // A filter that has the model of the truth states its errors: a NEES of 9 for nine states.
 //! assert!(assessment.reports.iter().all(|report| (report.nees - 9.0).abs() < 1e-6));
