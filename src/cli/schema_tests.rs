@@ -1,6 +1,6 @@
 //! The ranges of schemas are those of the readers.
 
-use super::{SchemaKind as ProcessKind, schema_of};
+use super::{SchemaKind, schema_of};
 use crate::io::{
     Failure, contamination_file, fusion_files, model_file, scenario_file, trajectory_file,
 };
@@ -10,7 +10,7 @@ use std::path::Path;
 /// A file with sound values, and its keys whose other values are refused for reasons that no range has: another key, the
 /// length of the whole.
 struct Sample {
-    kind: ProcessKind,
+    kind: SchemaKind,
     text: &'static str,
     loose: &'static [&'static str],
 }
@@ -171,7 +171,7 @@ factor = 4.0
 
 const SAMPLES: [Sample; 6] = [
     Sample {
-        kind: ProcessKind::Scenario,
+        kind: SchemaKind::Scenario,
         text: SCENARIO,
         loose: &[
             "imu.rate_hz",
@@ -184,40 +184,40 @@ const SAMPLES: [Sample; 6] = [
         ],
     },
     Sample {
-        kind: ProcessKind::Model,
+        kind: SchemaKind::Model,
         text: ANY_PROCESS,
         loose: &["rate_hz"],
     },
     Sample {
-        kind: ProcessKind::Initial,
+        kind: SchemaKind::Initial,
         text: INITIAL,
         loose: &[],
     },
     Sample {
-        kind: ProcessKind::Profile,
+        kind: SchemaKind::Profile,
         text: STANDING,
         loose: &["duration_s", "climb_m", "speed_m_s", "ramp_s"],
     },
     Sample {
-        kind: ProcessKind::Profile,
+        kind: SchemaKind::Profile,
         text: MOVING,
         loose: &["_m", "_deg", "_s", "_s2"],
     },
     Sample {
-        kind: ProcessKind::Contamination,
+        kind: SchemaKind::Contamination,
         text: CONTAMINATION,
         loose: &["0.share", "3.share", ".sigma2", ".sigma"],
     },
 ];
 
-fn read(kind: ProcessKind, path: &Path) -> Result<(), Failure> {
+fn read(kind: SchemaKind, path: &Path) -> Result<(), Failure> {
     match kind {
-        ProcessKind::Scenario => scenario_file::read(path).map(|_| ()),
-        ProcessKind::Study => unreachable!("what a run takes is for its options to say"),
-        ProcessKind::Model => model_file::read(path).map(|_| ()),
-        ProcessKind::Initial => fusion_files::read_initial(path).map(|_| ()),
-        ProcessKind::Profile => trajectory_file::load(path, None).map(|_| ()),
-        ProcessKind::Contamination => {
+        SchemaKind::Scenario => scenario_file::read(path).map(|_| ()),
+        SchemaKind::Study => unreachable!("what a run takes is for its options to say"),
+        SchemaKind::Model => model_file::read(path).map(|_| ()),
+        SchemaKind::Initial => fusion_files::read_initial(path).map(|_| ()),
+        SchemaKind::Profile => trajectory_file::load(path, None).map(|_| ()),
+        SchemaKind::Contamination => {
             contamination_file::find(&path.to_string_lossy(), 100.0).map(|_| ())
         }
     }
@@ -399,6 +399,6 @@ fn schemas_have_the_bounds_of_their_readers() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     // the keys of a study are those of a run, whose options clap bounds
-    bounds[ProcessKind::Study as usize] = usize::MAX;
+    bounds[SchemaKind::Study as usize] = usize::MAX;
     assert!(bounds.iter().all(|n| *n > 5), "{bounds:?}");
 }

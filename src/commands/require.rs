@@ -488,14 +488,7 @@ impl Requirements {
                 format!("a shorter --outage{earlier}"),
             );
         }
-        // The noise that is judged comes later, many times over the same track.
-        let silent = Model {
-            rate_hz: scenario.imu.rate_hz,
-            axes: Default::default(),
-        };
-        let track = scenario
-            .track(&trajectory, &silent, &[])
-            .map_err(Failure::input)?;
+        let track = OutagePlacements::track(&scenario, &trajectory).map_err(Failure::input)?;
         Ok(Self {
             scenario,
             trajectory,
@@ -635,8 +628,9 @@ impl Requirements {
         if ends.is_empty() && length_s > 0.0 {
             // The curves need not have the length that is asked for.
             let has_room = |outage: &&Outage| outage.end_s - outage.start_s > length_s - SAME_S;
-            let places: Vec<Outage> = long.outages().iter().filter(has_room).copied().collect();
-            ends = long.drifts_in(&of_length(&places, length_s), scenario, model)?;
+            let places = long.outages().iter().filter(has_room);
+            let places: Vec<Outage> = places.map(|outage| cut(outage, length_s)).collect();
+            ends = long.drifts_in(&places, scenario, model)?;
         }
         let worst = HardestLimit::of(&self.limits, &ends);
         Ok((curves, longest, worst))
@@ -676,7 +670,7 @@ impl Requirements {
             };
             json!({ "quantity": quantity, "points": CURVE_S.map(point) })
         };
-        let shown = worst.map(|worst| of_length(&long.outages()[worst.place..], length_s)[0]);
+        let shown = worst.map(|worst| cut(&long.outages()[worst.place], length_s));
         let margins = worst
             .zip(without_imu_errors)
             .map(|(worst, without)| Margins::new(worst, without));
@@ -852,7 +846,8 @@ impl Requirements {
         // The curves of long outages take long steps.
         while missed_s - kept_s > 1.0 + SAME_S {
             let length_s = kept_s + (0.5 * (missed_s - kept_s)).floor().max(1.0);
-            let drifts = long.drifts_in(&of_length(&places, length_s), scenario, model)?;
+            let tried: Vec<Outage> = places.iter().map(|o| cut(o, length_s)).collect();
+            let drifts = long.drifts_in(&tried, scenario, model)?;
             let is_kept = !drifts.iter().any(is_missed);
             *(if is_kept { &mut kept_s } else { &mut missed_s }) = length_s;
         }
@@ -961,13 +956,12 @@ struct CatalogueUnit {
 /// Times come from samples: within a millisecond they are the same (s).
 const SAME_S: f64 = 1e-3;
 
-/// Outages of this length (s) from the same starts, or shorter where these are.
-fn of_length(outages: &[Outage], length_s: f64) -> Vec<Outage> {
-    let cut = |outage: &Outage| Outage {
+/// The first part of an outage, of this length (s), or all of a shorter one.
+fn cut(outage: &Outage, length_s: f64) -> Outage {
+    Outage {
         end_s: outage.end_s.min(outage.start_s + length_s),
         ..*outage
-    };
-    outages.iter().map(cut).collect()
+    }
 }
 
 /// The errors after a time without fixes at every place where the outage lasts so long.

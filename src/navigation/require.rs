@@ -289,14 +289,20 @@ impl<'a> OutagePlacements<'a> {
         trajectory: &'a Trajectory,
         outages: &[Outage],
     ) -> Result<Self, ExperimentError> {
-        // The track is of the reference alone; the noise that is sought comes later, a hundred times over the
-        // same track.
+        let track = Self::track(scenario, trajectory)?;
+        Ok(Self::along(&track, trajectory, outages))
+    }
+
+    /// Track of the reference alone: the noise that is sought or judged comes later, many times over the same track.
+    ///
+    /// # Errors
+    /// When trajectory, rates and fixes do not fit together.
+    pub fn track(scenario: &Scenario, trajectory: &Trajectory) -> Result<Track, ExperimentError> {
         let silent = Model {
             rate_hz: scenario.imu.rate_hz,
             axes: Default::default(),
         };
-        let track = scenario.track(trajectory, &silent, &[])?;
-        Ok(Self::along(&track, trajectory, outages))
+        scenario.track(trajectory, &silent, &[])
     }
 
     /// Along a track of the trajectory without outages.

@@ -691,7 +691,7 @@ impl RunValidator {
         }
         let mut options = asked.options.clone();
         options.insert("seed".to_owned(), vec![seed.to_string()]);
-        // A cell says whether it keeps the limits: under others it is another.
+        // Its summary states whether the limits are kept, so they are part of the key of a cell.
         let limits = run.get("require").map(ToString::to_string);
         options.extend(limits.map(|limits| ("require".to_owned(), vec![limits])));
         let manifest = Manifest::new(Run::NAME, options.clone(), inputs.clone());

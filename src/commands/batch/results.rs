@@ -5,7 +5,7 @@ use crate::app::{Answer, Context, Failure, Result};
 use crate::commands::compare::{Comparison, between};
 use crate::commands::run::directory::{self as run_directory, RunDirectory};
 use crate::io::atomic::{AtomicDir, guard_others};
-use crate::report::csv::{csv, flat};
+use crate::report::csv::{csv, flat, merged};
 use crate::report::verdict::{tone, verdict_counts};
 use crate::report::{first_names, json};
 use indexmap::{IndexMap, IndexSet};
@@ -104,10 +104,10 @@ pub(super) fn merge(
             }
             answer.missing.push(name.clone());
         }
-        let place = read.iter().position(|(cell, _)| cell.name == reference);
-        match answer.add(&read, place) {
-            // What cannot be compared stands alone: it has been computed.
-            Err(e) if e.code() == 2 && place.is_some() => {
+        let at = read.iter().position(|(cell, _)| cell.name == reference);
+        match answer.add(&read, at) {
+            // Cells that cannot be compared keep their own figures.
+            Err(e) if e.code() == 2 && at.is_some() => {
                 context.warn(format!("{e}: no ratios to {reference}"));
                 answer.add(&read, None)?;
             }
@@ -137,29 +137,36 @@ impl StudyAnswer {
             let summary = &found.summary;
             let outages = summary["outages"].as_array().into_iter().flatten();
             let mut ends = Vec::new();
-            let mut labelled = flat(&json!({ "cell": cell.name }));
-            let labels = cell.labels.iter().cloned();
-            labelled.extend(labels.map(|(axis, label)| (axis, label.into())));
+            let of_cell = json!({
+                "method": summary["method"],
+                "filter": summary["filter_states"],
+                "runs": summary["runs"],
+                "diverged": summary["diverged"],
+            });
+            let row = |own: [Value; 2]| {
+                let mut row = flat(&json!({ "cell": cell.name }));
+                let labels = cell.labels.iter().cloned();
+                row.extend(labels.map(|(axis, label)| (axis, label.into())));
+                let [own, ratio] = own;
+                for (key, value) in flat(&merged([of_cell.clone(), own, ratio])) {
+                    row.entry(key).or_insert(value);
+                }
+                row
+            };
             if candidate.outages.is_empty() {
-                // What there is of a drive with all fixes: means over the run.
-                for state in REPORTED_NAMES {
-                    let [asee, rmse] = ["asee_mean", "rmse_mean"];
-                    let own = json!({
-                        "method": summary["method"],
-                        "filter": summary["filter_states"],
-                        "runs": summary["runs"],
-                        "diverged": summary["diverged"],
+                // Without an outage: means over the run.
+                let of_state = |state: &str| {
+                    json!({
                         "state": state,
-                        asee: summary["accuracy"][asee][state],
-                        rmse: summary["accuracy"][rmse][state],
+                        "asee_mean": summary["accuracy"]["asee_mean"][state],
+                        "rmse_mean": summary["accuracy"]["rmse_mean"][state],
                         "nees_mean": summary["nees"]["mean"],
                         "coverage": summary["coverage"]["mean"],
                         "verdict": summary["verdict"]["kind"],
-                    });
-                    let mut row = labelled.clone();
-                    row.extend(flat(&own));
-                    self.rows.push(row);
-                }
+                    })
+                };
+                let rows = REPORTED_NAMES.map(|state| row([of_state(state), Value::Null]));
+                self.rows.extend(rows);
             }
             for (i, (outage, own)) in outages.zip(&candidate.outages).enumerate() {
                 let horizontal = &outage["horizontal_error_end_m"];
@@ -174,10 +181,6 @@ impl StudyAnswer {
                 }));
                 for (state, ratio) in REPORTED_NAMES.iter().zip(&own.states) {
                     let own = json!({
-                        "method": summary["method"],
-                        "filter": summary["filter_states"],
-                        "runs": summary["runs"],
-                        "diverged": summary["diverged"],
                         "outage": i,
                         "start_s": start_s,
                         "end_s": end_s,
@@ -200,16 +203,8 @@ impl StudyAnswer {
                         "log_density_end": outage["log_density_end"],
                         "verdict": outage["verdict"]["kind"],
                     });
-                    let mut row = labelled.clone();
-                    for (key, value) in flat(&own).into_iter().chain(
-                        (!candidate.is_reference)
-                            .then(|| flat(ratio))
-                            .into_iter()
-                            .flatten(),
-                    ) {
-                        row.entry(key).or_insert(value);
-                    }
-                    self.rows.push(row);
+                    let ratio = json!((!candidate.is_reference).then_some(ratio));
+                    self.rows.push(row([own, ratio]));
                 }
             }
             self.versions.insert(found.manifest.version.clone());

@@ -174,9 +174,8 @@ impl Command for Choose {
         }
         context.end();
         let ranking = Ranking::new(&candidates, &folds);
-        let (best, diverges) = (&ranking.candidates[0], |c: &&RankedCandidate| {
-            c.log_score.value == f64::NEG_INFINITY
-        });
+        let best = &ranking.candidates[0];
+        let diverges = |c: &&RankedCandidate| c.log_score.value == f64::NEG_INFINITY;
         if diverges(&best) {
             return Err(Failure::failed(
                 "every candidate has runs that diverge on a recording",
@@ -240,7 +239,7 @@ impl Command for Choose {
         );
         let diverged = ranking.candidates.iter().filter(diverges);
         let diverged: Vec<&str> = diverged.map(|c| c.candidate.as_str()).collect();
-        warn("runs of it diverge on a recording", &diverged);
+        warn("its runs diverge on a recording", &diverged);
         let undescribed: Vec<&str> = ranking.undescribed.iter().map(String::as_str).collect();
         warn(
             "no candidate describes it (a warm-up? see nav-sim calibrate)",

@@ -605,6 +605,7 @@ fn rows(
     if let Some(own) = velocity {
         rows.velocities = all.map(|row| triad(own, row).into()).collect();
     }
+    // Standard deviations that are left out on purpose are not reported.
     let is_known = |name: &String| table::find(DICTIONARY.quantities, name).is_some();
     table.ignored.retain(|name| !is_known(name));
     let unused = (!table.ignored.is_empty())

@@ -689,7 +689,7 @@ impl Track {
                 },
             ))
         };
-        // What the strapdown errs at the marks between would be left out.
+        // Errors of the strapdown at the marks in between would be lost.
         let begins = if self.is_closed() {
             0..self.marks.len()
         } else {
