@@ -393,7 +393,7 @@ pub(crate) fn columns(
         &outages,
         one.seed,
     );
-    let plan = Plan::new(&experiment)?;
+    let plan = Plan::new(&experiment)?.with_track(&one.filter()?.track);
     let progress = |done| context.advance(done * runs.len() as u64);
     let results = monte_carlo::run_range(
         &plan,
@@ -699,7 +699,7 @@ fn with_runs(
         (method, expected) => {
             let runs = match runs {
                 Some(runs) => runs,
-                None => sampled(&experiment, scenario, &inputs.trajectory, context)?,
+                None => sampled(&analysis, scenario, &inputs.trajectory, context)?,
             };
             let mut sampled = Navigation::of_runs(runs, seed);
             match expected {
@@ -776,14 +776,14 @@ fn block(trajectory: &Trajectory, scenario: &Scenario) -> u64 {
 
 /// All runs, block by block.
 fn sampled(
-    experiment: &Experiment<'_>,
+    analysis: &Analysis<'_>,
     scenario: &Scenario,
     trajectory: &Trajectory,
     context: &Context<'_>,
 ) -> Result<RunResult> {
     let (runs, block) = (scenario.run.runs, block(trajectory, scenario));
     context.begin("runs", runs);
-    let plan = Plan::new(experiment)?;
+    let plan = Plan::new(analysis.experiment)?.with_track(analysis.track);
     let of_block = |first: u64| {
         monte_carlo::run_range(&plan, first, block.min(runs - first), &|| true, &|n| {
             context.advance(n)

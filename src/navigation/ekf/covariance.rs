@@ -38,10 +38,6 @@ pub struct Covariance {
     columns: [[Lanes; NAV]; NAV],
 }
 
-/// The covariance of one run: the lower triangle by rows.
-#[derive(Debug)]
-pub(crate) struct SharedCovariance(Box<[f64]>);
-
 /// Steps of biases that stay as they are: phi = 1, no innovation.
 const CONSTANT_BIASES: [BiasGroup; 2 * MAX_BLOCKS + 1] =
     [BiasGroup::constant(0.0); 2 * MAX_BLOCKS + 1];
@@ -152,18 +148,11 @@ impl Covariance {
             .for_each(|(to, from)| to[lane] = *from);
     }
 
-    /// The matrix of the first lane, to be shared.
-    pub(crate) fn shared(&self) -> SharedCovariance {
-        let lower = |i: usize| (0..=i).map(move |j| self.p[i * self.dim + j][0]);
-        SharedCovariance((0..self.dim).flat_map(lower).collect())
-    }
-
-    /// Sets the matrix of all lanes to a shared one.
-    pub(crate) fn set_shared(&mut self, shared: &SharedCovariance) {
-        let mut elements = shared.0.iter();
-        for i in 0..self.dim {
-            for (j, element) in (0..=i).zip(&mut elements) {
-                self.set(i, j, Lanes::splat(*element));
+    /// Sets the navigation square of all lanes.
+    pub(crate) fn set_navigation(&mut self, p: &[[f64; NAV]; NAV]) {
+        for i in 0..NAV {
+            for j in 0..=i {
+                self.set(i, j, Lanes::splat(p[i][j]));
             }
         }
     }

@@ -95,15 +95,6 @@ impl Ekf {
                 .mul_add(innovation, W::load(error))
                 .store(error);
         }
-        if let GainSource::Kept(updates) = &mut self.gains {
-            let mut variance = Lanes::ZERO;
-            s.store(&mut variance);
-            updates.push(SharedUpdate {
-                row: h.iter().map(|(state, c)| (*state, c[0])).collect(),
-                gain: scratch.gain.iter().map(|gain| gain[0]).collect(),
-                variance: variance[0],
-            });
-        }
         (innovation, s)
     }
 
@@ -154,11 +145,11 @@ impl Ekf {
 #[derive(Debug, Clone)]
 pub(crate) struct SharedUpdate {
     /// States that the measurement depends on, and their coefficients.
-    row: Vec<(usize, f64)>,
+    pub row: Vec<(usize, f64)>,
     /// One entry a state.
-    gain: Box<[f64]>,
+    pub gain: Box<[f64]>,
     /// The variance of the innovation.
-    variance: f64,
+    pub variance: f64,
 }
 
 /// Source of a filter's gains.
@@ -167,8 +158,6 @@ pub(crate) enum GainSource {
     /// Its own covariance.
     #[default]
     Own,
-    /// Its own covariance; its updates are kept.
-    Kept(Vec<SharedUpdate>),
     /// Updates for the next scalars, of which so many are used; no covariance is propagated.
     Given(Arc<[SharedUpdate]>, usize),
 }

@@ -64,11 +64,7 @@ pub(super) fn run_candidates(
 }
 
 /// Uses all measurements of an instant; returns the NIS of the fix.
-pub(super) fn measure(
-    ekf: &mut Ekf,
-    plan: &Plan<'_>,
-    measured: &LaneMeasurements,
-) -> Option<Lanes> {
+fn measure(ekf: &mut Ekf, plan: &Plan<'_>, measured: &LaneMeasurements) -> Option<Lanes> {
     let nis = measured.fix.as_ref().map(|fix| update(ekf, fix));
     if let (Some(h), Some(baro)) = (&measured.height, plan.experiment.baro) {
         let _ = update_height(ekf, h, baro.sigma_m);
@@ -152,7 +148,10 @@ impl<'a> LaneFilter<'a> {
     ) {
         let shared = self.shared.map(|shared| &shared[index]);
         if let Some(shared) = shared {
-            shared.before.iter().for_each(|p| self.ekf.p.set_shared(p));
+            shared
+                .before
+                .iter()
+                .for_each(|p| self.ekf.p.set_navigation(p));
             self.ekf.gains = GainSource::Given(shared.updates.clone(), 0);
         }
         // Before the fix of the same instant: the end of an outage is where the error is largest.
@@ -161,12 +160,14 @@ impl<'a> LaneFilter<'a> {
             self.nis.0 += nis;
             self.nis.1 += 1;
         }
-        if let Some(after) = shared.and_then(|shared| shared.after.as_ref()) {
-            self.ekf.p.set_shared(after);
-        }
         if event.report {
+            let mut biases = None;
+            if let Some((p, shared)) = shared.and_then(|shared| shared.after.as_ref()) {
+                self.ekf.p.set_navigation(p);
+                biases = Some(shared.map(Lanes::splat));
+            }
             apply_pending_earth_step(&mut self.ekf);
-            let epoch = EpochLanes::of(&self.ekf, self.live, plan, event);
+            let epoch = EpochLanes::of(&self.ekf, biases, self.live, plan, event);
             self.follow_outages(plan, event, &epoch);
             self.trace.push(epoch);
         }
@@ -352,20 +353,28 @@ struct EpochLanes {
 
 impl EpochLanes {
     /// Reported values of the first `live` lanes at an event.
-    fn of(ekf: &Ekf, live: usize, plan: &Plan<'_>, event: &Event) -> Self {
+    fn of(
+        ekf: &Ekf,
+        shared_biases: Option<[Lanes; BIASES]>,
+        live: usize,
+        plan: &Plan<'_>,
+        event: &Event,
+    ) -> Self {
         let found = LaneAssessment::of(ekf, live, &event.reference);
         let states: [usize; COVERAGE_DOF] =
             std::array::from_fn(|i| if i < 3 { 3 * R + i } else { 3 * PSI + i - 3 });
         let coverage = ekf
             .p
             .normalised_square(states, states.map(|s| found.navigation[s]));
-        let [accel, gyro] = Sensor::ALL.map(|sensor| ekf.bias_sigma(sensor).0);
-        let bias_see = std::array::from_fn(|i| if i < 3 { accel[i] } else { gyro[i - 3] });
+        let own = || {
+            let [accel, gyro] = Sensor::ALL.map(|sensor| ekf.bias_sigma(sensor).0);
+            std::array::from_fn(|i| if i < 3 { accel[i] } else { gyro[i - 3] })
+        };
         Self {
             t_s: event.t_s,
             gnss: event.fix,
             see: found.see,
-            bias_see,
+            bias_see: shared_biases.unwrap_or_else(own),
             error: found.error,
             att_error_deg: found.att_error_deg,
             nees: found.nees,

@@ -4,16 +4,12 @@
 //! along the reference therefore serves every run, and runs need strapdown and corrections alone. That holds while
 //! errors are small: runs are made both ways in the first batch and in one of [`CHECKED`], and compared.
 
-use super::REPORTED;
-use super::batch::{Batch, BatchFilter, measure, run_candidates};
-use super::plan::{Event, Plan};
-use super::source::LaneMeasurements;
-use crate::ekf::covariance::SharedCovariance;
-use crate::ekf::{
-    Ekf, FilterModel, FixUpdate, GainSource, SharedUpdate, advance, apply_pending_earth_step,
-};
-use crate::lanes::{LANES, Vec3};
-use crate::strapdown::Strapdown;
+use super::batch::{Batch, BatchFilter, run_candidates};
+use super::lincov::{FilterPass, Track};
+use super::plan::Plan;
+use super::{BIASES, NEES_DOF, REPORTED};
+use crate::ekf::{FixUpdate, SharedUpdate};
+use crate::lanes::LANES;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -66,15 +62,17 @@ const CHECKED: u64 = 64;
 /// A filter along the reference, event by event.
 pub(super) type SharedFilter = Vec<SharedEvent>;
 
-/// Covariances and updates of a filter at an event of the reference.
+/// A filter at an event of the reference.
 #[derive(Debug)]
 pub(super) struct SharedEvent {
-    /// Before the measurements, where an outage ends.
-    pub before: Option<SharedCovariance>,
+    /// Covariance of the navigation error before the measurements, where an outage ends.
+    pub before: Option<NavigationCovariance>,
     pub updates: Arc<[SharedUpdate]>,
-    /// After them, where it is reported.
-    pub after: Option<SharedCovariance>,
+    /// The same after them, and standard deviations of the sensors' biases (m/s², rad/s), where they are reported.
+    pub after: Option<(NavigationCovariance, [f64; BIASES])>,
 }
+
+type NavigationCovariance = [[f64; NEES_DOF]; NEES_DOF];
 
 /// The gains of all candidates, decided once a plan.
 #[derive(Debug)]
@@ -95,7 +93,15 @@ impl SharedGains {
                 first: None,
             };
         }
-        let along = |filter_model| Some(along_reference(plan, filter_model));
+        let own;
+        let track = match plan.track {
+            Some(track) => track,
+            None => {
+                own = Track::along(plan.experiment).expect("planned");
+                &own
+            }
+        };
+        let along = |filter_model| Some(FilterPass::new(track, filter_model).events());
         let mut shared: Vec<_> = filter_models.iter().map(along).collect();
         if gains == Gains::Shared {
             return Self {
@@ -188,30 +194,4 @@ fn largest_difference(shared: &Batch, own: &Batch) -> f64 {
     let differences = shared.iter().zip(&own).map(|(a, b)| (a / b - 1.0).abs());
     // of a perfect start both are zero
     differences.filter(|d| !d.is_nan()).fold(0.0, f64::max)
-}
-
-/// A filter whose errors are zero, as are those of its measurements.
-fn along_reference(plan: &Plan<'_>, filter_model: &FilterModel) -> SharedFilter {
-    let nominal = Strapdown::new(&plan.start, plan.experiment.gravity);
-    let mut ekf = Ekf::new(nominal, filter_model, &plan.start, plan.experiment.initial);
-    let (mut done, mut none) = (0, Vec::new());
-    let at = |(index, event): (usize, &Event)| {
-        let samples = &plan.ideal[done..event.sample];
-        none.resize(samples.len(), [Vec3::ZERO; 2]);
-        advance(&mut ekf, samples, &none);
-        done = event.sample;
-        apply_pending_earth_step(&mut ekf);
-        let before = plan.ends_outage(index).then(|| ekf.p.shared());
-        ekf.gains = GainSource::Kept(Vec::new());
-        let _ = measure(&mut ekf, plan, &LaneMeasurements::exact(plan, event));
-        let GainSource::Kept(updates) = std::mem::take(&mut ekf.gains) else {
-            unreachable!("kept")
-        };
-        SharedEvent {
-            before,
-            updates: updates.into(),
-            after: event.report.then(|| ekf.p.shared()),
-        }
-    };
-    plan.events.iter().enumerate().map(at).collect()
 }

@@ -1,6 +1,7 @@
 //! Common data of all runs of an experiment, computed once: ideal samples, reference, schedule.
 
 use super::gains::{Gains, SharedGains};
+use super::lincov::Track;
 use crate::earth::{GravityModel, MAX_LATITUDE};
 use crate::ekf::{FilterModel, FixUpdate, InitialSettings};
 use crate::frames::NavState;
@@ -117,6 +118,8 @@ pub struct Plan<'a> {
     pub(super) outages: Vec<(f64, usize)>,
     /// Quantile of the coverage statistic.
     pub(super) coverage_quantile: f64,
+    /// The reference as a covariance analysis has it, if it was made already.
+    pub(super) track: Option<&'a Track>,
     decision: OnceLock<SharedGains>,
 }
 
@@ -155,8 +158,15 @@ impl<'a> Plan<'a> {
             outages: outages.map(|o| effects(o, &events)).collect(),
             events,
             coverage_quantile: experiment.coverage_quantile(),
+            track: None,
             decision: OnceLock::new(),
         })
+    }
+
+    /// The plan of an experiment whose track is known: shared gains are then found sooner.
+    pub fn with_track(self, track: &'a Track) -> Self {
+        let track = Some(track);
+        Self { track, ..self }
     }
 
     /// True for the first fix after an outage, and for the last event if there is none.

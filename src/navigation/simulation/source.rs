@@ -27,20 +27,6 @@ pub(super) struct LaneMeasurements {
     pub aids: Vec<(Aid, Vec3)>,
 }
 
-impl LaneMeasurements {
-    /// The measurements of an instant without error.
-    pub(super) fn exact(plan: &Plan<'_>, event: &Event) -> Self {
-        let aids = event.aids.iter().filter(|aided| !aided.withheld);
-        Self {
-            fix: event.fix.then(|| exact_fix(plan, event)),
-            height: event.baro.then(|| Lanes::splat(event.reference.h)),
-            aids: aids
-                .map(|aided| (aided.aid, exact_aid(event, aided)))
-                .collect(),
-        }
-    }
-}
-
 fn exact_fix(plan: &Plan<'_>, event: &Event) -> Fix {
     let (gnss, (antenna, velocity)) = (plan.experiment.gnss, event.antenna);
     Fix {

@@ -5,11 +5,12 @@ use super::track::{
     AugmentedStates, ErrorSources, NAV, Nav, SIGNALS, ScalarMeasurement, Step, Track, TrackEpoch,
 };
 use super::truth::{TrueErrors, TruthModel};
-use crate::ekf::FilterModel;
 use crate::ekf::covariance::PSI;
+use crate::ekf::{FilterModel, SharedUpdate};
 use crate::linalg::mean;
 use crate::noise::Model;
 use crate::sensors::outage::Outage;
+use crate::simulation::gains::SharedEvent;
 use crate::simulation::{BIASES, REPORTED};
 use crate::units::DEG;
 use glam::DVec3;
@@ -178,6 +179,34 @@ impl<'a> FilterPass<'a> {
             ends,
             believed,
         }
+    }
+
+    /// The filter event by event, as runs share it.
+    pub(in crate::simulation) fn events(&self) -> Vec<SharedEvent> {
+        let states = &self.believed.states;
+        let gains = self.gains.chunks_exact(NAV + states.len());
+        let (mut elapsed, mut gains) = (0.0, gains.zip(&self.innovations));
+        let mut reports = self.reports.iter().zip(&self.biases);
+        let event = |(steps, mark): (&[Step], &TrackEpoch)| {
+            elapsed += steps.iter().map(|s| f64::from(s.samples)).sum::<f64>();
+            let update = |(row, (gain, variance)): (&ScalarMeasurement, (&[f64], &f64))| {
+                let of_states = states.iter().map(|s| row.coefficient(s, elapsed));
+                let all = row.h[..NAV].iter().copied().chain(of_states).enumerate();
+                SharedUpdate {
+                    row: all.filter(|(_, h)| *h != 0.0).collect(),
+                    gain: gain.into(),
+                    variance: *variance,
+                }
+            };
+            let after = mark.report.then(|| reports.next()).flatten();
+            SharedEvent {
+                before: mark.outages.first().map(|outage| self.ends[*outage]),
+                updates: mark.rows.iter().zip(&mut gains).map(update).collect(),
+                after: after.map(|(p, biases)| (*p, *biases)),
+            }
+        };
+        let marks = self.track.legs(0..self.track.marks.len());
+        marks.map(event).collect()
     }
 
     /// The reports, and what the filter states there.

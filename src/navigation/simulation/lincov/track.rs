@@ -1182,7 +1182,7 @@ impl ErrorSources {
         }
     }
 
-    /// Sources in a filter's model: one for each bias state.
+    /// Sources in a filter's model: one for each of its states behind the navigation's, in their order.
     pub(super) fn of_belief(filter_model: &FilterModel) -> Self {
         let of_sensor = |sensor: Sensor| {
             let groups = filter_model.groups[sensor as usize].iter();
@@ -1197,79 +1197,66 @@ impl ErrorSources {
     }
 
     /// The bias states of a group.
-    fn of_group(sensor: Sensor, group: &BiasGroup) -> Vec<ErrorSourceState> {
-        let state = |axis: usize| {
-            let (phi, q, initial) = (group.phi[axis], group.innovation[axis], group.initial[axis]);
-            (initial != 0.0 || q != 0.0)
-                .then(|| ErrorSourceState::bias(3 * sensor as usize + axis, [phi, q, initial]))
-        };
-        (0..3).filter_map(state).collect()
+    fn of_group(sensor: Sensor, group: &BiasGroup) -> [ErrorSourceState; 3] {
+        std::array::from_fn(|axis| {
+            let state = [group.phi[axis], group.innovation[axis], group.initial[axis]];
+            ErrorSourceState::bias(3 * sensor as usize + axis, state)
+        })
     }
 
     /// Unknown constants of a belief that are multiplied.
-    fn multiplied(filter_model: &FilterModel) -> Vec<ErrorSourceState> {
-        let mut states = Vec::new();
-        for (sensor, axis) in Sensor::ALL
-            .into_iter()
-            .flat_map(|s| (0..3).map(move |i| (s, i)))
-        {
-            let signal = 3 * sensor as usize + axis;
-            for unknown in filter_model.unknowns(sensor) {
-                let sigma = unknown.sigma[axis];
-                states.extend((sigma > 0.0).then(|| match unknown.kind {
+    fn multiplied(filter_model: &FilterModel) -> impl Iterator<Item = ErrorSourceState> {
+        let unknowns = Sensor::ALL.into_iter().flat_map(|sensor| {
+            filter_model
+                .unknowns(sensor)
+                .iter()
+                .map(move |u| (sensor, u))
+        });
+        unknowns.flat_map(|(sensor, unknown)| {
+            (0..3).map(move |axis| {
+                let (signal, sigma) = (3 * sensor as usize + axis, unknown.sigma[axis]);
+                match unknown.kind {
                     CoefficientKind::Drift => ErrorSourceState::ramp(signal, sigma),
                     CoefficientKind::ScaleFactor => {
                         ErrorSourceState::constant(SCALE_FACTOR + signal, sigma)
                     }
-                }));
-            }
-        }
-        states
+                }
+            })
+        })
     }
 
     /// Wheel scale and mounting of a vehicle, as in a filter's model.
-    fn of_vehicle(filter_model: &FilterModel) -> Vec<ErrorSourceState> {
+    fn of_vehicle(filter_model: &FilterModel) -> impl Iterator<Item = ErrorSourceState> {
         let parts = [
             AidPart::WheelScale,
             AidPart::MountingPitch,
             AidPart::MountingYaw,
         ];
+        let sigmas = (filter_model.vehicle != DVec3::ZERO).then_some(filter_model.vehicle);
         let states = parts
             .into_iter()
-            .zip(filter_model.vehicle.to_array())
-            .filter(|(_, sigma)| *sigma > 0.0);
-        states
-            .map(|(part, sigma)| {
-                ErrorSourceState::of_vehicle(
-                    part,
-                    ErrorProcess::Constant(sigma),
-                    filter_model.rate_hz,
-                )
-            })
-            .collect()
+            .zip(sigmas.into_iter().flat_map(|s| s.to_array()));
+        states.map(|(part, sigma)| {
+            let constant = ErrorProcess::Constant(sigma);
+            ErrorSourceState::of_vehicle(part, constant, filter_model.rate_hz)
+        })
     }
 
     /// Turn-on biases and scale factors that a belief has beside its noise model, as sources.
     pub(super) fn beside_model(filter_model: &FilterModel) -> Vec<ErrorSourceState> {
+        let constants = Sensor::ALL.into_iter().flat_map(|sensor| {
+            let groups = filter_model.groups[sensor as usize].iter();
+            groups
+                .filter(|group| group.is_constant())
+                .flat_map(move |group| Self::of_group(sensor, group))
+        });
+        let states = Self::multiplied(filter_model)
+            .chain(Self::of_vehicle(filter_model))
+            .chain(constants);
         // drifts are of the noise model
-        let mut states = Self::multiplied(filter_model);
-        states.retain(|source| source.ramp == 0.0);
-        states.extend(Self::of_vehicle(filter_model));
-        for sensor in Sensor::ALL {
-            for group in filter_model.groups[sensor as usize]
-                .iter()
-                .filter(|g| g.is_constant())
-            {
-                let constant = |axis| {
-                    ErrorSourceState::bias(
-                        3 * sensor as usize + axis,
-                        [1.0, 0.0, group.initial[axis]],
-                    )
-                };
-                states.extend((0..3).map(constant).filter(|s| s.initial > 0.0));
-            }
-        }
         states
+            .filter(|source| source.ramp == 0.0 && source.initial > 0.0)
+            .collect()
     }
 
     /// The sources of a noise model, each process exactly.
