@@ -3,7 +3,7 @@
 
 use super::{Context, Failure, Input, IntoFailure, Reporter, Result, refused};
 use crate::io::atomic::{AtomicDir, DirectoryState, OutputClaim, claim_directory, claim_file};
-use crate::io::{atomic, input, suggest};
+use crate::io::{atomic, beside, input, suggest};
 use crate::parse;
 use crate::report::json;
 use clap::builder::ValueParser;
@@ -524,16 +524,6 @@ pub fn answered<C: Command>(
         files,
         unmet: answer.unmet(),
     })
-}
-
-/// The file beside another that has its stem and this ending; with none itself.
-fn beside(path: &Path, ending: &str) -> PathBuf {
-    if ending.is_empty() {
-        return path.to_owned();
-    }
-    let mut name = path.file_stem().unwrap_or_default().to_owned();
-    name.push(ending);
-    path.with_file_name(name)
 }
 
 // Outputs of a command: claimed before its work, written whole after it.

@@ -387,7 +387,8 @@ impl Comparison {
             let all = c
                 .outages
                 .iter()
-                .map(|outage| outage.states[state].ratio_error_pct);
+                .map(|outage| outage.states[state].ratio_error_pct)
+                .filter(|pct| !pct.is_nan());
             let low = all.clone().reduce(f64::min)?;
             let [low, high] = [low, all.fold(low, f64::max)].map(|pct| format!("{pct:+.0}"));
             Some(if low == high {
@@ -661,6 +662,10 @@ fn signed(ratio: &StateRatio) -> String {
     /// Half an interval of a logarithm above which e^x and 1 + x differ in what is shown.
     const WIDE: f64 = 0.25;
     let pct = ratio.ratio_error_pct;
+    if pct.is_nan() {
+        // no report within the outage
+        return "–".to_owned();
+    }
     let decimals =
         |x: f64, digits: f64| (digits - x.abs().log10().floor()).clamp(0.0, 2.0) as usize;
     let shown = decimals(pct, 2.0);

@@ -53,7 +53,7 @@ pub struct Draws {
 /// Path of the draws of a model file.
 #[must_use]
 pub(crate) fn beside(model: &Path) -> PathBuf {
-    model.with_extension("draws.json")
+    super::beside(model, ".draws.json")
 }
 
 /// The draws beside a model file, at the rate of an IMU, if there are any.

@@ -19,6 +19,25 @@ pub(crate) mod table;
 pub(crate) mod toml_file;
 pub mod trajectory_file;
 
+use std::path::{Path, PathBuf};
+
+/// The file beside another that has its name, less `.toml` or `.json`, and this ending; with none itself.
+pub(crate) fn beside(path: &Path, ending: &str) -> PathBuf {
+    if ending.is_empty() {
+        return path.to_owned();
+    }
+    // of m.1 and m.2 the number is no ending
+    let has_ending = path.extension().is_some_and(|e| e == "toml" || e == "json");
+    let name = if has_ending {
+        path.file_stem()
+    } else {
+        path.file_name()
+    };
+    let mut name = name.unwrap_or_default().to_owned();
+    name.push(ending);
+    path.with_file_name(name)
+}
+
 pub(crate) use crate::failure::{Failure, Place, help};
 
 #[cfg(test)]

@@ -350,6 +350,13 @@ const LONGEST_NAME: usize = 200;
 /// More cells than this are a mistake.
 const MOST: usize = 100_000;
 
+fn few_enough(cells: usize) -> Result<()> {
+    if cells > MOST {
+        return Err(Failure::input(format!("more than {MOST} cells")));
+    }
+    Ok(())
+}
+
 /// A run whose values may be lists: nav-sim batch
 #[derive(Default, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -430,6 +437,10 @@ impl Study {
                 let places = self.run.values().chain(self.vary.values());
                 let is_named = places.into_iter().any(|value| uses(value, axis));
                 match is_named || values.iter().any(|(_, keys)| !keys.is_empty()) {
+                    true if ["cell", "state"].contains(&axis.as_str()) => refused(
+                        format!("\"vary.{axis}\": results.csv has a column of this name"),
+                        "give the axis another name",
+                    ),
                     true => Ok(values),
                     false => refused(
                         format!("\"vary.{axis}\" changes nothing"),
@@ -438,6 +449,7 @@ impl Study {
                 }
             });
             let values = values.map_err(|e| self.at(&format!("vary.{axis}"), e))?;
+            few_enough(requests.len() * values.len())?;
             let product = |(labels, run): &(Labels, Table)| -> Vec<(Labels, Table)> {
                 let with = |(label, keys): &(String, Table)| {
                     let mut run = run.clone();
@@ -562,9 +574,7 @@ impl RunValidator {
 
     /// Expands the first list that a single run would not take as it is.
     fn expand(&mut self, run: Table, labels: Labels, all: &mut Vec<(Labels, Table)>) -> Result<()> {
-        if all.len() > MOST {
-            return Err(Failure::input(format!("more than {MOST} cells")));
-        }
+        few_enough(all.len())?;
         let is_new = |path: &str| !labels.iter().any(|(axis, _)| axis == path);
         let mut leaves = leaves(&run, "").into_iter();
         let Some((path, list)) = leaves.find_map(|(path, value)| {

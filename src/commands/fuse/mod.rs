@@ -323,17 +323,18 @@ fn gnss_sigma(text: &str) -> Result<GnssSigma, &'static str> {
         return Ok((Some(fix_sigma(text)?), [1.0; 2]));
     };
     let (position, velocity) = factors.split_once(':').unwrap_or((factors, factors));
-    match (positive(position), positive(velocity)) {
-        (Ok(position), Ok(velocity)) => Ok((None, [position, velocity])),
-        _ => Err("expected factors > 0: x3 or x3:2"),
+    let factor = |text| positive(text).ok().filter(|x| (1e-3..=1e3).contains(x));
+    match (factor(position), factor(velocity)) {
+        (Some(position), Some(velocity)) => Ok((None, [position, velocity])),
+        _ => Err("expected factors from 0.001 to 1000: x3 or x3:2"),
     }
 }
 
 /// `POS` or `N,E,D` in metres, then `:VEL` or `:N,E,D` in m/s.
 fn fix_sigma(text: &str) -> Result<FixSigma, &'static str> {
     let three = |part: &str| {
-        numbers::<3>(part).or(numbers::<1>(part).map(|[all]| [all; 3])).filter(|sigma| sigma.iter().all(|x| *x > 0.0)).ok_or(
-            "expected metres > 0, one or three (north, east, down), then m/s after a colon: 2,2,4:0.1",
+        numbers::<3>(part).or(numbers::<1>(part).map(|[all]| [all; 3])).filter(|sigma| sigma.iter().all(|x| *x >= 1e-6)).ok_or(
+            "expected metres from 1e-6, one or three (north, east, down), then m/s after a colon: 2,2,4:0.1",
         )
     };
     let (position, velocity) = text

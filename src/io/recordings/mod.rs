@@ -173,7 +173,7 @@ pub(crate) fn load(
 ) -> Result<InputTable, Failure> {
     use FileKind as K;
     load_signals(path, options, dictionary)
-        .map_err(|e| file_kind::or_wrong_kind(&[K::Recording, K::Imu, K::Log], path, e))
+        .map_err(|e| file_kind::or_wrong_kind(&[K::Recording, K::Imu, K::Log, K::Other], path, e))
 }
 
 fn load_signals(
