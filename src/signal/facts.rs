@@ -188,15 +188,24 @@ pub fn zeros(axis: &[f64]) -> Option<f64> {
 #[must_use]
 pub fn clipped(axis: &[f64]) -> Option<(f64, f64)> {
     let there = || axis.iter().copied().filter(|x| x.is_finite());
-    let ends = [f64::min as fn(f64, f64) -> f64, f64::max];
-    ends.into_iter().find_map(|farther| {
-        let end = there().reduce(farther)?;
-        let inside = there().filter(|x| *x != end).reduce(farther)?;
-        let count = |value: f64| there().filter(|x| *x == value).count();
-        let (at_end, next) = (count(end), count(inside));
-        let is_tail = || Some((end - median(there())).abs() >= FINE * step(axis)?);
-        (is_beyond(at_end, at_end + next, 0.75) && is_tail()?)
-            .then(|| (at_end as f64 / there().count() as f64, end))
+    [-1.0, 1.0].into_iter().find_map(|sign| {
+        // the value farthest out and the next, each with its number
+        let (mut end, mut inside) = ((f64::NEG_INFINITY, 0), (f64::NEG_INFINITY, 0));
+        for x in there().map(|x| sign * x) {
+            if x > end.0 {
+                (end, inside) = ((x, 1), end);
+            } else if x == end.0 {
+                end.1 += 1;
+            } else if x > inside.0 {
+                inside = (x, 1);
+            } else if x == inside.0 {
+                inside.1 += 1;
+            }
+        }
+        let ((end, at_end), (_, next)) = (end, inside);
+        let is_tail = || Some((sign * end - median(there())).abs() >= FINE * step(axis)?);
+        (next > 0 && is_beyond(at_end, at_end + next, 0.75) && is_tail()?)
+            .then(|| (at_end as f64 / there().count() as f64, sign * end))
     })
 }
 
@@ -504,7 +513,7 @@ pub fn shared_noise(axes: &[&[f64]]) -> Vec<SharedNoise> {
     let mut blocks: Vec<Blocks> = axes.iter().map(|axis| samples_of(axis)).collect();
     let mut width = 1.0;
     while blocks.first().is_some_and(|blocks| blocks.len() >= 4) {
-        let signs: Vec<Vec<i8>> = blocks.iter().map(|own| signs(&haar(own, width))).collect();
+        let signs: Vec<Vec<Signs>> = blocks.iter().map(|own| signs(&haar(own, width))).collect();
         for (pair, found) in pairs.iter().zip(&mut found) {
             let correlation = sign_correlation(&signs[pair[0]], &signs[pair[1]], tests);
             let Some(correlation) = correlation.filter(|x| x.abs() >= LEAST_CORRELATION) else {
@@ -526,27 +535,32 @@ pub fn shared_noise(axes: &[&[f64]]) -> Vec<SharedNoise> {
     found.into_iter().flatten().collect()
 }
 
-/// Sides of the median; 0 on it.
-fn signs(values: &[f64]) -> Vec<i8> {
+/// Bits of 64 values: those above the median, and those below it.
+type Signs = [u64; 2];
+
+fn signs(values: &[f64]) -> Vec<Signs> {
     let there = values.iter().copied().filter(|x| x.is_finite());
-    if there.clone().next().is_none() {
-        return vec![0; values.len()];
-    }
-    let middle = median(there);
-    let side = |x: &f64| i8::from(*x > middle) - i8::from(*x < middle);
-    values.iter().map(side).collect()
+    let middle = there.clone().next().map_or(f64::NAN, |_| median(there));
+    let of = |values: &[f64]| {
+        let bits = values.iter().enumerate();
+        bits.fold([0; 2], |[above, below], (i, x)| {
+            let bit = |is_there| u64::from(is_there) << i;
+            [above | bit(*x > middle), below | bit(*x < middle)]
+        })
+    };
+    values.chunks(64).map(of).collect()
 }
 
 /// Correlation by signs, where one of so many tests that find none has a share of [`LEVEL`].
-fn sign_correlation(a: &[i8], b: &[i8], tests: f64) -> Option<f64> {
+fn sign_correlation(a: &[Signs], b: &[Signs], tests: f64) -> Option<f64> {
     let (mut trials, mut same, mut above) = (0_usize, 0_usize, [0_usize; 2]);
-    for (a, b) in a.iter().zip(b) {
-        if *a != 0 && *b != 0 {
-            trials += 1;
-            same += usize::from(a == b);
-            above[0] += usize::from(*a > 0);
-            above[1] += usize::from(*b > 0);
-        }
+    let count = |bits: u64| bits.count_ones() as usize;
+    for ([a, below_a], [b, below_b]) in a.iter().zip(b) {
+        let both = (a | below_a) & (b | below_b);
+        trials += count(both);
+        same += count(a & b | below_a & below_b);
+        above[0] += count(a & both);
+        above[1] += count(b & both);
     }
     // steps put more on one side of the median than on the other
     let [of_a, of_b] = above.map(|count| count as f64 / trials.max(1) as f64);
