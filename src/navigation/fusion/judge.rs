@@ -6,6 +6,7 @@ use super::{Nine, horizontal};
 use crate::frames::{NavState, RollPitchYaw};
 use crate::linalg::{mean, median};
 use crate::metrics::{DriveVerdict, NormalisedErrors, PerState, Verdict, VerdictKind};
+use crate::sensors::outage::Outage;
 use crate::simulation::{REPORTED, TOLERANCE, reported_error};
 use crate::trajectory::reference::Reference;
 use crate::units::DEG;
@@ -139,12 +140,12 @@ pub struct Judgement {
     pub errors: Vec<StatedErrors>,
 }
 
-/// Judges a solution with outages (start, end) (s); none where the reference reaches no row.
+/// Judges a solution with outages; none where the reference reaches no row.
 pub fn judge(
     rows: &[StatedRow],
     reference: &Reference,
     given: ReferenceOffset,
-    outages: &[(f64, f64)],
+    outages: &[Outage],
 ) -> Option<Judgement> {
     let nearest = at_epochs(rows, reference, given);
     let is_at_epochs = nearest.is_some();
