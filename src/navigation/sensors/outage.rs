@@ -150,10 +150,12 @@ impl<'a> FixedData<'a> {
     fn has_fix_in(&self, outage: &Outage) -> bool {
         match self.fixes {
             Fixes::Every { interval_s } => {
+                let (start_s, end_s) = self.span_s;
+                let before = ((outage.start_s - start_s) / interval_s).floor().max(0.0);
                 // there is no fix at the start itself
-                let fixes = (1_u32..).map(|k| self.span_s.0 + f64::from(k) * interval_s);
-                let mut until = fixes.take_while(|t_s| !outage.is_over(*t_s));
-                until.any(|t_s| outage.withholds(t_s))
+                let numbers = [before.max(1.0), before + 1.0];
+                let mut times = numbers.map(|k| start_s + k * interval_s).into_iter();
+                times.any(|t_s| t_s <= end_s + SLACK_S && outage.withholds(t_s))
             }
             Fixes::At(times_s) => times_s.iter().any(|t_s| outage.withholds(*t_s)),
         }
@@ -231,7 +233,7 @@ impl OutageError {
 /// Outages as they are on data.
 #[derive(Debug, Clone)]
 pub struct PlacedOutages {
-    /// In time order, apart from one another.
+    /// In time order: each withholds a fix, and there is one between any two.
     pub windows: Vec<Outage>,
     /// Remarks on outages that differ from the request.
     pub remarks: Vec<String>,
@@ -403,11 +405,10 @@ impl OutagePlan {
                 });
             }
         }
-        let windows = self.windows(data.span_s, seed);
-        // Every fixed window lies on the data by now: fewer windows than were requested can only come of a
-        // union.
+        let windows = self.windows(data, seed);
+        // Every fixed window withholds a fix: fewer windows than were requested can only come of a union.
         if self.fixed.len() > windows.len() {
-            remarks.push("overlapping outages are merged".to_owned());
+            remarks.push("outages without a fix between them are merged".to_owned());
         }
         if let Some(first_s) = self
             .periodic
@@ -433,33 +434,35 @@ impl OutagePlan {
         Ok(PlacedOutages { windows, remarks })
     }
 
-    /// The windows on data that last from `span_s.0` to `span_s.1`: in time order, those that overlap or touch
-    /// made one, cut at the ends, those outside left out.
-    fn windows(&self, span_s: (f64, f64), seed: u64) -> Vec<Outage> {
+    /// The windows on data in time order, cut at the ends: those that withhold no fix left out, those without a fix
+    /// between them made one.
+    fn windows(&self, data: &FixedData<'_>, seed: u64) -> Vec<Outage> {
+        let (start_s, end_s) = data.span_s;
         let fixed = self.fixed.iter().chain(&self.default).copied();
-        let periodic = self.periodic.iter().flat_map(|p| p.windows(span_s));
-        let random = self.random.iter().flat_map(|r| r.windows(span_s, seed));
-        united(fixed.chain(periodic).chain(random).collect(), span_s)
-    }
-}
-
-fn united(mut windows: Vec<Outage>, (start_s, end_s): (f64, f64)) -> Vec<Outage> {
-    windows.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
-    let mut united: Vec<Outage> = Vec::new();
-    for window in windows {
-        let cut = Outage {
+        let periodic = self.periodic.iter().flat_map(|p| p.windows(data.span_s));
+        let random = self
+            .random
+            .iter()
+            .flat_map(|r| r.windows(data.span_s, seed));
+        let cut = |window: Outage| Outage {
             start_s: window.start_s.max(start_s),
             end_s: window.end_s.min(end_s),
         };
-        match united.last_mut() {
-            _ if cut.start_s >= cut.end_s => {}
-            // Touching counts as overlapping: the first fix after the one is the first that the other
-            // withholds.
-            Some(last) if cut.start_s <= last.end_s => last.end_s = last.end_s.max(cut.end_s),
-            _ => united.push(cut),
-        }
+        let all = fixed.chain(periodic).chain(random).map(cut);
+        let mut windows: Vec<Outage> = all.filter(|window| data.has_fix_in(window)).collect();
+        windows.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
+        windows.dedup_by(|next, last| {
+            let is_one = !data.has_fix_in(&Outage {
+                start_s: last.end_s,
+                end_s: next.start_s,
+            });
+            if is_one {
+                last.end_s = last.end_s.max(next.end_s);
+            }
+            is_one
+        });
+        windows
     }
-    united
 }
 
 #[cfg(test)]
