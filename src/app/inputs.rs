@@ -105,6 +105,19 @@ pub(crate) fn placed(
     Ok(placed.windows)
 }
 
+/// Turn-on biases that a model and that of the true errors state, where the scenario is silent.
+pub(crate) fn turn_on(
+    scenario: &mut Scenario,
+    model: (&Path, &ModelFile),
+    truth: Option<(&Path, &ModelFile)>,
+    context: &Context<'_>,
+) {
+    expect_turn_on(&mut scenario.initial, model.1.turn_on, model.0, context);
+    if let Some((path, file)) = truth {
+        make_turn_on(&mut scenario.imu, file.turn_on, path, context);
+    }
+}
+
 /// Lets the filter expect the turn-on bias that its model states, where settings are silent.
 pub(crate) fn expect_turn_on(
     initial: &mut InitialSettings,

@@ -79,6 +79,8 @@ impl Command for Design {
             let trajectory = inputs::trajectory(path, context)?;
             let outages = scenario
                 .outages_on((trajectory.start_s(), trajectory.end_s()), 0)?
+            let own = (self.model.as_path(), &file);
+            inputs::turn_on(&mut scenario, own, Some(own), context);
                 .windows;
             scenario.imu.rate_hz = file.model.rate_hz;
             scenario.validate().map_err(Failure::input)?;

@@ -187,8 +187,8 @@ impl Requirements {
         let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
         let file = inputs::model(path, context)?;
         let mut scenario = self.scenario.clone();
-        inputs::expect_turn_on(&mut scenario.initial, file.turn_on, path, context);
-        inputs::make_turn_on(&mut scenario.imu, file.turn_on, path, context);
+        let own = (path, &file);
+        inputs::turn_on(&mut scenario, own, Some(own), context);
         let missing = missing(&file.not_stated());
         if !missing.is_empty() {
             context.warn(format!(
@@ -881,9 +881,8 @@ impl Requirements {
     /// A unit whose turn-on biases are there and expected; `model` is at the rate of the IMU.
     fn unit(&self, name: String, file: &ModelFile, model: Model) -> CatalogueUnit {
         let mut scenario = self.scenario.clone();
-        let (path, silent) = (Path::new(&name), Context::default());
-        inputs::expect_turn_on(&mut scenario.initial, file.turn_on, path, &silent);
-        inputs::make_turn_on(&mut scenario.imu, file.turn_on, path, &silent);
+        let own = (Path::new(&name), file);
+        inputs::turn_on(&mut scenario, own, Some(own), &Context::default());
         CatalogueUnit {
             name,
             model,
