@@ -93,14 +93,14 @@ pub(crate) fn recordings(
     Ok(recordings)
 }
 
-/// The outages on a trajectory; what is doubtful about them.
+/// The outages on a trajectory that lasts from `span_s.0` to `span_s.1`; what is doubtful about them.
 pub(crate) fn placed(
     scenario: &Scenario,
-    trajectory: &Trajectory,
+    span_s: (f64, f64),
     seed: u64,
     context: &Context<'_>,
 ) -> Result<Vec<Outage>> {
-    let placed = scenario.outages_on((trajectory.start_s(), trajectory.end_s()), seed)?;
+    let placed = scenario.outages_on(span_s, seed)?;
     context.warn_each(placed.remarks);
     Ok(placed.windows)
 }

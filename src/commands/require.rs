@@ -470,7 +470,7 @@ impl Requirements {
         ask: OutageRequest,
         first_s: Option<f64>,
     ) -> Result<Self, Failure> {
-        let span_s = (trajectory.start_s(), trajectory.end_s());
+        let span_s = trajectory.span_s();
         let (lasts_s, length_s) = (span_s.1 - span_s.0, ask.length_s());
         let settled_s = span_s.0 + SETTLED_S.min(0.5 * (lasts_s - length_s)).max(0.0);
         let earlier = first_s.map_or("", |_| ", or an earlier --start");

@@ -229,14 +229,13 @@ impl Run {
         if self.spread {
             inputs.truth = TrueImu::Drawn(self.drawn(&made_by, &scenario, seed)?);
         }
-        let outages = inputs::placed(&scenario, &inputs.trajectory, seed, context).map_err(
-            |e| match &self.settings.file.scenario {
+        let outages = inputs::placed(&scenario, inputs.trajectory.span_s(), seed, context)
+            .map_err(|e| match &self.settings.file.scenario {
                 Some(file) if self.settings.outages.is_empty() => {
                     e.within(&file.display().to_string())
                 }
                 _ => e,
-            },
-        )?;
+            })?;
         let wanting = self
             .require
             .iter()
