@@ -904,7 +904,12 @@ impl Requirements {
         let end_s = self.trajectory.end_s();
         let seconds = (end_s - length_s - self.first_s).floor().max(0.0) + 1.0;
         let count = seconds.min((TOGETHER_S / mean_s).max(BEGINNINGS));
-        evenly(self.first_s, end_s, length_s, count as u32)
+        evenly(
+            self.trajectory.span_s(),
+            self.first_s,
+            length_s,
+            count as u32,
+        )
     }
 
     /// The outage at the places that it is asked for, each as long as the trajectory allows.
