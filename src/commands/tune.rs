@@ -178,7 +178,15 @@ impl Tune {
             }
             let outages = inputs::placed(scenario, (0.0, DAY_S), seed, context)?;
             let lengths: Vec<f64> = outages.iter().map(|o| o.end_s - o.start_s).collect();
-            let track = drive(model, &scenario.imu, &scenario.gnss, &lengths).ok_or_else(|| {
+            let Scenario {
+                imu,
+                gnss,
+                initial,
+                filter,
+                ..
+            } = scenario;
+            let track = drive(model, imu, gnss, initial, filter.gravity, &lengths);
+            let track = track.ok_or_else(|| {
                 Failure::input("no built-in drive for this receiver")
                     .hint("give a trajectory with --trajectory")
             })?;
