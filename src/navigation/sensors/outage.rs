@@ -173,8 +173,21 @@ impl<'a> FixedData<'a> {
         }
     }
 
-    /// An outage requested by its times, cut where the data end.
-    fn place(&self, asked: Outage) -> Result<Outage, OutageError> {
+    /// A window cut where the data end: one that lasts longer withholds a fix at their very end.
+    fn cut(&self, window: Outage) -> Outage {
+        let (start_s, end_s) = self.span_s;
+        let next_s = match self.fixes {
+            Fixes::Every { interval_s } => end_s + interval_s,
+            Fixes::At(_) => end_s,
+        };
+        Outage {
+            start_s: window.start_s.max(start_s),
+            end_s: window.end_s.min(next_s),
+        }
+    }
+
+    /// Checks that an outage requested by its times begins on the data and withholds a fix.
+    fn check(&self, asked: Outage) -> Result<(), OutageError> {
         let (start_s, end_s) = self.span_s;
         let refused = |reason: String, fixes: String| {
             Err(OutageError::Placed {
@@ -193,12 +206,8 @@ impl<'a> FixedData<'a> {
                 ),
             );
         }
-        let placed = Outage {
-            end_s: asked.end_s.min(end_s),
-            ..asked
-        };
-        if self.has_fix_in(&placed) {
-            return Ok(placed);
+        if self.has_fix_in(&asked) {
+            return Ok(());
         }
         refused("withholds no fix".to_owned(), self.described())
     }
@@ -383,7 +392,7 @@ impl OutagePlan {
     ///     ..OutagePlan::default()
     /// };
     /// let placed = plan(50.0, 70.0).on(&data, 1)?;
-    /// assert_eq!(placed.windows, [Outage { start_s: 50.0, end_s: 60.0 }]);
+    /// assert_eq!(placed.windows, [Outage { start_s: 50.0, end_s: 61.0 }]);
     /// assert_eq!(placed.remarks[0], "outage 50:70 is cut: the trajectory ends at 60 s");
     /// assert!(plan(70.0, 90.0).on(&data, 1).is_err());
     /// # Ok::<(), nav_sim_navigation::sensors::outage::OutageError>(())
@@ -396,7 +405,8 @@ impl OutagePlan {
         let (start_s, end_s) = data.span_s;
         let mut remarks = Vec::new();
         for asked in &self.fixed {
-            if data.place(*asked)? != *asked {
+            data.check(*asked)?;
+            if asked.end_s > end_s {
                 remarks.push(match data.fixes {
                     Fixes::At([.., last]) => {
                         format!("outage {asked} is cut at {end_s} s: the fixes end at {last} s")
@@ -437,19 +447,18 @@ impl OutagePlan {
     /// The windows on data in time order, cut at the ends: those that withhold no fix left out, those without a fix
     /// between them made one.
     fn windows(&self, data: &FixedData<'_>, seed: u64) -> Vec<Outage> {
-        let (start_s, end_s) = data.span_s;
         let fixed = self.fixed.iter().chain(&self.default).copied();
         let periodic = self.periodic.iter().flat_map(|p| p.windows(data.span_s));
         let random = self
             .random
             .iter()
             .flat_map(|r| r.windows(data.span_s, seed));
-        let cut = |window: Outage| Outage {
-            start_s: window.start_s.max(start_s),
-            end_s: window.end_s.min(end_s),
-        };
-        let all = fixed.chain(periodic).chain(random).map(cut);
-        let mut windows: Vec<Outage> = all.filter(|window| data.has_fix_in(window)).collect();
+        let all = fixed.chain(periodic).chain(random);
+        let mut windows: Vec<Outage> = all
+            .filter(|window| window.start_s < data.span_s.1)
+            .map(|window| data.cut(window))
+            .filter(|window| data.has_fix_in(window))
+            .collect();
         windows.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
         windows.dedup_by(|next, last| {
             let is_one = !data.has_fix_in(&Outage {

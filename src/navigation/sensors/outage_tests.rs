@@ -33,7 +33,7 @@ fn kinds_are_united_in_time_order() {
         }),
         ..OutagePlan::default()
     };
-    let expected = vec![outage(10.0, 25.0), outage(50.0, 70.0), outage(95.0, 100.0)];
+    let expected = vec![outage(10.0, 25.0), outage(50.0, 70.0), outage(95.0, 101.0)];
     assert_eq!(plan.windows(&regular(0.0, 100.0), 1), expected);
 }
 
@@ -73,7 +73,7 @@ fn periodic_outages_begin_where_the_span_does() {
         }),
         ..OutagePlan::default()
     };
-    let expected = vec![outage(0.0, 10.0), outage(90.0, 110.0), outage(190.0, 200.0)];
+    let expected = vec![outage(0.0, 10.0), outage(90.0, 110.0), outage(190.0, 201.0)];
     assert_eq!(plan(-10.0).windows(&regular(0.0, 200.0), 1), expected);
     assert_eq!(
         plan(-1e12 - 10.0).windows(&regular(0.0, 200.0), 1),
@@ -90,22 +90,25 @@ fn an_outage_lies_on_the_data_and_withholds_a_fix() {
     assert_eq!(recorded.span_s, (0.0, 5.0));
     let regular = regular(0.0, 5.0);
     for data in [recorded, regular] {
-        let place = |a, b| data.place(outage(a, b));
-        assert_eq!(place(2.0, 3.0), Ok(outage(2.0, 3.0)));
-        assert_eq!(place(3.5, 9.0), Ok(outage(3.5, 5.0)));
-        assert_eq!(place(0.0, 1.5), Ok(outage(0.0, 1.5)));
+        let check = |a, b| data.check(outage(a, b));
+        for (a, b) in [(2.0, 3.0), (3.5, 9.0), (0.0, 1.5)] {
+            assert_eq!(check(a, b), Ok(()));
+        }
         for (a, b) in [(2.1, 2.9), (0.0, 1.0), (2.0 + 1e-8, 3.0)] {
-            let e = place(a, b).unwrap_err().to_string();
+            let e = check(a, b).unwrap_err().to_string();
             assert_eq!(e, format!("outage {a}:{b} withholds no fix"));
         }
         for (a, b) in [(-1.0, 3.0), (5.0, 9.0)] {
-            let e = place(a, b).unwrap_err().to_string();
+            let e = check(a, b).unwrap_err().to_string();
             let expected = "does not lie on the data, which last from 0 to 5 s";
             assert_eq!(e, format!("outage {a}:{b} {expected}"));
         }
     }
+    // of the two, the regular fixes have one at 5 s
+    let ends = [recorded, regular].map(|d| d.cut(outage(3.5, 9.0)).end_s);
+    assert_eq!(ends, [5.0, 6.0]);
     let hints = [recorded, regular].map(|d| {
-        d.place(outage(5.0, 9.0))
+        d.check(outage(5.0, 9.0))
             .unwrap_err()
             .hint()
             .map(str::to_owned)
@@ -129,7 +132,7 @@ fn default_outages_are_cut_and_that_is_said() {
     }
     .on(&data, 1)
     .unwrap();
-    assert_eq!(placed.windows, [outage(300.0, 390.0), outage(700.0, 720.0)]);
+    assert_eq!(placed.windows, [outage(300.0, 390.0), outage(700.0, 721.0)]);
     let expected = [
         "the default outage 700:790 is cut: the trajectory lasts from 0 to 720 s",
         "the default outage 800:810 is left out: the trajectory lasts from 0 to 720 s",
