@@ -242,7 +242,7 @@ fn at_epochs(
     }
     let nearest = epochs.iter().filter_map(|t| {
         let next = times.partition_point(|own| own < t);
-        let near = [next.checked_sub(1)?, next.min(times.len() - 1)];
+        let near = [next.saturating_sub(1), next.min(times.len() - 1)];
         let apart = |k: &usize| (times[*k] - t).abs();
         let nearest = near
             .into_iter()
