@@ -285,7 +285,7 @@ impl Verdict {
         if known.is_empty() {
             return None;
         }
-        let independent = size(&known) * together;
+        let independent = (size(&known) * together).max(1.0);
         let samples_of_state: [f64; REPORTED] = std::array::from_fn(|state| size(&[state]));
         let samples = |outage: Option<usize>, state: Option<usize>| match (outage, state) {
             (Some(_), _) => 1.0,
