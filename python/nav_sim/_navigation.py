@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
-import numpy.typing as npt
 
 from nav_sim import _model, _trajectory
 from nav_sim._answer import Answer, Columns, Progress, ask, axes_or_new, flattened, windows
@@ -315,7 +314,7 @@ def fuse(
             lever_arm_m=numbers(lever_arm_m, "lever_arm_m", 3),
             mounting=_mounting(mounting),
             reference=None if reference is None else _trajectory.staged(reference, staging, "reference"),
-            outage=windows(outages or None),
+            outage=windows(outages) if len(outages) else None,
             filter=filter,
             turn_on_bias=turn_on_bias,
             gnss_sigma=_sigma(gnss_sigma),
@@ -381,7 +380,7 @@ def judge(
             solution=staging.table(solution, "solution"),
             reference=_trajectory.staged(reference, staging, "reference"),
             covariance=None if covariance is None else staging.table(covariance, "covariance"),
-            outage=windows(outages or None),
+            outage=windows(outages) if len(outages) else None,
             reference_delay=reference_delay_s,
             reference_arm=numbers(reference_arm_m, "reference_arm_m", 3),
             origin=None if origin is None else _joined(origin),
@@ -408,15 +407,17 @@ def _mounting(mounting: Mounting | None) -> Any:
     except (TypeError, ValueError):
         raise NavSimError(f"mounting={mounting!r} is neither a text nor angles") from None
     if angles.shape not in ((3,), (2, 3)):
-        raise NavSimError("mounting: roll, pitch, yaw (°) are needed, and where known three standard deviations")
-    both: npt.NDArray[np.float64] = angles if angles.ndim == 2 else np.stack([angles, np.ones(3)])
-    return f"{_joined(both[0])}:{_joined(both[1])}"
+        raise NavSimError("mounting: roll, pitch, yaw (°), and three standard deviations where known")
+    both = angles if angles.ndim == 2 else np.stack([angles, np.ones(3)])
+    return ":".join(map(_joined, both))
 
 
 def _sigma(sigma: float | Mapping[str, Any] | None) -> Any:
     if sigma is None:
         return None
     if isinstance(sigma, Mapping):
-        each = {key: np.broadcast_to(np.asarray(value, dtype=np.float64), 3) for key, value in sigma.items()}
-        return ":".join(_joined(each[key]) for key in ("pos_m", "vel_m_s") if key in each)
+        keys = sorted(sigma)
+        if keys not in (["pos_m"], ["pos_m", "vel_m_s"]):
+            raise NavSimError(f"gnss_sigma={sigma!r}: not pos_m, or pos_m and vel_m_s")
+        return ":".join(_joined(np.broadcast_to(sigma[key], 3)) for key in keys)
     return f"x{number(sigma, 'gnss_sigma')!r}"

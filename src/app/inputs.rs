@@ -93,16 +93,29 @@ pub(crate) fn recordings(
     Ok(recordings)
 }
 
-/// The outages on a trajectory; what is doubtful about them.
+/// The outages on a trajectory that lasts from `span_s.0` to `span_s.1`; what is doubtful about them.
 pub(crate) fn placed(
     scenario: &Scenario,
-    trajectory: &Trajectory,
+    span_s: (f64, f64),
     seed: u64,
     context: &Context<'_>,
 ) -> Result<Vec<Outage>> {
-    let placed = scenario.outages_on((trajectory.start_s(), trajectory.end_s()), seed)?;
+    let placed = scenario.outages_on(span_s, seed)?;
     context.warn_each(placed.remarks);
     Ok(placed.windows)
+}
+
+/// Turn-on biases that a model and that of the true errors state, where the scenario is silent.
+pub(crate) fn turn_on(
+    scenario: &mut Scenario,
+    model: (&Path, &ModelFile),
+    truth: Option<(&Path, &ModelFile)>,
+    context: &Context<'_>,
+) {
+    expect_turn_on(&mut scenario.initial, model.1.turn_on, model.0, context);
+    if let Some((path, file)) = truth {
+        make_turn_on(&mut scenario.imu, file.turn_on, path, context);
+    }
 }
 
 /// Lets the filter expect the turn-on bias that its model states, where settings are silent.

@@ -275,6 +275,7 @@ fn differences(candidate: &RunDirectory, reference: &RunDirectory) -> Vec<&'stat
         &candidate.origin.configuration,
         &reference.origin.configuration,
     );
+    let is_drawn = [candidate, reference].map(|run| run.origin.spread);
     let (candidate, reference) = (&candidate.manifest, &reference.manifest);
     let is_expected = [c, r].map(|manifest| manifest.run.method == Method::Lincov);
     let all = [
@@ -286,7 +287,7 @@ fn differences(candidate: &RunDirectory, reference: &RunDirectory) -> Vec<&'stat
         ),
         (
             "the source of errors is",
-            truth(candidate) != truth(reference),
+            is_drawn[0] != is_drawn[1] || truth(candidate) != truth(reference),
         ),
         ("[imu] is", c.imu != r.imu),
         ("[gnss] is", c.gnss != r.gnss),

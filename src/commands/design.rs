@@ -77,10 +77,10 @@ impl Command for Design {
         let mut destination = None;
         if let Some(path) = &self.trajectory {
             let trajectory = inputs::trajectory(path, context)?;
-            let outages = scenario
-                .outages_on((trajectory.start_s(), trajectory.end_s()), 0)?
-                .windows;
+            let outages = inputs::placed(&scenario, trajectory.span_s(), 0, context)?;
             scenario.imu.rate_hz = file.model.rate_hz;
+            let own = (self.model.as_path(), &file);
+            inputs::turn_on(&mut scenario, own, Some(own), context);
             scenario.validate().map_err(Failure::input)?;
             destination = Some((
                 NavigateInputs::new(trajectory, file.model.clone(), TrueImu::AsBelieved),
@@ -95,10 +95,13 @@ impl Command for Design {
         let recordings = self.recordings.map_or(vec![3, 6, 12], |k| vec![k as usize]);
         let hours = self.hours.map_or(vec![1.0, 3.0, 10.0], |h| vec![h]);
         let mut designs = Vec::new();
+        let silent = Context::default();
         for k in recordings {
             for h in &hours {
+                // the filter is the same in all of them
+                let context = [&silent, context][usize::from(designs.is_empty())];
                 designs.push(
-                    self.design(&file, &mut destination, bootstrap, k, *h)
+                    self.design(&file, &mut destination, bootstrap, (k, *h), context)
                         .map_err(|e| Failure::input(e).hint("more, or longer recordings"))?,
                 );
             }
@@ -131,8 +134,8 @@ impl Design {
         file: &ModelFile,
         destination: &mut Option<Destination>,
         bootstrap: Bootstrap,
-        recordings: usize,
-        hours: f64,
+        (recordings, hours): (usize, f64),
+        context: &Context<'_>,
     ) -> Result<DesignOutcome> {
         let model = &file.model;
         let anticipated = PlannedRecordings {
@@ -158,7 +161,7 @@ impl Design {
             }
         }
         let horizontal_p95 = match destination {
-            Some(destination) => destination_quantiles(destination, &all, model.rate_hz)?,
+            Some(destination) => destination_quantiles(destination, &all, model.rate_hz, context)?,
             None => Vec::new(),
         };
         Ok(DesignOutcome {
@@ -220,13 +223,14 @@ fn destination_quantiles(
     (inputs, scenario, outages): &mut Destination,
     outcomes: &[Outcome],
     rate_hz: f64,
+    context: &Context<'_>,
 ) -> Result<Vec<DesignedQuantile>> {
     outcomes
         .iter()
         .for_each(|outcome| outcome.apply_to(&mut inputs.model));
     let draws = DrawsFile::of(outcomes, rate_hz);
     inputs.model_draws = draws.and_then(|draws| draws.draws(&inputs.model));
-    let found = navigate(inputs, scenario, outages, 0, &Context::default())?;
+    let found = navigate(inputs, scenario, outages, 0, context)?;
     let quantile = |o: &OutageSummary| {
         let h = &o.horizontal_error_end_m;
         let ci95: [f64; 2] = h.p95_ci95.0.zip(h.p95_ci95.1)?.into();

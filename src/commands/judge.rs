@@ -86,8 +86,8 @@ impl Command for Judge {
             delay_s: self.reference_delay_s,
             lever_arm_m: self.reference_arm_m.into(),
         };
-        let outages: Vec<_> = self.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
-        let judgement = judge(&rows, &reference, given, &outages).ok_or_else(|| {
+        let outages = &self.outages;
+        let judgement = judge(&rows, &reference, given, outages).ok_or_else(|| {
             let (start, end) = reference.span_s();
             let ends = rows.first().zip(rows.last());
             let ends = ends.map_or((0.0, 0.0), |(a, b)| (a.t_s, b.t_s));
@@ -105,7 +105,7 @@ impl Command for Judge {
         })?;
         let (first, last) = (rows.first(), rows.last());
         let span = first.zip(last).map_or((0.0, 0.0), |(a, b)| (a.t_s, b.t_s));
-        for outage in &self.outages {
+        for outage in outages {
             if outage.end_s < span.0 || outage.start_s > span.1 {
                 let asked = window(outage.start_s, outage.end_s);
                 let message = format!("--outage: {asked} is outside the solution");
@@ -130,8 +130,8 @@ impl Command for Judge {
             Failure::bound("the solution is overconfident")
                 .hint("larger process or measurement noise in the filter: errors.csv shows where")
         });
-        let summary = summary(&judgement, &outages);
-        let document = page(&judgement, &outages);
+        let summary = summary(&judgement, outages);
+        let document = page(&judgement, outages);
         let files = [
             ("summary.json", json(&summary)),
             ("errors.csv", errors_csv(&judgement)),
@@ -142,16 +142,16 @@ impl Command for Judge {
     }
 }
 
-fn summary(judgement: &Judgement, outages: &[(f64, f64)]) -> serde_json::Value {
+fn summary(judgement: &Judgement, outages: &[Outage]) -> serde_json::Value {
     let stated = judgement.stated.as_ref();
     let mut verdict = stated.map_or(json!({}), |s| json!(s.verdict));
     verdict["kind"] = json!(judgement.kind);
-    let outage = |(k, (start_s, end_s)): (usize, &(f64, f64))| {
-        let mut within = judgement.errors.iter();
-        let last = within.rfind(|e| e.t_s > *start_s && e.t_s <= end_s + 1e-6);
+    let outage = |(k, outage): (usize, &Outage)| {
+        let mut errors = judgement.errors.iter();
+        let last = errors.rfind(|e| outage.withholds(e.t_s));
         json!({
-            "start_s": start_s,
-            "end_s": end_s,
+            "start_s": outage.start_s,
+            "end_s": outage.end_s,
             "verdict": stated.and_then(|s| s.outages.get(k)),
             "horizontal_error_end_m": last.map(|e| e.values[0].hypot(e.values[1])),
             "horizontal_sigma_end_m": last.map(|e| e.sigma[0].hypot(e.sigma[1])),
@@ -240,11 +240,12 @@ fn lines(judgement: &Judgement, outages: &[(f64, f64)]) -> Vec<String> {
     lines
 }
 
-fn page(judgement: &Judgement, outages: &[(f64, f64)]) -> Document {
+fn page(judgement: &Judgement, outages: &[Outage]) -> Document {
+    let windows: Vec<_> = outages.iter().map(|o| (o.start_s, o.end_s)).collect();
     let mut document = Document::new(
         "A solution against a reference",
         tone(judgement.kind),
-        lines(judgement, outages),
+        lines(judgement, &windows),
     );
     let ends = judgement.errors.first().zip(judgement.errors.last());
     if let Some((first, last)) = ends {
@@ -313,7 +314,7 @@ fn page(judgement: &Judgement, outages: &[(f64, f64)]) -> Document {
     document.charts(
         &error_charts(
             &[(rows.collect(), names, [Colour::BELIEVED, Colour::REAL])],
-            outages,
+            &windows,
         ),
         "Lines: solution minus reference. Bands: ± 3 σ as stated.",
     );

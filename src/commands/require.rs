@@ -187,8 +187,8 @@ impl Requirements {
         let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
         let file = inputs::model(path, context)?;
         let mut scenario = self.scenario.clone();
-        inputs::expect_turn_on(&mut scenario.initial, file.turn_on, path, context);
-        inputs::make_turn_on(&mut scenario.imu, file.turn_on, path, context);
+        let own = (path, &file);
+        inputs::turn_on(&mut scenario, own, Some(own), context);
         let missing = missing(&file.not_stated());
         if !missing.is_empty() {
             context.warn(format!(
@@ -470,7 +470,7 @@ impl Requirements {
         ask: OutageRequest,
         first_s: Option<f64>,
     ) -> Result<Self, Failure> {
-        let span_s = (trajectory.start_s(), trajectory.end_s());
+        let span_s = trajectory.span_s();
         let (lasts_s, length_s) = (span_s.1 - span_s.0, ask.length_s());
         let settled_s = span_s.0 + SETTLED_S.min(0.5 * (lasts_s - length_s)).max(0.0);
         let earlier = first_s.map_or("", |_| ", or an earlier --start");
@@ -881,9 +881,8 @@ impl Requirements {
     /// A unit whose turn-on biases are there and expected; `model` is at the rate of the IMU.
     fn unit(&self, name: String, file: &ModelFile, model: Model) -> CatalogueUnit {
         let mut scenario = self.scenario.clone();
-        let (path, silent) = (Path::new(&name), Context::default());
-        inputs::expect_turn_on(&mut scenario.initial, file.turn_on, path, &silent);
-        inputs::make_turn_on(&mut scenario.imu, file.turn_on, path, &silent);
+        let own = (Path::new(&name), file);
+        inputs::turn_on(&mut scenario, own, Some(own), &Context::default());
         CatalogueUnit {
             name,
             model,
@@ -905,7 +904,12 @@ impl Requirements {
         let end_s = self.trajectory.end_s();
         let seconds = (end_s - length_s - self.first_s).floor().max(0.0) + 1.0;
         let count = seconds.min((TOGETHER_S / mean_s).max(BEGINNINGS));
-        evenly(self.first_s, end_s, length_s, count as u32)
+        evenly(
+            self.trajectory.span_s(),
+            self.first_s,
+            length_s,
+            count as u32,
+        )
     }
 
     /// The outage at the places that it is asked for, each as long as the trajectory allows.

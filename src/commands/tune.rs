@@ -176,16 +176,24 @@ impl Tune {
                     "give a trajectory with --trajectory",
                 );
             }
-            let outages = scenario.outages_on((0.0, DAY_S), seed)?.windows;
+            let outages = inputs::placed(scenario, (0.0, DAY_S), seed, context)?;
             let lengths: Vec<f64> = outages.iter().map(|o| o.end_s - o.start_s).collect();
-            let track = drive(model, &scenario.imu, &scenario.gnss, &lengths).ok_or_else(|| {
+            let Scenario {
+                imu,
+                gnss,
+                initial,
+                filter,
+                ..
+            } = scenario;
+            let track = drive(model, imu, gnss, initial, filter.gravity, &lengths);
+            let track = track.ok_or_else(|| {
                 Failure::input("no built-in drive for this receiver")
                     .hint("give a trajectory with --trajectory")
             })?;
             return Ok((track, outages));
         };
         let trajectory = inputs::trajectory(path, context)?;
-        let outages = inputs::placed(scenario, &trajectory, seed, context)?;
+        let outages = inputs::placed(scenario, trajectory.span_s(), seed, context)?;
         let track = scenario
             .track(&trajectory, model, &outages)
             .map_err(Failure::input)?;

@@ -432,18 +432,19 @@ fn hardest(limits: &[Limit], drifts: &[Drift]) -> HardestLimit {
     HardestLimit::of(limits, drifts).expect("limits")
 }
 
-/// Outages of one length at `places` times, the first at `first_s`, evenly to the end of the trajectory.
-pub fn evenly(first_s: f64, end_s: f64, length_s: f64, places: u32) -> Vec<Outage> {
-    let last_s = end_s - length_s;
+/// Outages of one length at `places` times, the first at `first_s`, evenly to the end of a trajectory that lasts from
+/// `span_s.0` to `span_s.1`.
+pub fn evenly(span_s: (f64, f64), first_s: f64, length_s: f64, places: u32) -> Vec<Outage> {
+    let last_s = span_s.1 - length_s;
     let step = if places > 1 {
         (last_s - first_s).max(0.0) / f64::from(places - 1)
     } else {
         0.0
     };
     let mut outages: Vec<Outage> = (0..places)
-        // Reports come at whole seconds: only from such a start are the errors within the outage those after
-        // 1, 2, 3 … s.
-        .map(|k| (first_s + f64::from(k) * step).floor())
+        // Reports come every second from the start: only from one of them are the errors within the outage those
+        // after 1, 2, 3 … s.
+        .map(|k| span_s.0 + (first_s - span_s.0 + f64::from(k) * step + 1e-6).floor())
         .map(|start_s| Outage {
             start_s,
             end_s: start_s + length_s,

@@ -57,6 +57,16 @@ fn a_turn_on_bias_is_stored_said_and_expected_by_run() {
         off(number(initial, "/gyro_bias_sigma_rad_s"), sigma) < 0.03,
         "{initial}"
     );
+    // a design has it on the same drive, and so the same errors
+    let outage = "--outage 30:40";
+    let design = "design m.toml --recordings 4 --hours 0.1 --draws 40 --trajectory drive.toml";
+    let planned = place.answer(&format!("{design} {outage}"));
+    let run = "run drive.toml m.toml --method lincov --filter full";
+    let made = place.answer(&format!("{run} {outage}"));
+    assert_eq!(
+        number(&planned, "/designs/0/horizontal_p95/0/p95_m"),
+        number(&made, "/outages/0/horizontal_error_end_m/p95")
+    );
 }
 
 #[test]

@@ -79,7 +79,7 @@ impl World {
     fn analysis(&self, model: &Model, truth: TrueImu, draws: Option<Draws>) -> Summary {
         let mut inputs = NavigateInputs::new(self.trajectory.clone(), model.clone(), truth);
         inputs.model_draws = draws;
-        let span = (self.trajectory.start_s(), self.trajectory.end_s());
+        let span = self.trajectory.span_s();
         let outages = self.scenario.outages_on(span, 0).unwrap().windows;
         navigate(&inputs, &self.scenario, &outages, 0, &Context::default())
             .unwrap()

@@ -103,7 +103,7 @@ impl Command for Choose {
         let scenario = self.settings.checked()?;
         let trajectory = inputs::trajectory(&self.trajectory, context)?;
         let seed = context.seed_or(scenario.run.seed);
-        let outages = inputs::placed(&scenario, &trajectory, seed, context)?;
+        let outages = inputs::placed(&scenario, trajectory.span_s(), seed, context)?;
         if outages.is_empty() {
             return refused(
                 "no outage: candidates are compared at the ends of outages",

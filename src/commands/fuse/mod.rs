@@ -909,6 +909,8 @@ fn filter_model(
             &model,
             &ImuSettings::default(),
             &receiver(gnss, interval_s),
+            &InitialSettings::default(),
+            GravityModel::default(),
             lengths,
         )
     };

@@ -12,7 +12,6 @@ use nav_sim_document::{
 };
 use nav_sim_navigation::ekf::FixUpdate;
 use nav_sim_navigation::metrics::{EpochMetrics, OutageSummary, Summary, VerdictKind};
-use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::{GainsUsed, REPORTED_NAMES};
 
 /// Outages whose tables are shown: of more, those with the largest errors.
@@ -350,7 +349,8 @@ fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
 fn remedy(summary: &Summary, unexpected: &[String], answer: &RunAnswer) -> String {
     let verdict = &summary.verdict;
     let has_input = |role| answer.inputs.iter().any(|input| input.role == role);
-    let [is_recorded, is_modelled] = ["static", "truth"].map(has_input);
+    let [is_recorded, has_truth] = ["static", "truth"].map(has_input);
+    let is_other = is_recorded || has_truth || answer.origin.spread;
     let ratios = summary.reduction.iter().flat_map(|quality| {
         quality
             .outage_end
@@ -359,8 +359,6 @@ fn remedy(summary: &Summary, unexpected: &[String], answer: &RunAnswer) -> Strin
             .flat_map(|state| state.0)
     });
     let is_far = verdict.beyond_linear.is_some();
-    let is_analysed = summary.method == Method::Lincov.name()
-        || verdict.by_covariance_analysis == Some(VerdictKind::Overconfident);
     // what recordings contain is unknown, and so is whether linear analysis would find the filter wrong
     match unexpected.first() {
         _ if summary.is_contradicted || is_recorded && is_far => {}
@@ -369,12 +367,8 @@ fn remedy(summary: &Summary, unexpected: &[String], answer: &RunAnswer) -> Strin
         None if ratios.fold(0.0, f64::max) > 1.0 + verdict.tolerance => {
             return "--filter full models each process".to_owned();
         }
-        None if is_recorded || is_modelled || is_analysed && !is_far => {
-            let how = if is_recorded || is_modelled {
-                ""
-            } else {
-                " --scenario"
-            };
+        None if is_other || !is_far => {
+            let how = if is_other { "" } else { " --scenario" };
             return format!(
                 "MODEL is not the truth: nav-sim tune{how} finds variances that cover it"
             );

@@ -229,14 +229,13 @@ impl Run {
         if self.spread {
             inputs.truth = TrueImu::Drawn(self.drawn(&made_by, &scenario, seed)?);
         }
-        let outages = inputs::placed(&scenario, &inputs.trajectory, seed, context).map_err(
-            |e| match &self.settings.file.scenario {
+        let outages = inputs::placed(&scenario, inputs.trajectory.span_s(), seed, context)
+            .map_err(|e| match &self.settings.file.scenario {
                 Some(file) if self.settings.outages.is_empty() => {
                     e.within(&file.display().to_string())
                 }
                 _ => e,
-            },
-        )?;
+            })?;
         let wanting = self
             .require
             .iter()
@@ -309,17 +308,13 @@ impl Run {
         };
         let trajectory = shared.trajectory(&self.trajectory, context)?;
         let (model, file) = read_model(&self.model)?;
-        inputs::expect_turn_on(&mut scenario.initial, file.turn_on, &self.model, context);
         let truth = self.truth.as_deref().map(read_model).transpose()?;
+        let own = (self.model.as_path(), &file);
+        let of_truth = self.truth.as_deref().zip(truth.as_ref());
+        let of_truth = of_truth.map_or(own, |(path, (_, file))| (path, file));
         // recordings are their own truth: what they had of a constant bias is taken from them
-        if self.recordings.is_empty() {
-            inputs::make_turn_on(
-                &mut scenario.imu,
-                truth.as_ref().map_or(&file, |(_, file)| file).turn_on,
-                self.truth.as_ref().unwrap_or(&self.model),
-                context,
-            );
-        }
+        let of_truth = self.recordings.is_empty().then_some(of_truth);
+        inputs::turn_on(scenario, own, of_truth, context);
         let draws = |path: &Path, file: &ModelFile| -> Option<Draws> {
             draws_file::usable(path, file, imu_hz).unwrap_or_else(|doubt| {
                 context.warn(format!("{doubt}: no intervals from the calibration"));

@@ -6,6 +6,7 @@ use super::{Nine, horizontal};
 use crate::frames::{NavState, RollPitchYaw};
 use crate::linalg::{mean, median};
 use crate::metrics::{DriveVerdict, NormalisedErrors, PerState, Verdict, VerdictKind};
+use crate::sensors::outage::Outage;
 use crate::simulation::{REPORTED, TOLERANCE, reported_error};
 use crate::trajectory::reference::Reference;
 use crate::units::DEG;
@@ -139,12 +140,12 @@ pub struct Judgement {
     pub errors: Vec<StatedErrors>,
 }
 
-/// Judges a solution with outages (start, end) (s); none where the reference reaches no row.
+/// Judges a solution with outages; none where the reference reaches no row.
 pub fn judge(
     rows: &[StatedRow],
     reference: &Reference,
     given: ReferenceOffset,
-    outages: &[(f64, f64)],
+    outages: &[Outage],
 ) -> Option<Judgement> {
     let nearest = at_epochs(rows, reference, given);
     let is_at_epochs = nearest.is_some();
@@ -241,7 +242,7 @@ fn at_epochs(
     }
     let nearest = epochs.iter().filter_map(|t| {
         let next = times.partition_point(|own| own < t);
-        let near = [next.checked_sub(1)?, next.min(times.len() - 1)];
+        let near = [next.saturating_sub(1), next.min(times.len() - 1)];
         let apart = |k: &usize| (times[*k] - t).abs();
         let nearest = near
             .into_iter()

@@ -229,9 +229,8 @@ fn from_reference(rows: &[SolutionRow], outages: &[Outage]) -> Option<FromRefere
         })
     };
     let normalised: Vec<NormalisedErrors> = rows.iter().filter_map(normalised).collect();
-    let windows: Vec<(f64, f64)> = outages.iter().map(|o| (o.start_s, o.end_s)).collect();
     (!errors.is_empty()).then(|| FromReference {
-        verdict: Verdict::of_drive(&normalised, &windows),
+        verdict: Verdict::of_drive(&normalised, outages),
         rmse: PerState(rmse),
         horizontal_rmse_m: horizontal(&rmse),
         horizontal_max_m: errors

@@ -57,10 +57,9 @@ impl ExpectedRun {
             .collect::<Option<_>>()?;
         let ends = experiment.outages.iter().zip(&law.outage_ends);
         let of_outage = |(window, end): (&Outage, &AssessedInstant)| {
-            let window = (window.start_s, window.end_s);
-            let mut outage = outage(window, end, &epochs);
+            let mut outage = outage((window.start_s, window.end_s), end, &epochs);
             // A barometer or a vehicle that measures in the outage corrects what grows upwards.
-            let lasts = |rate_hz: f64| (window.1 - window.0) * rate_hz >= 1.0;
+            let lasts = |rate_hz: f64| (window.end_s - window.start_s) * rate_hz >= 1.0;
             let sees_height = experiment.baro.is_some_and(|b| lasts(b.rate_hz))
                 || experiment
                     .aiding
@@ -68,7 +67,8 @@ impl ExpectedRun {
                     .as_ref()
                     .is_some_and(|nhc| lasts(nhc.rate_hz));
             let sigma_m_s = outage.asee_end.0[VELOCITY_DOWN];
-            outage.beyond_linear = !sees_height && is_beyond_linear(window, &epochs, sigma_m_s);
+            outage.beyond_linear =
+                !sees_height && is_beyond_linear(window, &law.reports, sigma_m_s);
             outage
         };
         let outages: Vec<OutageSummary> = ends.map(of_outage).collect();

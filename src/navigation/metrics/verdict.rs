@@ -14,6 +14,7 @@
 //! fewer samples the verdict is undecided.
 
 use super::estimate::{Estimate, PerState, SampleSize, chi_square_interval};
+use crate::sensors::outage::Outage;
 use crate::simulation::{NEES_DOF, OutageRecord, REPORTED, REPORTED_NAMES, RunRecord, TOLERANCE};
 use serde::Serialize;
 
@@ -225,9 +226,9 @@ impl Verdict {
         verdicts(runs, outages, independent_windows).0
     }
 
-    /// The verdict on one recorded drive with outages (start, end) (s): errors in order of time. None without errors over their
-    /// standard deviations.
-    pub fn of_drive(errors: &[NormalisedErrors], outages: &[(f64, f64)]) -> Option<DriveVerdict> {
+    /// The verdict on one recorded drive with outages: errors in order of time. None without errors over their standard
+    /// deviations.
+    pub fn of_drive(errors: &[NormalisedErrors], outages: &[Outage]) -> Option<DriveVerdict> {
         let column = |state: usize| errors.iter().map(move |e| e.over_sigma[state]);
         let known: Vec<usize> = (0..REPORTED)
             .filter(|state| column(*state).any(f64::is_finite))
@@ -265,11 +266,8 @@ impl Verdict {
             sum / f64::from(count)
         };
         let limit = chi_square_interval(known.len().max(1), 1.0, 1.0 - COVERAGE).upper;
-        let end = |&(start_s, end_s): &(f64, f64)| {
-            let mut within = errors
-                .iter()
-                .filter(|e| e.t_s > start_s && e.t_s <= end_s + 1e-6);
-            let last = within.next_back();
+        let end = |outage: &Outage| {
+            let last = errors.iter().rfind(|e| outage.withholds(e.t_s));
             OutageRecord {
                 error_end: last.map_or([f64::NAN; REPORTED], |e| e.over_sigma),
                 see_end: [1.0; REPORTED],
@@ -287,7 +285,7 @@ impl Verdict {
         if known.is_empty() {
             return None;
         }
-        let independent = size(&known) * together;
+        let independent = (size(&known) * together).max(1.0);
         let samples_of_state: [f64; REPORTED] = std::array::from_fn(|state| size(&[state]));
         let samples = |outage: Option<usize>, state: Option<usize>| match (outage, state) {
             (Some(_), _) => 1.0,

@@ -280,3 +280,17 @@ fn states_whose_errors_are_the_same_are_one() {
     );
     assert!(Verdict::of_drive(&[], &[]).is_none());
 }
+
+/// Rows at 1 Hz and a fix at 100 s: the row at 99 s is the last without it, and its errors are the outage's.
+#[test]
+fn an_outage_ends_before_its_fix() {
+    let mut errors = drive(1, 10, 1.0);
+    errors[99].over_sigma = [3.0; REPORTED];
+    errors[100].over_sigma = [0.1; REPORTED];
+    let outage = Outage {
+        start_s: 50.0,
+        end_s: 100.0,
+    };
+    let found = Verdict::of_drive(&errors, &[outage]).unwrap();
+    assert_eq!(found.outages[0].ratio, 3.0);
+}

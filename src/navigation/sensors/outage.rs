@@ -150,10 +150,12 @@ impl<'a> FixedData<'a> {
     fn has_fix_in(&self, outage: &Outage) -> bool {
         match self.fixes {
             Fixes::Every { interval_s } => {
+                let (start_s, end_s) = self.span_s;
+                let before = ((outage.start_s - start_s) / interval_s).floor().max(0.0);
                 // there is no fix at the start itself
-                let fixes = (1_u32..).map(|k| self.span_s.0 + f64::from(k) * interval_s);
-                let mut until = fixes.take_while(|t_s| !outage.is_over(*t_s));
-                until.any(|t_s| outage.withholds(t_s))
+                let numbers = [before.max(1.0), before + 1.0];
+                let mut times = numbers.map(|k| start_s + k * interval_s).into_iter();
+                times.any(|t_s| t_s <= end_s + SLACK_S && outage.withholds(t_s))
             }
             Fixes::At(times_s) => times_s.iter().any(|t_s| outage.withholds(*t_s)),
         }
@@ -171,8 +173,21 @@ impl<'a> FixedData<'a> {
         }
     }
 
-    /// An outage requested by its times, cut where the data end.
-    fn place(&self, asked: Outage) -> Result<Outage, OutageError> {
+    /// A window cut where the data end: one that lasts longer withholds a fix at their very end.
+    fn cut(&self, window: Outage) -> Outage {
+        let (start_s, end_s) = self.span_s;
+        let next_s = match self.fixes {
+            Fixes::Every { interval_s } => end_s + interval_s,
+            Fixes::At(_) => end_s,
+        };
+        Outage {
+            start_s: window.start_s.max(start_s),
+            end_s: window.end_s.min(next_s),
+        }
+    }
+
+    /// Checks that an outage requested by its times begins on the data and withholds a fix.
+    fn check(&self, asked: Outage) -> Result<(), OutageError> {
         let (start_s, end_s) = self.span_s;
         let refused = |reason: String, fixes: String| {
             Err(OutageError::Placed {
@@ -191,12 +206,8 @@ impl<'a> FixedData<'a> {
                 ),
             );
         }
-        let placed = Outage {
-            end_s: asked.end_s.min(end_s),
-            ..asked
-        };
-        if self.has_fix_in(&placed) {
-            return Ok(placed);
+        if self.has_fix_in(&asked) {
+            return Ok(());
         }
         refused("withholds no fix".to_owned(), self.described())
     }
@@ -231,7 +242,7 @@ impl OutageError {
 /// Outages as they are on data.
 #[derive(Debug, Clone)]
 pub struct PlacedOutages {
-    /// In time order, apart from one another.
+    /// In time order: each withholds a fix, and there is one between any two.
     pub windows: Vec<Outage>,
     /// Remarks on outages that differ from the request.
     pub remarks: Vec<String>,
@@ -381,7 +392,7 @@ impl OutagePlan {
     ///     ..OutagePlan::default()
     /// };
     /// let placed = plan(50.0, 70.0).on(&data, 1)?;
-    /// assert_eq!(placed.windows, [Outage { start_s: 50.0, end_s: 60.0 }]);
+    /// assert_eq!(placed.windows, [Outage { start_s: 50.0, end_s: 61.0 }]);
     /// assert_eq!(placed.remarks[0], "outage 50:70 is cut: the trajectory ends at 60 s");
     /// assert!(plan(70.0, 90.0).on(&data, 1).is_err());
     /// # Ok::<(), nav_sim_navigation::sensors::outage::OutageError>(())
@@ -394,7 +405,8 @@ impl OutagePlan {
         let (start_s, end_s) = data.span_s;
         let mut remarks = Vec::new();
         for asked in &self.fixed {
-            if data.place(*asked)? != *asked {
+            data.check(*asked)?;
+            if asked.end_s > end_s {
                 remarks.push(match data.fixes {
                     Fixes::At([.., last]) => {
                         format!("outage {asked} is cut at {end_s} s: the fixes end at {last} s")
@@ -403,11 +415,10 @@ impl OutagePlan {
                 });
             }
         }
-        let windows = self.windows(data.span_s, seed);
-        // Every fixed window lies on the data by now: fewer windows than were requested can only come of a
-        // union.
+        let windows = self.windows(data, seed);
+        // Every fixed window withholds a fix: fewer windows than were requested can only come of a union.
         if self.fixed.len() > windows.len() {
-            remarks.push("overlapping outages are merged".to_owned());
+            remarks.push("outages without a fix between them are merged".to_owned());
         }
         if let Some(first_s) = self
             .periodic
@@ -433,33 +444,34 @@ impl OutagePlan {
         Ok(PlacedOutages { windows, remarks })
     }
 
-    /// The windows on data that last from `span_s.0` to `span_s.1`: in time order, those that overlap or touch
-    /// made one, cut at the ends, those outside left out.
-    fn windows(&self, span_s: (f64, f64), seed: u64) -> Vec<Outage> {
+    /// The windows on data in time order, cut at the ends: those that withhold no fix left out, those without a fix
+    /// between them made one.
+    fn windows(&self, data: &FixedData<'_>, seed: u64) -> Vec<Outage> {
         let fixed = self.fixed.iter().chain(&self.default).copied();
-        let periodic = self.periodic.iter().flat_map(|p| p.windows(span_s));
-        let random = self.random.iter().flat_map(|r| r.windows(span_s, seed));
-        united(fixed.chain(periodic).chain(random).collect(), span_s)
+        let periodic = self.periodic.iter().flat_map(|p| p.windows(data.span_s));
+        let random = self
+            .random
+            .iter()
+            .flat_map(|r| r.windows(data.span_s, seed));
+        let all = fixed.chain(periodic).chain(random);
+        let mut windows: Vec<Outage> = all
+            .filter(|window| window.start_s < data.span_s.1)
+            .map(|window| data.cut(window))
+            .filter(|window| data.has_fix_in(window))
+            .collect();
+        windows.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
+        windows.dedup_by(|next, last| {
+            let is_one = !data.has_fix_in(&Outage {
+                start_s: last.end_s,
+                end_s: next.start_s,
+            });
+            if is_one {
+                last.end_s = last.end_s.max(next.end_s);
+            }
+            is_one
+        });
+        windows
     }
-}
-
-fn united(mut windows: Vec<Outage>, (start_s, end_s): (f64, f64)) -> Vec<Outage> {
-    windows.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
-    let mut united: Vec<Outage> = Vec::new();
-    for window in windows {
-        let cut = Outage {
-            start_s: window.start_s.max(start_s),
-            end_s: window.end_s.min(end_s),
-        };
-        match united.last_mut() {
-            _ if cut.start_s >= cut.end_s => {}
-            // Touching counts as overlapping: the first fix after the one is the first that the other
-            // withholds.
-            Some(last) if cut.start_s <= last.end_s => last.end_s = last.end_s.max(cut.end_s),
-            _ => united.push(cut),
-        }
-    }
-    united
 }
 
 #[cfg(test)]

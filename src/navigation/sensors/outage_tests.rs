@@ -5,6 +5,14 @@ fn outage(start_s: f64, end_s: f64) -> Outage {
     Outage { start_s, end_s }
 }
 
+/// Fixes at 1 Hz.
+const fn regular(start_s: f64, end_s: f64) -> FixedData<'static> {
+    FixedData {
+        span_s: (start_s, end_s),
+        fixes: Fixes::Every { interval_s: 1.0 },
+    }
+}
+
 #[test]
 fn a_fix_at_the_start_is_missing_and_at_the_end_is_not() {
     let o = outage(300.0, 390.0);
@@ -25,8 +33,33 @@ fn kinds_are_united_in_time_order() {
         }),
         ..OutagePlan::default()
     };
-    let expected = vec![outage(10.0, 25.0), outage(50.0, 70.0), outage(95.0, 100.0)];
-    assert_eq!(plan.windows((0.0, 100.0), 1), expected);
+    let expected = vec![outage(10.0, 25.0), outage(50.0, 70.0), outage(95.0, 101.0)];
+    assert_eq!(plan.windows(&regular(0.0, 100.0), 1), expected);
+}
+
+/// A fix every 10 s. Windows of 3 s every 20 s: those from 12 s withhold none, those from 18 s one each. Of 8 s every 9 s: each
+/// withholds one, and there is none in the seconds between.
+#[test]
+fn outages_without_fixes_between_them_are_one() {
+    let windows = |first_s, every_s, duration_s| {
+        let data = FixedData {
+            span_s: (0.0, 60.0),
+            fixes: Fixes::Every { interval_s: 10.0 },
+        };
+        let plan = OutagePlan {
+            periodic: Some(PeriodicOutages {
+                first_s,
+                every_s,
+                duration_s,
+            }),
+            ..OutagePlan::default()
+        };
+        plan.windows(&data, 1)
+    };
+    assert_eq!(windows(12.0, 20.0, 3.0), []);
+    let each = [outage(18.0, 21.0), outage(38.0, 41.0)];
+    assert_eq!(windows(18.0, 20.0, 3.0)[..2], each);
+    assert_eq!(windows(19.0, 9.0, 8.0).len(), 1);
 }
 
 /// First one, from time immemorial: as many windows as the span has room for, at the same times.
@@ -40,10 +73,13 @@ fn periodic_outages_begin_where_the_span_does() {
         }),
         ..OutagePlan::default()
     };
-    let expected = vec![outage(0.0, 10.0), outage(90.0, 110.0), outage(190.0, 200.0)];
-    assert_eq!(plan(-10.0).windows((0.0, 200.0), 1), expected);
-    assert_eq!(plan(-1e12 - 10.0).windows((0.0, 200.0), 1), expected);
-    let epoch = plan(0.0).windows((1.7e9 - 10.0, 1.7e9 + 30.0), 1);
+    let expected = vec![outage(0.0, 10.0), outage(90.0, 110.0), outage(190.0, 201.0)];
+    assert_eq!(plan(-10.0).windows(&regular(0.0, 200.0), 1), expected);
+    assert_eq!(
+        plan(-1e12 - 10.0).windows(&regular(0.0, 200.0), 1),
+        expected
+    );
+    let epoch = plan(0.0).windows(&regular(1.7e9 - 10.0, 1.7e9 + 30.0), 1);
     assert_eq!(epoch, [outage(1.7e9, 1.7e9 + 20.0)]);
 }
 
@@ -52,27 +88,27 @@ fn an_outage_lies_on_the_data_and_withholds_a_fix() {
     let fixes = [1.0, 2.0, 3.0, 4.0];
     let recorded = FixedData::recorded(&fixes);
     assert_eq!(recorded.span_s, (0.0, 5.0));
-    let regular = FixedData {
-        span_s: (0.0, 5.0),
-        fixes: Fixes::Every { interval_s: 1.0 },
-    };
+    let regular = regular(0.0, 5.0);
     for data in [recorded, regular] {
-        let place = |a, b| data.place(outage(a, b));
-        assert_eq!(place(2.0, 3.0), Ok(outage(2.0, 3.0)));
-        assert_eq!(place(3.5, 9.0), Ok(outage(3.5, 5.0)));
-        assert_eq!(place(0.0, 1.5), Ok(outage(0.0, 1.5)));
+        let check = |a, b| data.check(outage(a, b));
+        for (a, b) in [(2.0, 3.0), (3.5, 9.0), (0.0, 1.5)] {
+            assert_eq!(check(a, b), Ok(()));
+        }
         for (a, b) in [(2.1, 2.9), (0.0, 1.0), (2.0 + 1e-8, 3.0)] {
-            let e = place(a, b).unwrap_err().to_string();
+            let e = check(a, b).unwrap_err().to_string();
             assert_eq!(e, format!("outage {a}:{b} withholds no fix"));
         }
         for (a, b) in [(-1.0, 3.0), (5.0, 9.0)] {
-            let e = place(a, b).unwrap_err().to_string();
+            let e = check(a, b).unwrap_err().to_string();
             let expected = "does not lie on the data, which last from 0 to 5 s";
             assert_eq!(e, format!("outage {a}:{b} {expected}"));
         }
     }
+    // of the two, the regular fixes have one at 5 s
+    let ends = [recorded, regular].map(|d| d.cut(outage(3.5, 9.0)).end_s);
+    assert_eq!(ends, [5.0, 6.0]);
     let hints = [recorded, regular].map(|d| {
-        d.place(outage(5.0, 9.0))
+        d.check(outage(5.0, 9.0))
             .unwrap_err()
             .hint()
             .map(str::to_owned)
@@ -87,10 +123,7 @@ fn an_outage_lies_on_the_data_and_withholds_a_fix() {
 /// What was asked for is refused where what is there by default is cut or left out.
 #[test]
 fn default_outages_are_cut_and_that_is_said() {
-    let data = FixedData {
-        span_s: (0.0, 720.0),
-        fixes: Fixes::Every { interval_s: 1.0 },
-    };
+    let data = regular(0.0, 720.0);
     let late = outage(800.0, 810.0);
     let default = [Outage::PAPER.to_vec(), vec![late]].concat();
     let placed = OutagePlan {
@@ -99,7 +132,7 @@ fn default_outages_are_cut_and_that_is_said() {
     }
     .on(&data, 1)
     .unwrap();
-    assert_eq!(placed.windows, [outage(300.0, 390.0), outage(700.0, 720.0)]);
+    assert_eq!(placed.windows, [outage(300.0, 390.0), outage(700.0, 721.0)]);
     let expected = [
         "the default outage 700:790 is cut: the trajectory lasts from 0 to 720 s",
         "the default outage 800:810 is left out: the trajectory lasts from 0 to 720 s",
@@ -135,7 +168,7 @@ fn outages_that_are_not_as_asked_for_are_remarked() {
         ..OutagePlan::default()
     };
     let common = [
-        "overlapping outages are merged",
+        "outages without a fix between them are merged",
         "outage_periodic.first_s = 100 s: the trajectory ends at 100 s",
     ];
     let found = remarks(plan.clone(), Fixes::Every { interval_s: 1.0 });
@@ -163,7 +196,10 @@ fn random_outages_occur_at_the_stated_rate_and_repeat_with_the_seed() {
         }),
         ..OutagePlan::default()
     };
-    let span = (0.0, 36_000.0);
+    let span = &FixedData {
+        span_s: (0.0, 36_000.0),
+        fixes: Fixes::Every { interval_s: 1e-3 },
+    };
     let count = |seed| plan.windows(span, seed).len() as f64;
     let seeds = 2000;
     let counts: Vec<f64> = (0..seeds).map(count).collect();
@@ -171,7 +207,7 @@ fn random_outages_occur_at_the_stated_rate_and_repeat_with_the_seed() {
     let variance = counts.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (seeds - 1) as f64;
     // Renewal function of a delayed process: (T − E[wait])/cycle up to the residual of the first cycle,
     // E N(T) = T/m + (s² + m²)/(2m²) − E[first]/m, m = 630 s, s = E[first] = 600 s.
-    let (m, s, t) = (630.0, 600.0, span.1);
+    let (m, s, t) = (630.0, 600.0, span.span_s.1);
     let expected = t / m + (s * s + m * m) / (2.0 * m * m) - s / m;
     assert_abs_diff_eq!(
         mean,

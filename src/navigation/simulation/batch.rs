@@ -117,8 +117,10 @@ impl<'a> LaneFilter<'a> {
         for (lane, start) in starts.iter().enumerate() {
             nominal.set_lane(lane, start);
         }
-        let outage = || {
+        let outage = |(reports, _): &(f64, usize)| {
             std::array::from_fn(|_| OutageRecord {
+                // NaN without a report
+                see_mean: [0.0 / reports; REPORTED],
                 reconvergence_s: f64::NAN,
                 ..Default::default()
             })
@@ -133,7 +135,7 @@ impl<'a> LaneFilter<'a> {
             shared,
             live,
             trace: Vec::with_capacity(plan.events.len()),
-            outages: plan.experiment.outages.iter().map(|_| outage()).collect(),
+            outages: plan.outages.iter().map(outage).collect(),
             nis: (Lanes::ZERO, 0),
         }
     }

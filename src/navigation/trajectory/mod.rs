@@ -173,6 +173,11 @@ impl Trajectory {
         self.knots()[self.knots().len() - 1]
     }
 
+    /// Times of the first and the last sample (s).
+    pub fn span_s(&self) -> (f64, f64) {
+        (self.start_s(), self.end_s())
+    }
+
     /// Times of the samples (s): the third derivative is constant between two of them.
     pub fn knots(&self) -> &[f64] {
         self.curve.knots()

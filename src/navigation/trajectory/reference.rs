@@ -128,8 +128,7 @@ impl Reference {
 
     /// First and last instant (s).
     pub fn span_s(&self) -> (f64, f64) {
-        let ends = |curve: &Trajectory| (curve.start_s(), curve.end_s());
-        let spans = self.stretches.iter().map(|s| ends(&s.curve));
+        let spans = self.stretches.iter().map(|s| s.curve.span_s());
         spans.fold((f64::INFINITY, f64::NEG_INFINITY), |all, own| {
             (all.0.min(own.0), all.1.max(own.1))
         })

@@ -93,7 +93,7 @@ pub fn strapdown_over_sigma(track: &Track, filter_model: &FilterModel) -> f64 {
 
 /// The law of a filter's true errors at one instant: normal, with this mean and covariance, in the filter's navigation states
 /// (position m, velocity m/s, attitude rad, in n).
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Instant {
     /// Time from the start (s).
     pub after_s: f64,
@@ -111,7 +111,7 @@ pub struct Instant {
 }
 
 /// A filter's errors at one instant, and what it states of them.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct AssessedInstant {
     /// The law of the true errors.
     pub errors: Instant,

@@ -324,6 +324,8 @@ pub fn drive(
     model: &Model,
     defects: &ImuSettings,
     gnss: &GnssSettings,
+    initial: &InitialSettings,
+    gravity: GravityModel,
     outages_s: &[f64],
 ) -> Option<Track> {
     let longest = outages_s.iter().copied().fold(0.0, f64::max).min(LONGEST_S);
@@ -350,11 +352,11 @@ pub fn drive(
     let experiment = Experiment {
         trajectory: &trajectory,
         rate_hz,
-        gravity: GravityModel::default(),
+        gravity,
         truth: Truth::Model(model),
         filter_models: &[],
         gnss: &gnss,
-        initial: &InitialSettings::default(),
+        initial,
         defects,
         baro: None,
         aiding: &AidingSettings::default(),
