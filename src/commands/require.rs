@@ -488,6 +488,14 @@ impl Requirements {
                 format!("a shorter --outage{earlier}"),
             );
         }
+        if let OutageRequest::Window(outage) = ask {
+            let asked = Scenario {
+                outage: Some(vec![outage]),
+                ..scenario.clone()
+            };
+            // as `run` does one that withholds no fix
+            asked.outages_on(span_s, 0)?;
+        }
         let track = OutagePlacements::track(&scenario, &trajectory).map_err(Failure::input)?;
         Ok(Self {
             scenario,
