@@ -257,7 +257,7 @@ pub(crate) struct AtomicDir {
 }
 
 /// Temporary directories within a destination are named after this.
-const INSIDE: &str = "out";
+pub(crate) const INSIDE: &str = "out";
 
 impl AtomicDir {
     /// Makes the temporary directory, beside the destination or, if that exists, in it.

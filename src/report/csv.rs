@@ -57,6 +57,9 @@ pub(crate) fn csv(rows: &[Map<String, Value>]) -> String {
     rows.iter()
         .flat_map(Map::keys)
         .for_each(|key| _ = columns.insert(key.clone(), Value::Null));
+    if columns.is_empty() {
+        return String::new();
+    }
     let mut to = csv::Writer::from_writer(Vec::new());
     let cell = |value: Option<&Value>| match value {
         None | Some(Value::Null) => String::new(),

@@ -118,19 +118,22 @@ impl BatchRequest {
         context: &Context<'_>,
     ) -> Result<BatchOutcome> {
         let directory = self.directory();
-        let place = StudyDirectory(&directory);
+        let place = StudyDirectory {
+            path: &directory,
+            force: self.force,
+        };
         let cells = study.cells(self.study.parent().unwrap_or(Path::new("")))?;
-        let share = find_shard(self.shard, self.shards, variable)?;
         let merged = || {
+            // of workers that were killed as they wrote results, or where another had just written the same cell
+            atomic::remove_abandoned(&directory.join(atomic::INSIDE));
             let answer = results::merge(study, &cells, &place, context)?;
             answer.write(&place)?;
-            // a worker that was killed where another had just written the same cell
             let done = cells.iter().filter(|cell| place.is_done(cell));
             done.for_each(|cell| atomic::remove_abandoned(&place.cell(&cell.name)));
             Ok(BatchOutcome::Merged(Box::new(answer)))
         };
         guard(&place)?;
-        let changed = adopt(&place, &cells, self.dry_run || self.merge, context);
+        let changed = adopt(&place, &cells, self.dry_run, context);
         if let (Some((name, what)), false) = (changed.first(), self.force || self.dry_run) {
             return refused(
                 format!("cell {name} {what}"),
@@ -140,6 +143,7 @@ impl BatchRequest {
         if self.merge {
             return merged();
         }
+        let share = find_shard(self.shard, self.shards, variable)?;
         let units = units(&cells, context)?;
         if self.dry_run {
             return estimate(&cells, &units, &place, changed.len(), context)
@@ -190,7 +194,13 @@ impl BatchRequest {
         let missing = cells.iter().filter(|cell| !place.is_done(cell));
         let missing: Vec<String> = missing.map(|cell| cell.name.clone()).collect();
         if missing.is_empty() {
-            drop(fs::remove_dir_all(directory.join("locks")));
+            let locks = units
+                .iter()
+                .map(RunBlock::lock)
+                .chain(cells.iter().map(StudyCell::lock));
+            locks.for_each(|name| drop(fs::remove_file(place.path.join("locks").join(name))));
+            // a directory of that name may hold other files
+            drop(fs::remove_dir(place.path.join("locks")));
             return merged();
         }
         context.remark(format!(
@@ -210,7 +220,7 @@ fn adopt(
     is_dry: bool,
     context: &Context<'_>,
 ) -> Vec<(String, String)> {
-    let keyed = fs::read_dir(place.0.join("cells"))
+    let keyed = fs::read_dir(place.path.join("cells"))
         .into_iter()
         .flatten()
         .flatten()
@@ -395,6 +405,13 @@ pub(crate) struct StudyCell {
     runs: u64,
     /// All that the noise depends on: cells that share it differ in the filter alone.
     noise: String,
+}
+
+impl StudyCell {
+    /// Name of its lock.
+    fn lock(&self) -> String {
+        self.manifest.key[..32].to_owned()
+    }
 }
 
 impl Study {
@@ -701,6 +718,8 @@ impl RunValidator {
         }
         let mut options = asked.options.clone();
         options.insert("seed".to_owned(), vec![seed.to_string()]);
+        // settings have no order
+        options.entry("set".to_owned()).and_modify(|set| set.sort());
         // Its summary states whether the limits are kept, so they are part of the key of a cell.
         let limits = run.get("require").map(ToString::to_string);
         options.extend(limits.map(|limits| ("require".to_owned(), vec![limits])));
@@ -890,6 +909,11 @@ impl RunBlock<'_> {
         self.runs * self.cells.len() as u64
     }
 
+    /// Name of its lock.
+    fn lock(&self) -> String {
+        format!("{}-{}", &self.cells[0].noise[..32], self.first)
+    }
+
     /// Its first run and their number.
     const fn span(&self) -> (u64, u64) {
         (self.first, self.runs)
@@ -897,11 +921,15 @@ impl RunBlock<'_> {
 }
 
 /// The directory of a study.
-struct StudyDirectory<'a>(pub &'a Path);
+struct StudyDirectory<'a> {
+    path: &'a Path,
+    /// True if cells of another request are replaced.
+    force: bool,
+}
 
 impl StudyDirectory<'_> {
     fn cell(&self, name: &str) -> PathBuf {
-        self.0.join("cells").join(name)
+        self.path.join("cells").join(name)
     }
 
     /// The manifest of a cell that is there.
@@ -915,7 +943,7 @@ impl StudyDirectory<'_> {
     }
 
     fn parts(&self, cell: &StudyCell) -> PathBuf {
-        self.0.join("parts").join(&cell.manifest.key[..32])
+        self.path.join("parts").join(&cell.manifest.key[..32])
     }
 
     fn part(&self, cell: &StudyCell, (first, runs): (u64, u64)) -> PathBuf {
@@ -931,13 +959,15 @@ impl StudyDirectory<'_> {
         unit.cells.iter().all(|cell| self.has(unit, cell))
     }
 
-    /// The lock of a unit, which the kernel frees when its process ends; none where another process works on it. Without
-    /// locks (some shared disks) both compute the same bytes.
-    fn lock(&self, unit: &RunBlock<'_>) -> Result<Option<File>> {
-        let locks = self.0.join("locks");
-        let path = locks.join(format!("{}-{}", &unit.cells[0].noise[..32], unit.first));
-        let file = fs::create_dir_all(&locks)
-            .and_then(|()| File::create(&path))
+    /// The lock of a unit or cell, which the kernel frees when its process ends; none where another process works on it.
+    /// Without locks (some shared disks) both compute the same bytes.
+    fn lock(&self, name: &str) -> Result<Option<File>> {
+        let locks = self.path.join("locks");
+        let path = locks.join(name);
+        let create = || fs::create_dir_all(&locks).and_then(|()| File::create(&path));
+        // a process that finds all done removes the directory
+        let file = create()
+            .or_else(|_| create())
             .map_err(|e| Failure::unwritable(&path, e))?;
         Ok(match file.try_lock() {
             Err(fs::TryLockError::WouldBlock) => None,
@@ -1021,7 +1051,7 @@ fn compute(
     front: &CellReporter<'_>,
 ) -> Result<Failures> {
     let mut failures = Failures::new();
-    let Some(_lock) = place.lock(unit)? else {
+    let Some(_lock) = place.lock(&unit.lock())? else {
         return Ok(failures);
     };
     let missing = unit.cells.iter().filter(|cell| !place.has(unit, cell));
@@ -1100,6 +1130,13 @@ fn write_cell(
     context: &Context<'_>,
 ) -> Result<()> {
     let answer = run.navigate(result, context)?;
+    // looked at once more: a study that was edited may have been computed meanwhile
+    if let Some(there) = place.manifest(&cell.name)
+        && there.key != cell.manifest.key
+        && !place.force
+    {
+        return Err(Failure::failed(difference(&there, &cell.manifest)));
+    }
     let mut asked = cell.asked.clone();
     asked.out = Some(place.cell(&cell.name));
     let written = asked.write(&answer, &answer.document(), cell.manifest.clone(), context);
@@ -1117,7 +1154,8 @@ fn assemble(
     spans: &[(u64, u64)],
     context: &Context<'_>,
 ) -> Result<()> {
-    if place.is_done(cell) {
+    let lock = place.lock(&cell.lock())?;
+    if lock.is_none() || place.is_done(cell) {
         return Ok(());
     }
     let mut whole: Option<RunResult> = None;

@@ -98,7 +98,9 @@ pub(super) fn merge(
                 Some(Err(e)) if e.code() == 1 => return Err(e),
                 Some(Err(e)) => {
                     context.warn(format!("{e}; {name} is set aside"));
-                    drop(fs::rename(path, place.cell(&format!("{name}.damaged"))));
+                    let aside = place.cell(&format!("{name}.damaged"));
+                    drop(fs::remove_dir_all(&aside));
+                    drop(fs::rename(path, aside));
                 }
                 None => {}
             }
@@ -249,7 +251,7 @@ impl StudyAnswer {
 
     /// Writes the results, all or none.
     pub(super) fn write(&self, place: &StudyDirectory<'_>) -> Result<()> {
-        let mut files = AtomicDir::create(place.0)?;
+        let mut files = AtomicDir::create(place.path)?;
         for (name, text) in
             FILES
                 .into_iter()
@@ -267,14 +269,14 @@ impl StudyAnswer {
 /// The file that would be lost.
 pub(super) fn guard(place: &StudyDirectory<'_>) -> Result<()> {
     let mut files = FILES.iter().chain(&["manifest.json"]);
-    files.try_for_each(|name| guard_others(&place.0.join(name), name))
+    files.try_for_each(|name| guard_others(&place.path.join(name), name))
 }
 
 /// Removes results of before, where a cell is missing.
 pub(super) fn withdraw(place: &StudyDirectory<'_>) {
     FILES
         .iter()
-        .for_each(|name| drop(fs::remove_file(place.0.join(name))));
+        .for_each(|name| drop(fs::remove_file(place.path.join(name))));
 }
 
 impl Answer for StudyAnswer {
