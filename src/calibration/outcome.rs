@@ -574,16 +574,6 @@ impl Outcome {
     pub fn goodness(&self) -> Option<Goodness> {
         self.inference.as_ref().and_then(|i| i.goodness)
     }
-
-    /// The scales that count.
-    pub fn counted_levels(&self) -> Vec<u32> {
-        self.curve
-            .levels
-            .iter()
-            .copied()
-            .filter(|level| !self.curve.ignored.contains(level))
-            .collect()
-    }
 }
 
 #[cfg(test)]

@@ -229,7 +229,7 @@ fn goodness(outcome: &Outcome, draws: &[Fit]) -> Goodness {
     let objectives: Vec<f64> = draws.iter().map(|d| d.objective).collect();
     Goodness {
         statistic: fit.objective,
-        dof: (outcome.counted_levels().len()).saturating_sub(fit.free_parameters()),
+        dof: (outcome.curve.counted_levels().len()).saturating_sub(fit.free_parameters()),
         expected: median(&objectives),
         p_value: p_value(fit.objective, &objectives),
     }

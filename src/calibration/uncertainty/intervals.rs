@@ -300,7 +300,7 @@ pub(super) fn quantile(sorted: &[f64], p: f64) -> f64 {
 
 /// Longest averaging time that the scales of a fit tell of (s): a scale is two averages long.
 fn observed_s(outcome: &Outcome, rate_hz: f64) -> Option<f64> {
-    let longest = outcome.counted_levels().into_iter().max()?;
+    let longest = outcome.curve.counted_levels().into_iter().max()?;
     Some(f64::from(longest - 1).exp2() / rate_hz)
 }
 

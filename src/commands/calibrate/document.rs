@@ -467,7 +467,7 @@ fn fit_notes(outcome: &Outcome, settings: &CalibrationSettings) -> Vec<String> {
             .map(|i| format!("{} fits as well (p = {:.2})", i.spec, i.p_value)),
     );
     if let Some(reading) = &outcome.reading {
-        let counted = reading.counted_levels();
+        let counted = reading.curve.counted_levels();
         let bands = bands(&counted).map(|[from, to]| {
             let [from, to] = [from, to].map(|level| seconds(&level));
             (
@@ -508,7 +508,7 @@ fn fit_notes(outcome: &Outcome, settings: &CalibrationSettings) -> Vec<String> {
             .map(|i| &labels[*i])
             .map(|label| format!("{label} is zero: not observed")),
     );
-    let longest_s = outcome.counted_levels().last().map_or(0.0, seconds);
+    let longest_s = outcome.curve.counted_levels().last().map_or(0.0, seconds);
     for (i, label) in labels
         .iter()
         .enumerate()
