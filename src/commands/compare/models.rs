@@ -21,8 +21,7 @@ fn estimates((file, draws): &(ModelFile, Option<Draws>), channel: Channel) -> Ve
     let (model, rate_hz) = (file.model.axis(channel), file.model.rate_hz);
     let drawn = draws.iter().flat_map(|draws| &draws.models);
     let drawn: Vec<_> = drawn.map(|model| model.axis(channel)).collect();
-    let stretch = draws.as_ref().map_or(1.0, |draws| draws.stretch);
-    let figures = figures_with_intervals(model, &drawn, stretch, rate_hz, range_s);
+    let figures = figures_with_intervals(model, &drawn, rate_hz, range_s);
     let quantities = [
         ExportQuantity::Density,
         ExportQuantity::Walk,

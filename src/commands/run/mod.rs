@@ -1029,7 +1029,6 @@ fn intervals(
                 .iter()
                 .filter_map(|ends| Some(ends.get(k)?[i]))
                 .collect(),
-            draws.stretch,
         );
         (low / x, high / x)
     };
