@@ -170,7 +170,7 @@ impl<'a> CurveSampler<'a> {
         })
     }
 
-    /// A curve from elsewhere, which scatters by its degrees of freedom.
+    /// A curve from elsewhere, which scatters by its degrees of freedom, and as a whole by what recordings differ by.
     fn elsewhere(&self, generator: &mut Generator) -> Curve {
         let curve = self.curve;
         // The law knows all levels from 1; the curve may have some of them.
@@ -181,11 +181,12 @@ impl<'a> CurveSampler<'a> {
             .zip(&curve.edof)
             .for_each(|(l, e)| edof[*l as usize - 1] = *e);
         let ratio = self.law.draw(&edof, generator);
+        let shared = curve.differing.sqrt() * generator.sample::<f64, _>(StandardNormal);
         let wv = curve
             .levels
             .iter()
             .zip(&self.centre)
-            .map(|(l, nu)| nu * ratio[*l as usize - 1]);
+            .map(|(l, nu)| nu * ratio[*l as usize - 1] * shared.exp());
         Curve {
             wv: wv.collect(),
             ..curve.clone()

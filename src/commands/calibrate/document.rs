@@ -33,11 +33,10 @@ impl Calibration {
             in_order(self.outcomes.iter().map(|o| o.estimator.name())).join(", ")
         );
         let mut document = Document::new(&title, self.tone(), self.verdict());
-        let of_one = self.outcomes.iter().all(|o| o.recordings == 1);
-        let interval = if of_one {
-            "95 %, this power-on"
-        } else {
-            "95 %, mean of power-ons"
+        let interval = match self.outcomes.iter().map(|o| o.recordings).max() {
+            Some(0) => "95 %, this curve",
+            Some(1) => "95 %, this power-on",
+            _ => "95 %, mean of power-ons",
         };
         let policy = policy();
         let columns = [
