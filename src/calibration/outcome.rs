@@ -246,11 +246,9 @@ pub struct Inference {
     pub draws: usize,
     /// Draws that had a fit.
     pub fitted: usize,
-    /// The models of these draws: what other recordings of the same IMU would have given.
+    /// The models of these draws: what other recordings of the same IMU would have given. Their distances from the median are
+    /// stretched for the few replicates from which their scatter is known: by Student's quantile over the normal one.
     pub drawn: Vec<Composite>,
-    /// Factor of the distances of the quantiles of the draws from their median, for the few replicates from
-    /// which their scatter is known: Student's quantile over the normal one.
-    pub stretch: f64,
     /// One interval a parameter that is not fixed, in the order of the model.
     pub intervals: Vec<ParameterInterval>,
     /// Goodness of fit of the model; none for slopes (AVLR), which are not fitted to the curve.
@@ -573,16 +571,6 @@ impl Outcome {
     /// Goodness of fit of the model, if it was tested.
     pub fn goodness(&self) -> Option<Goodness> {
         self.inference.as_ref().and_then(|i| i.goodness)
-    }
-
-    /// The scales that count.
-    pub fn counted_levels(&self) -> Vec<u32> {
-        self.curve
-            .levels
-            .iter()
-            .copied()
-            .filter(|level| !self.curve.ignored.contains(level))
-            .collect()
     }
 }
 

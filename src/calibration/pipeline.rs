@@ -245,7 +245,10 @@ mod tests {
         let ranged = fit(&whole, Some(range));
         let (shortened, all) = (fit(&short, None), fit(&whole, None));
         assert_eq!(
-            (ranged.counted_levels().len(), ranged.departure().scales),
+            (
+                ranged.curve.counted_levels().len(),
+                ranged.departure().scales
+            ),
             (12, 12)
         );
         // The weights of either fit settle to 1e-6, and the objective without lack of fit is not stationary where they do.

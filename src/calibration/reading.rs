@@ -50,7 +50,7 @@ fn averaging_s(level: u32, rate_hz: f64) -> f64 {
 /// The widest band of scales in which N is read and the widest with the longest scale, or all scales where there is no such band.
 fn slopes(outcome: &Outcome, rate_hz: f64) -> Option<Outcome> {
     let spec: ModelSpec = "WN+QN+FN+RW".parse().ok()?;
-    let counted = outcome.counted_levels();
+    let counted = outcome.curve.counted_levels();
     let fitted = |scales: &[u32]| {
         let mut curve = outcome.curve.clone();
         curve.ignored = curve.levels.clone();
@@ -109,7 +109,7 @@ mod tests {
     fn the_scales_that_a_vibration_leaves_give_the_noise() {
         let vibrating = outcome(&[3, 4, 5]);
         let read = vibrating.for_navigation();
-        assert_eq!(read.counted_levels(), (6..=16).collect::<Vec<_>>());
+        assert_eq!(read.curve.counted_levels(), (6..=16).collect::<Vec<_>>());
         let amplitudes = read.fit.composite.processes.iter().map(Process::amplitude);
         for (found, exact) in amplitudes.zip([1.0_f64, 0.0, 0.0, 1e-5]) {
             assert_abs_diff_eq!(found, exact, epsilon = 1e-3 * exact.max(1e-6));

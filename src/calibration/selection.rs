@@ -85,7 +85,7 @@ pub(crate) fn choose(
     let fitted = |spec: &ModelSpec| {
         fit(curve, spec, settings.rate_hz, settings.weighting).map(|fit| (spec.clone(), fit))
     };
-    let scales = curve.levels.len() - curve.ignored.len();
+    let scales = curve.counted_levels().len();
     let all = sums(scales);
     let fits = all.par_iter().map(fitted).collect::<Result<Vec<_>, _>>()?;
     let fits: Vec<(ModelSpec, Fit)> = fits

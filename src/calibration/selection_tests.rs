@@ -158,7 +158,7 @@ fn candidates_are_sums_that_the_counted_scales_can_carry() {
     let outcome = calibrate(&[recordings(1, |_| white.clone())], &settings)
         .unwrap()
         .remove(0);
-    assert_eq!(outcome.counted_levels().len(), 6);
+    assert_eq!(outcome.curve.counted_levels().len(), 6);
     let candidates = outcome.ranking.unwrap().candidates;
     assert!(candidates.iter().all(|c| c.spec.parameters() < 6));
 }

@@ -131,6 +131,7 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, Failure> {
         let mut curve = Curve {
             quantization: robust.as_ref().map(|tuning| *tuning.quantization()),
             classical: entry.classical_tau_s.iter().map(level).collect(),
+            differing: entry.differing.clamp(0.0, 100.0),
             ..Curve::default()
         };
         for i in 0..tau {

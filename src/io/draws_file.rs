@@ -31,8 +31,6 @@ pub struct DrawsFile {
 pub struct SignalDraws {
     /// Signals of the fit: `accel`, or `accel.x` alone.
     pub signals: String,
-    /// Factor on the distances of the draws from their median.
-    pub stretch: f64,
     /// Names of the columns: process and parameter, as in the model file.
     pub parameters: Vec<String>,
     /// The fit itself: a model file that has other values is not of these draws.
@@ -46,8 +44,6 @@ pub struct SignalDraws {
 pub struct Draws {
     /// One model a draw.
     pub models: Vec<Model>,
-    /// Factor on the distances from the median, for any quantity computed from the draws.
-    pub stretch: f64,
 }
 
 /// Path of the draws of a model file.
@@ -68,7 +64,7 @@ pub(crate) fn usable(path: &Path, file: &ModelFile, rate_hz: f64) -> Result<Opti
         let models = draws.models.iter();
         let models = models.map(|model| continuous::at_rate(model, rate_hz).ok());
         let models = models.collect::<Option<_>>()?;
-        Some(Draws { models, ..draws })
+        Some(Draws { models })
     });
     let foreign = || format!("{} is not of {}", beside(path).display(), path.display());
     draws.map(Some).ok_or_else(foreign)
@@ -112,7 +108,6 @@ impl DrawsFile {
             let (inference, composite) = (outcome.inference.as_ref()?, &outcome.fit.composite);
             Some(SignalDraws {
                 signals: outcome.scope.name(),
-                stretch: inference.stretch,
                 parameters: composite
                     .parameters()
                     .map(|(parameter, _)| composite.name_of(parameter))
@@ -155,8 +150,7 @@ impl DrawsFile {
                 model.axes[channel.index()] = with_values(axis, row, self.rate_hz)?;
             }
         }
-        let stretch = self.signals.iter().map(|s| s.stretch).fold(1.0, f64::max);
-        Some(Draws { models, stretch })
+        Some(Draws { models })
     }
 }
 
@@ -185,7 +179,6 @@ mod tests {
     fn file() -> (Model, DrawsFile) {
         let signals = |signals: &str, base: f64| SignalDraws {
             signals: signals.to_owned(),
-            stretch: 1.0 + base / 10.0,
             parameters: vec!["WN sigma2".into(), "AR1 phi".into(), "AR1 sigma2".into()],
             estimate: values(&axis(base)),
             draws: [0.9, 1.2]
@@ -211,7 +204,7 @@ mod tests {
             draws.models[1],
             Model::pooled(100.0, &axis(1.2), &axis(2.4))
         );
-        assert_eq!((draws.models.len(), draws.stretch), (2, 1.2));
+        assert_eq!(draws.models.len(), 2);
     }
 
     #[test]

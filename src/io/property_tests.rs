@@ -43,7 +43,6 @@ fn draws() -> impl Strategy<Value = DrawsFile> {
             let parameters = vec!["WN sigma2".to_owned(); 3];
             let signals = SignalDraws {
                 signals: "accel".to_owned(),
-                stretch: rate_hz,
                 parameters,
                 estimate,
                 draws,

@@ -197,6 +197,9 @@ pub(crate) struct FittedCurve {
     /// Median ln of each variance over the true one, for a fit that is centred by it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub log_bias: Vec<f64>,
+    /// Variance of ln nu, at all scales alike, by which the curve of other recordings would differ beyond that.
+    #[serde(default)]
+    pub differing: f64,
     /// Lower ends of the 95 % intervals.
     #[serde(default)]
     pub ci_low: Vec<f64>,
@@ -288,6 +291,7 @@ fn fitted(
             .map(|level| tau_s(*level, settings.rate_hz))
             .collect(),
         log_bias: curve.log_bias.clone(),
+        differing: curve.differing,
         ci_low: band.ci_low,
         ci_high: band.ci_high,
         implied: implied(model, curve),

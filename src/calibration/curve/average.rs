@@ -9,6 +9,7 @@ use crate::wavelet::{
     default_levels, gappy, interval,
 };
 use rayon::prelude::*;
+use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 use std::fmt;
 use std::str::FromStr;
 
@@ -317,9 +318,25 @@ pub fn average(
             false => 0.0,
         };
         let bias: f64 = kept.iter().map(bias).sum();
-        curve.log_bias.push(log_bias(1.0 / inverse, bias));
+        let trim = dropped(replicates.len()) as f64 / replicates.len() as f64;
+        let ninths = kept.iter().map(|t| t.samples / total / (9.0 * t.eta3));
+        curve.log_bias.push(match trim {
+            0.0 => log_bias(1.0 / inverse, bias),
+            _ => bias.ln_1p() + trimmed_log_bias(ninths.sum(), trim),
+        });
     }
     Ok(curve)
+}
+
+/// Median ln of the mean of the middle ones of many variances over the true one, a share `trim` dropped at each end. `variance`:
+/// that of their cube roots. Robust variances of few coefficients scatter as classical ones do: so the degrees are
+/// twice eta3.
+fn trimmed_log_bias(variance: f64, trim: f64) -> f64 {
+    // (chi²/n)^(1/3) = c + √v z (Wilson and Hilferty), and E z² = 1 − 2 q phi(q)/(1 − 2 trim) of |z| < q.
+    let (normal, c) = (Normal::standard(), 1.0 - variance);
+    let q = normal.inverse_cdf(1.0 - trim);
+    let square = 1.0 - 2.0 * q * normal.pdf(q) / (1.0 - 2.0 * trim);
+    (c.powi(3) + 3.0 * c * variance * square).ln()
 }
 
 /// Median ln of a wavelet variance over the true one, of these degrees of freedom and relative bias.
@@ -354,6 +371,7 @@ fn is_majority(terms: &[Term], is_counted: fn(&&Term) -> bool) -> bool {
 struct Term {
     samples: f64,
     nu: f64,
+    eta3: f64,
     edof: f64,
     is_robust: bool,
     is_without_root: bool,
@@ -366,6 +384,7 @@ impl Term {
         Self {
             samples: replicate.samples as f64,
             nu: replicate.value(estimator, i),
+            eta3: replicate.edof_eta3(level),
             edof: replicate.edof(estimator, level, tuning),
             is_robust,
             is_without_root: is_robust && replicate.robust[i].status == RootStatus::NoRoot,

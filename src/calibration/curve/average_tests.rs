@@ -100,6 +100,40 @@ fn equal_replicates_multiply_the_degrees_of_freedom() {
     assert_relative_eq!(curve.edof[0], 4.0 * 0.6 * 499.5, max_relative = 1e-12);
 }
 
+/// 4000 sets of variances that are chi-squares of 2 eta3 degrees, eta3 = (T − 1)/2 at level 1: the median of ln of the trimmed
+/// mean less its bias is 0 to four of its standard errors (1.2533 of those of a mean) and 0.02 for so few of the many of the formula.
+#[test]
+fn a_trimmed_mean_of_skewed_variances_is_centred() {
+    let mut generator = generator(3, 0);
+    for (count, trim, eta3) in [(4, 1, 1), (8, 2, 1), (8, 2, 3), (15, 4, 1), (15, 4, 3)] {
+        let degrees = 2.0 * f64::from(eta3);
+        let law = rand_distr::ChiSquared::new(degrees).unwrap();
+        let coarse = RobustVariance {
+            value: f64::NAN,
+            status: RootStatus::Coarse,
+            zeros: 0.0,
+        };
+        let mut drawn = |_| Replicate {
+            samples: 2 * eta3 as usize + 1,
+            ..crate::tests::replicate(vec![generator.sample(law) / degrees], vec![coarse])
+        };
+        let mut centred = |_| {
+            let replicates: Vec<Replicate> = (0..count).map(&mut drawn).collect();
+            let trim = Trim::Count(trim);
+            let curve = average(&replicates, Estimator::DrAwv, trim, &tuning()).unwrap();
+            curve.wv[0].ln() - curve.log_bias[0]
+        };
+        let logs: Vec<f64> = (0..4000).map(&mut centred).collect();
+        let middle = median(&logs);
+        let square = logs.iter().map(|x| (x - middle).powi(2)).sum::<f64>() / 4000.0;
+        let allowed = 4.0 * 1.2533 * (square / 4000.0).sqrt() + 0.02;
+        assert!(
+            middle.abs() < allowed,
+            "{count} {trim} {eta3}: {middle} {allowed}"
+        );
+    }
+}
+
 /// Gaussian numbers of 0.3 steps, rounded: nu of level j is their variance over 2^j, that of the law of three numbers −1, 0,
 /// 1 (0.2 % beyond; P(1) = P(Z > 5/3) = 0.0478, variance 0.0956). Every scale counts and is right to four standard deviations,
 /// √(2/eta), and the 1.3 % of fine steps; the first is the classical variance, with all its degrees of freedom.

@@ -354,7 +354,7 @@ fn check(curve: &Curve, spec: &ModelSpec) -> Result<(), CalibrationError> {
             "the degrees of freedom at scale 2^{level} are {value}, out of 1e-15 to 1e15"
         )));
     }
-    let (parameters, scales) = (spec.parameters(), curve.levels.len() - curve.ignored.len());
+    let (parameters, scales) = (spec.parameters(), curve.counted_levels().len());
     if scales < parameters {
         return Err(too_few_scales(spec, parameters, scales));
     }

@@ -1,5 +1,6 @@
 //! Intervals of parameters from draws around their estimates.
 
+use crate::curve::median;
 use crate::fit::{Fit, Range, correlated};
 use crate::noise::practical::{AllanCurve, AllanMinimum, BiasModel, Horizon, Policy};
 use crate::noise::{Composite, Parameter, ParameterRef, Process, ProcessKind};
@@ -21,9 +22,35 @@ impl ParameterInterval {
     }
 }
 
-/// The intervals of all parameters, in the order of the model. `stretch`: Student's quantile over
-/// the normal one, where the draws' own spread is known from few replicates.
-pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<ParameterInterval> {
+/// Multiplies the distances of the parameters of draws from their median, process by process: by Student's quantile over the
+/// normal one, where the draws' own spread is known from few replicates.
+pub(crate) fn stretch(fits: &mut [Fit], stretches: &[f64]) {
+    for (i, stretch) in stretches.iter().enumerate() {
+        let kind = fits.first().map(|fit| fit.composite.processes[i].kind());
+        for (p, parameter) in kind
+            .iter()
+            .flat_map(|kind| kind.parameters().iter().enumerate())
+        {
+            let scaled = |fit: &Fit| parameter.scaled(fit.composite.processes[i].values()[p]);
+            // Of a process without amplitude the shape is anything.
+            let is_there = |fit: &Fit| !fit.zero.contains(&i) && scaled(fit).is_finite();
+            let there = fits.iter().filter(|fit| is_there(fit));
+            let middle = median(&there.map(scaled).collect::<Vec<_>>());
+            for fit in fits.iter_mut().filter(|fit| is_there(fit)) {
+                let value = parameter.unscaled(middle + stretch * (scaled(fit) - middle));
+                let process = &mut fit.composite.processes[i];
+                *process = process.with(*parameter, value).unwrap_or(*process);
+            }
+        }
+    }
+}
+
+/// The intervals of all parameters, in the order of the model, from draws stretched by `stretches`.
+pub(crate) fn intervals(
+    outcome: &Outcome,
+    fits: &[Fit],
+    stretches: &[f64],
+) -> Vec<ParameterInterval> {
     let model = &outcome.fit.composite;
     let searched = correlated(&outcome.curve);
     let matched: Vec<Vec<Option<&Process>>> =
@@ -43,7 +70,7 @@ pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<Pa
         // By draws mirrored at the estimate, and the quantiles of the draws themselves.
         let of_parameter = |(p, (&parameter, value)): (usize, (&Parameter, f64))| {
             let drawn = there.iter().map(|process| process.values()[p]).collect();
-            let draws = ParameterDraws::new(parameter, drawn, stretch);
+            let quantiles = tails(drawn);
             // Amplitudes are not negative.
             let least = if parameter.is_shape() {
                 f64::NEG_INFINITY
@@ -54,7 +81,9 @@ pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<Pa
             let [low, high] = match vanished {
                 // The quantile is that of what has vanished.
                 Some(_) => [f64::NAN; 2],
-                None => unless_one_sided(value, draws.around(value)).map(at_least),
+                None => {
+                    unless_one_sided(value, mirrored(parameter, quantiles, value)).map(at_least)
+                }
             };
             let one_sided = low.is_nan().then_some(Undetermined::OneSided);
             let interval = ParameterInterval {
@@ -67,7 +96,7 @@ pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<Pa
                 lost,
                 absent: vanished.clone().or(one_sided),
             };
-            (interval, draws.stretched().map(at_least))
+            (interval, quantiles.map(at_least))
         };
         let parameters = process.kind().parameters().iter().zip(process.values());
         let (mut own, quantiles): (Vec<_>, Vec<_>) =
@@ -77,10 +106,9 @@ pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<Pa
                 .for_each(|i| i.refuse(Undetermined::BeyondSearch));
         }
         // With its amplitude the shape is lost too.
+        let widest = UNDETERMINED_RATIO.powf(stretches[i].min(2.0));
         let open = |i: &ParameterInterval| {
-            !i.of.parameter.is_shape()
-                && i.absent.is_none()
-                && i.high > i.low * UNDETERMINED_RATIO.powf(stretch.min(2.0))
+            !i.of.parameter.is_shape() && i.absent.is_none() && i.high > i.low * widest
         };
         if own.iter().any(open) {
             own.iter_mut().for_each(|i| i.refuse(Undetermined::Open));
@@ -206,79 +234,47 @@ const fn hull(mirrored: [f64; 2], quantiles: [f64; 2]) -> [f64; 2] {
     [mirrored[0].min(quantiles[0]), mirrored[1].max(quantiles[1])]
 }
 
-/// Quantiles of the draws of one parameter, and the intervals that follow.
+/// Quantiles 0.025 and 0.975 of draws.
+fn tails(mut drawn: Vec<f64>) -> [f64; 2] {
+    drawn.sort_by(f64::total_cmp);
+    [TAIL, 1.0 - TAIL].map(|p| quantile(&drawn, p))
+}
+
+/// The 95 % interval: the quantiles of the draws mirrored at the estimate.
 ///
 /// Amplitudes and correlation times are scale parameters: estimate over truth is distributed as draw over estimate, whatever
 /// the truth. So the ends of an interval are estimate²/draw at the quantiles of the draws (exact for a variance whose estimate
 /// is a chi-square; the same as the quantiles themselves where the draws are symmetric in the logarithm); theta
-/// of MA1 likewise with differences. The distances of the quantiles from the median are multiplied by `stretch`. Where
-/// the estimate or a quantile is at the bound, 0, the ends are the quantiles themselves.
-struct ParameterDraws {
-    parameter: Parameter,
-    quantiles: [f64; 2],
-    median: f64,
-    stretch: f64,
-}
-
-impl ParameterDraws {
-    fn new(parameter: Parameter, mut drawn: Vec<f64>, stretch: f64) -> Self {
-        drawn.sort_by(f64::total_cmp);
-        let [low, median, high] = [TAIL, 0.5, 1.0 - TAIL].map(|p| quantile(&drawn, p));
-        Self {
-            parameter,
-            quantiles: [low, high],
-            median,
-            stretch,
-        }
-    }
-
-    /// The stretched distances of the quantiles from the median, times `sign`, from a centre on that scale; the quantiles
-    /// themselves where it or one of them is at a bound.
-    fn ends(&self, centre: f64, sign: f64) -> [f64; 2] {
-        let (parameter, median) = (self.parameter, self.parameter.scaled(self.median));
-        let distance = |q| self.stretch * (parameter.scaled(q) - median);
-        let mut ends = self
-            .quantiles
-            .map(|q| parameter.unscaled(centre + sign * distance(q)));
-        ends.sort_by(f64::total_cmp);
-        if centre.is_finite() && ends.iter().all(|e| e.is_finite()) {
-            ends
-        } else {
-            self.quantiles
-        }
-    }
-
-    /// The quantiles, their distances stretched.
-    fn stretched(&self) -> [f64; 2] {
-        self.ends(self.parameter.scaled(self.median), 1.0)
-    }
-
-    /// The 95 % interval: the quantiles mirrored at the estimate.
-    fn around(&self, estimate: f64) -> [f64; 2] {
-        // 2·estimate − quantile is the mirror image; written with the median, whose distance from the
-        // quantiles is what is stretched.
-        let scaled = |x| self.parameter.scaled(x);
-        self.ends(2.0 * scaled(estimate) - scaled(self.median), -1.0)
+/// of MA1 likewise with differences. Where the estimate or a quantile is at the bound, 0, the ends are the quantiles
+/// themselves.
+fn mirrored(parameter: Parameter, quantiles: [f64; 2], estimate: f64) -> [f64; 2] {
+    let scaled = |x| parameter.scaled(x);
+    let mut ends = quantiles.map(|q| parameter.unscaled(2.0 * scaled(estimate) - scaled(q)));
+    ends.sort_by(f64::total_cmp);
+    if scaled(estimate).is_finite() && ends.iter().all(|e| e.is_finite()) {
+        ends
+    } else {
+        quantiles
     }
 }
 
 /// 95 % interval of a positive figure computed from the model, from its values in the draws. Mirrored only: unlike a
 /// process it is always reported, so there is no selection.
-pub fn derived_interval(estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
-    ParameterDraws::new(Parameter::Sigma2, drawn, stretch).around(estimate)
+pub fn derived_interval(estimate: f64, drawn: Vec<f64>) -> [f64; 2] {
+    mirrored(Parameter::Sigma2, tails(drawn), estimate)
 }
 
 /// The 95 % interval of a positive quantity that some of `draws` draws have; none where more of them lack it than the
 /// quantile leaves out, or its draws lie to one side of the estimate.
-fn scale_interval(estimate: f64, drawn: Vec<f64>, draws: usize, stretch: f64) -> Option<[f64; 2]> {
+fn scale_interval(estimate: f64, drawn: Vec<f64>, draws: usize) -> Option<[f64; 2]> {
     if (drawn.len() as f64) < (1.0 - TAIL) * draws as f64 || drawn.is_empty() {
         return None;
     }
-    let draws = ParameterDraws::new(Parameter::Sigma2, drawn, stretch);
-    let ends = unless_one_sided(estimate, draws.around(estimate));
+    let quantiles = tails(drawn);
+    let ends = unless_one_sided(estimate, mirrored(Parameter::Sigma2, quantiles, estimate));
     ends.iter()
         .all(|end| end.is_finite())
-        .then(|| hull(ends, draws.stretched()))
+        .then(|| hull(ends, quantiles))
 }
 
 /// Probability beyond either end of a 95 % interval.
@@ -300,7 +296,7 @@ pub(super) fn quantile(sorted: &[f64], p: f64) -> f64 {
 
 /// Longest averaging time that the scales of a fit tell of (s): a scale is two averages long.
 fn observed_s(outcome: &Outcome, rate_hz: f64) -> Option<f64> {
-    let longest = outcome.counted_levels().into_iter().max()?;
+    let longest = outcome.curve.counted_levels().into_iter().max()?;
     Some(f64::from(longest - 1).exp2() / rate_hz)
 }
 
@@ -333,11 +329,10 @@ impl Practical {
     }
 }
 
-/// The 95 % intervals from the fits of the draws; `stretch` as in [`intervals`].
+/// The 95 % intervals from the fits of the draws, stretched as for [`intervals`].
 pub(crate) fn practical_intervals(
     outcome: &Outcome,
     fits: &[Fit],
-    stretch: f64,
     rate_hz: f64,
 ) -> PracticalIntervals {
     let Some(range_s) = observed_s(outcome, rate_hz) else {
@@ -346,7 +341,7 @@ pub(crate) fn practical_intervals(
     let drawn: Vec<&Composite> = fits.iter().map(|fit| &fit.composite).collect();
     let own = &outcome.fit.composite;
     let [density, walk, instability] =
-        figures_with_intervals(own, &drawn, stretch, rate_hz, range_s).map(|(_, ends)| ends);
+        figures_with_intervals(own, &drawn, rate_hz, range_s).map(|(_, ends)| ends);
     PracticalIntervals {
         density,
         walk,
@@ -359,7 +354,6 @@ pub(crate) fn practical_intervals(
 pub fn figures_with_intervals(
     model: &Composite,
     drawn: &[&Composite],
-    stretch: f64,
     rate_hz: f64,
     range_s: f64,
 ) -> [(Option<f64>, Option<[f64; 2]>); 3] {
@@ -374,8 +368,7 @@ pub fn figures_with_intervals(
     let figures: Vec<_> = drawn.iter().filter_map(|model| read(model)).collect();
     [0, 1, 2].map(|k| {
         let there = figures.iter().filter_map(|r| r[k]).filter(|x| *x > 0.0);
-        let ends =
-            own[k].and_then(|own| scale_interval(own, there.collect(), drawn.len(), stretch));
+        let ends = own[k].and_then(|own| scale_interval(own, there.collect(), drawn.len()));
         (own[k], ends)
     })
 }
@@ -428,9 +421,9 @@ mod tests {
             let whole = (0..100 - lost_ones).map(|i| whole(0.8 + 0.4 * i as f64 / 99.0));
             whole.chain((0..lost_ones).map(|_| lost.clone())).collect()
         };
-        let all = intervals(&outcome, &draws(2), 1.0);
+        let all = intervals(&outcome, &draws(2), &[1.0; 2]);
         assert!(all.iter().all(|i| i.absent.is_none()), "{all:?}");
-        let all = intervals(&outcome, &draws(10), 1.0);
+        let all = intervals(&outcome, &draws(10), &[1.0; 2]);
         assert!(
             all[0].absent == Some(Undetermined::Vanishes) && (all[0].lost - 0.1).abs() < 1e-9,
             "{all:?}"
@@ -461,15 +454,11 @@ mod tests {
         let drawn = (0..4000)
             .map(|_| 3.0 * generator.sample(law) / 8.0)
             .collect();
-        let [low, high] = ParameterDraws::new(Parameter::Sigma2, drawn, 1.0).around(3.0);
+        let [low, high] = derived_interval(3.0, drawn);
         assert_relative_eq!(low, 24.0 / 17.53, max_relative = 0.064);
         assert_relative_eq!(high, 24.0 / 2.18, max_relative = 0.125);
-        assert_eq!(
-            ParameterDraws::new(Parameter::Sigma2, vec![0.0, 0.0, 1.0], 1.0).around(0.0),
-            [0.0, 1.0]
-        );
-        let [low, high] =
-            ParameterDraws::new(Parameter::Phi, vec![0.85, 0.9, 0.93], 1.0).around(0.9);
+        assert_eq!(derived_interval(0.0, vec![0.0, 0.0, 1.0]), [0.0, 1.0]);
+        let [low, high] = mirrored(Parameter::Phi, [0.85, 0.93], 0.9);
         assert!(
             0.0 < low && low < 0.9 && 0.9 < high && high < 1.0,
             "{low} {high}"
@@ -480,21 +469,31 @@ mod tests {
     /// estimate, 2 to 8 times it; as they are, 1/8 to 1/2 of it. All of that is in the interval.
     #[test]
     fn the_interval_of_a_parameter_holds_the_draws_and_their_mirror_image() {
-        let drawn: Vec<f64> = (-100..=100)
-            .map(|k| 0.25 * f64::from(k).mul_add(0.01, 0.0).exp2())
-            .collect();
-        let hull_of = |stretch| {
-            let draws = ParameterDraws::new(Parameter::Sigma2, drawn.clone(), stretch);
-            hull(draws.around(1.0), draws.stretched())
-        };
-        for stretch in [1.0, 1.5] {
+        let curve = exact(
+            &Composite::new(vec![Process::white(1.0).unwrap()]),
+            8,
+            |_| 50.0,
+        );
+        let spec = "WN".parse().unwrap();
+        let own = fit(&curve, &spec, 1.0, Weighting::Edof).unwrap();
+        for factor in [1.0, 1.5] {
+            let draw = |k: i32| {
+                let white = Process::white(0.25 * (0.01 * f64::from(k)).exp2()).unwrap();
+                Fit {
+                    composite: Composite::new(vec![white]),
+                    ..own.clone()
+                }
+            };
+            let mut fits: Vec<Fit> = (-100..=100).map(draw).collect();
+            stretch(&mut fits, &[factor]);
+            let drawn = fits
+                .iter()
+                .map(|fit| fit.composite.processes[0].values()[0]);
+            let quantiles = tails(drawn.collect());
+            let found = hull(mirrored(Parameter::Sigma2, quantiles, 1.0), quantiles);
             // quantiles 0.025 and 0.975 of 201: the fifth from either end
-            let end = 4.0 * 0.96_f64.exp2().powf(stretch);
-            assert_relative_eq!(
-                hull_of(stretch)[..],
-                [1.0 / end, end][..],
-                max_relative = 0.01
-            );
+            let end = 4.0 * 0.96_f64.exp2().powf(factor);
+            assert_relative_eq!(found[..], [1.0 / end, end][..], max_relative = 0.01);
         }
     }
 }

@@ -11,10 +11,12 @@
 
 use crate::curve::sampling::{SamplingDistribution, VarianceDistribution, variance_of_log};
 use crate::curve::{Estimator, MAD_TO_DEVIATION, Replicate, falling_root, median, p_value};
+use crate::fit::Weighting;
 use crate::imu::Axis;
+use crate::noise::{Composite, Process};
 use crate::outcome::{AxesDiffer, LevelSpread, Outcome};
 use crate::rng::{Generator, StreamKey};
-use crate::wavelet::Tuning;
+use crate::wavelet::{Curve, Tuning};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 use rayon::prelude::*;
@@ -168,56 +170,74 @@ impl ReplicateSpread {
             .collect()
     }
 
-    /// Ratio of the quantiles 0.975 of Student's law and the normal one, by which intervals are stretched
-    /// because the variances are known from few replicates. 1 for a single replicate, whose variances are
-    /// those of the law.
-    pub(crate) fn student(&self) -> f64 {
-        self.stretch(&self.between, |_| 1.0)
+    /// Ratio of the quantiles 0.975 of Student's law and the normal one for each process of the model of a curve, by which
+    /// draws are stretched because the variances are known from few replicates. 1 for a single replicate, whose
+    /// variances are those of the law.
+    pub(crate) fn student(&self, model: &Composite, curve: &Curve) -> Vec<f64> {
+        self.stretches(model, curve, &self.between, |_| 1.0)
     }
 
     /// Ratio of [`Self::student`] where replicates differ by these standard deviations, times the median of the deviation that so few replicates show,
     /// over the true one: what half of all calibrations stretch the true scatter by, or less.
-    pub(crate) fn stated_where(&self, between: &[f64]) -> f64 {
-        self.stretch(between, |freedom| {
+    pub(crate) fn stated_where(
+        &self,
+        model: &Composite,
+        curve: &Curve,
+        between: &[f64],
+    ) -> Vec<f64> {
+        self.stretches(model, curve, between, |freedom| {
             let median = ChiSquared::new(freedom).map_or(freedom, |law| law.inverse_cdf(0.5));
             (median / freedom).sqrt()
         })
     }
 
-    fn stretch(&self, between: &[f64], shown: impl Fn(f64) -> f64) -> f64 {
+    fn stretches(
+        &self,
+        model: &Composite,
+        curve: &Curve,
+        between: &[f64],
+        shown: impl Fn(f64) -> f64,
+    ) -> Vec<f64> {
         if self.units.len() < 2 {
-            return 1.0;
+            return vec![1.0; model.processes.len()];
         }
-        // Those that the estimator leaves.
-        let freedom = (self.share_of_freedom * self.freedom(between)).max(1.0);
-        let student =
-            StudentsT::new(0.0, 1.0, freedom).map_or(NORMAL_975, |law| law.inverse_cdf(0.975));
-        student / NORMAL_975 * shown(freedom)
+        let roots = Weighting::Model.roots(curve, &curve.wv);
+        let of_process = |process: &Process| {
+            // Of least squares of ln nu, in which the process has a part of each level.
+            let levels = curve.levels.iter().zip(&curve.wv).zip(&roots);
+            let weight = |((level, wv), root): ((&u32, &f64), &f64)| {
+                process.haar_wv(*level) * wv * root * root
+            };
+            let weights: Vec<f64> = levels.map(weight).collect();
+            // Those that the estimator leaves.
+            let freedom = (self.share_of_freedom * self.freedom(between, &weights)).max(1.0);
+            let student =
+                StudentsT::new(0.0, 1.0, freedom).map_or(NORMAL_975, |law| law.inverse_cdf(0.975));
+            student / NORMAL_975 * shown(freedom)
+        };
+        model.processes.iter().map(of_process).collect()
     }
 
-    /// Degrees of freedom of the variance of a mean: of its part that follows from the signals' own noise one less than
-    /// there are signals, of what recordings differ by one less than there are recordings (Satterthwaite's rule, as if the
-    /// axes shared all of it); the median over the levels.
-    fn freedom(&self, between: &[f64]) -> f64 {
+    /// Degrees of freedom of the variance of a weighted mean over signals and levels: of its part that follows from the
+    /// signals' own noise one less than there are signals, of what recordings differ by one less than there are
+    /// recordings (Satterthwaite's rule, as if the axes shared all of it).
+    fn freedom(&self, between: &[f64], weights: &[f64]) -> f64 {
         let (signals, recordings) = (self.units.len() as f64, self.recordings() as f64);
-        if recordings < 2.0 {
+        // Their own noise falls with the number of signals, and is nearly independent from level to level; a parameter that
+        // differs moves all its levels alike, in all signals of a recording.
+        let own = self
+            .within
+            .iter()
+            .zip(weights)
+            .map(|(s, w)| (s * w).powi(2));
+        let own = own.sum::<f64>() / signals;
+        let common: f64 = between.iter().zip(weights).map(|(b, w)| b * w).sum();
+        let common = common.powi(2) / recordings;
+        if recordings < 2.0 || own <= 0.0 {
             return signals - 1.0;
         }
-        let at_level = |(within, between): (&f64, &f64)| {
-            // Variance of the mean of all signals: their own noise falls with the number of signals, shared
-            // differences with that of recordings.
-            let (own, common) = (within * within / signals, between * between / recordings);
-            let scatter = own * own / (signals - 1.0) + common * common / (recordings - 1.0);
-            (own + common).powi(2) / scatter
-        };
-        median(
-            &self
-                .within
-                .iter()
-                .zip(between)
-                .map(at_level)
-                .collect::<Vec<_>>(),
-        )
+        let scatter = own * own / (signals - 1.0) + common * common / (recordings - 1.0);
+        (own + common).powi(2) / scatter
     }
 
     fn recordings(&self) -> usize {
@@ -742,7 +762,6 @@ mod spread_tests;
 #[cfg(test)]
 mod alike_tests {
     use super::*;
-    use crate::noise::{Composite, Process};
     use crate::tests::{generator, measured, normal, white_and_walk};
     use crate::wavelet::Tuning;
 

@@ -3,6 +3,7 @@
 use super::*;
 use crate::curve::sampling::variance_of_log;
 use crate::tests::*;
+use crate::wavelet::interval::edof_eta3;
 
 /// Of replicates whose noise is nothing.
 fn noiseless(logs: &[f64], estimator: Estimator) -> Scatter {
@@ -68,7 +69,11 @@ fn coverage(between: f64, is_shared: bool) -> f64 {
     const SETS: u32 = 1000;
     const SAMPLES: usize = 1 << 14;
     let tuning = Tuning::default();
-    let law = SamplingDistribution::new(&Composite::new(vec![Process::white(1.0).unwrap()]), 1);
+    let model = Composite::new(vec![Process::white(1.0).unwrap()]);
+    let (law, curve) = (
+        SamplingDistribution::new(&model, 1),
+        exact(&model, 1, |_| 1.0),
+    );
     let mut generator = Generator::seed_from_u64(7);
     let mut held = 0;
     for _ in 0..SETS {
@@ -93,7 +98,7 @@ fn coverage(between: f64, is_shared: bool) -> f64 {
         let squares: f64 = (0..300)
             .map(|_| mean(&mut spread.draw(&mut generator).iter().map(|r| r[0].ln())).powi(2))
             .sum();
-        let half = (squares / 300.0).sqrt() * NORMAL_975 * spread.student();
+        let half = (squares / 300.0).sqrt() * NORMAL_975 * spread.student(&model, &curve)[0];
         held += u32::from(estimate.abs() < half);
     }
     f64::from(held) / f64::from(SETS)
@@ -135,4 +140,29 @@ fn a_level_that_a_short_recording_lacks_scatters_as_the_others_show() {
     let mean = drawn.iter().sum::<f64>() / 4000.0;
     let variance = drawn.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 3999.0;
     assert_relative_eq!(variance, 0.09, max_relative = 4.0 * 0.022 + 0.02);
+}
+
+/// White noise that differs by 0.3 from one to the next of three recordings of three axes, and a random walk that does not: what
+/// leads at the levels that differ is known to 2 degrees of freedom, t₀.₉₇₅(2) = 4.3027, and the other to 8, 2.3060. Their own
+/// noise at these levels, and the part of either beside the other, move the quantiles by less than 2 %.
+#[test]
+fn a_process_is_known_as_well_as_the_levels_it_leads_at() {
+    let model = white_and_walk(1.0, 1e-4);
+    let curve = exact(&model, 10, |level| edof_eta3(4096, level));
+    let replicates: Vec<Replicate> = (0..9)
+        .map(|k| Replicate {
+            name: (k / 3).to_string(),
+            axis: Some(Axis::ALL[k % 3]),
+            samples: 4096,
+            ..replicate(curve.wv.clone(), Vec::new())
+        })
+        .collect();
+    let law = SamplingDistribution::new(&model, 10);
+    let spread = ReplicateSpread::new(&replicates, Estimator::Awv, &law, &Tuning::default());
+    let between: Vec<f64> = (1..=10)
+        .map(|level| if level <= 3 { 0.3 } else { 0.0 })
+        .collect();
+    let found = spread.stretches(&model, &curve, &between, |_| 1.0);
+    let expected = [4.302_653, 2.306_004].map(|quantile| quantile / NORMAL_975);
+    assert_relative_eq!(found[..], expected[..], max_relative = 0.02);
 }

@@ -33,11 +33,10 @@ impl Calibration {
             in_order(self.outcomes.iter().map(|o| o.estimator.name())).join(", ")
         );
         let mut document = Document::new(&title, self.tone(), self.verdict());
-        let of_one = self.outcomes.iter().all(|o| o.recordings == 1);
-        let interval = if of_one {
-            "95 %, this power-on"
-        } else {
-            "95 %, mean of power-ons"
+        let interval = match self.outcomes.iter().map(|o| o.recordings).max() {
+            Some(0) => "95 %, this curve",
+            Some(1) => "95 %, this power-on",
+            _ => "95 %, mean of power-ons",
         };
         let policy = policy();
         let columns = [
@@ -467,7 +466,7 @@ fn fit_notes(outcome: &Outcome, settings: &CalibrationSettings) -> Vec<String> {
             .map(|i| format!("{} fits as well (p = {:.2})", i.spec, i.p_value)),
     );
     if let Some(reading) = &outcome.reading {
-        let counted = reading.counted_levels();
+        let counted = reading.curve.counted_levels();
         let bands = bands(&counted).map(|[from, to]| {
             let [from, to] = [from, to].map(|level| seconds(&level));
             (
@@ -508,7 +507,7 @@ fn fit_notes(outcome: &Outcome, settings: &CalibrationSettings) -> Vec<String> {
             .map(|i| &labels[*i])
             .map(|label| format!("{label} is zero: not observed")),
     );
-    let longest_s = outcome.counted_levels().last().map_or(0.0, seconds);
+    let longest_s = outcome.curve.counted_levels().last().map_or(0.0, seconds);
     for (i, label) in labels
         .iter()
         .enumerate()

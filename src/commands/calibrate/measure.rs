@@ -322,6 +322,19 @@ pub(crate) fn read_curves(
             .and_then(|name| name.parse().ok())
             .unwrap_or(Estimator::Given);
         is_sensor_assumed |= named.sensor.or(sensor).is_none();
+        if let (Some(stated), Some(given)) = (named.sensor, sensor)
+            && stated != given
+        {
+            return refused(
+                format!(
+                    "{}: the curve is of {}, --axes of {}",
+                    path(),
+                    stated.name(),
+                    given.name()
+                ),
+                "leave --axes out: it is for CSV curves",
+            );
+        }
         let sensor = named.sensor.or(sensor).unwrap_or(Sensor::Accel);
         let scope = Scope {
             sensor,

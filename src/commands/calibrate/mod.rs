@@ -101,7 +101,17 @@ pub struct Calibrate {
 }
 
 /// Flags about recordings and their averages, which a curve has behind it.
-const OF_RECORDINGS: [&str; 6] = ["estimator", "trim", "pool", "skip_s", "gaps", "efficiency"];
+const OF_RECORDINGS: [&str; 9] = [
+    "estimator",
+    "trim",
+    "pool",
+    "skip_s",
+    "gaps",
+    "efficiency",
+    "columns",
+    "topic",
+    "stamp",
+];
 
 /// Names of the estimators, those of several recordings first.
 pub(crate) const ESTIMATORS: [&str; 7] =
@@ -294,6 +304,12 @@ impl Calibrate {
 
     fn structure(&self) -> Result<ModelChoice> {
         let chosen: ModelChoice = self.model.parse().map_err(unknown_model)?;
+        if self.curve.is_some() && self.tuning.levels().is_some() {
+            return refused(
+                "--scales J with --curve, which has its scales",
+                "--scales FROM:TO fits a range",
+            );
+        }
         let is_avlr = self.estimator == EstimatorChoice::One(Estimator::Avlr);
         if is_avlr && self.tuning.fitted().is_some() {
             return refused(

@@ -21,8 +21,7 @@ fn estimates((file, draws): &(ModelFile, Option<Draws>), channel: Channel) -> Ve
     let (model, rate_hz) = (file.model.axis(channel), file.model.rate_hz);
     let drawn = draws.iter().flat_map(|draws| &draws.models);
     let drawn: Vec<_> = drawn.map(|model| model.axis(channel)).collect();
-    let stretch = draws.as_ref().map_or(1.0, |draws| draws.stretch);
-    let figures = figures_with_intervals(model, &drawn, stretch, rate_hz, range_s);
+    let figures = figures_with_intervals(model, &drawn, rate_hz, range_s);
     let quantities = [
         ExportQuantity::Density,
         ExportQuantity::Walk,
@@ -116,10 +115,23 @@ pub(super) fn compare(paths: [&Path; 2], context: &Context<'_>) -> Result<PlainA
     let judged = rows.iter().filter(|row| distance(row) >= 0.0).count();
     rows.sort_by(|a, b| distance(b).total_cmp(&distance(a)));
     let rest = judged - changed.len();
+    let is_central =
+        |row: &Value| distance(row) >= 0.0 && (row["figure"] == "N" || row["figure"] == "K");
     let (tone, verdict) = match (judged, &changed[..]) {
         (0, _) => (
             Tone::Undecided,
             "not judged: no shared figure has intervals (calibrate writes them)".to_owned(),
+        ),
+        (_, []) if judged < rows.len() => (
+            if rows.iter().any(is_central) {
+                Tone::Good
+            } else {
+                Tone::Undecided
+            },
+            format!(
+                "no change seen: {rest} figures within 1.5 half widths of 95 %, {} without intervals",
+                rows.len() - judged
+            ),
         ),
         (_, []) => (
             Tone::Good,

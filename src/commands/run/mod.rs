@@ -1024,7 +1024,6 @@ fn intervals(
                 .iter()
                 .filter_map(|ends| Some(ends.get(k)?[i]))
                 .collect(),
-            draws.stretch,
         );
         (low / x, high / x)
     };

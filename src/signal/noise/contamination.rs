@@ -278,7 +278,7 @@ impl Operation {
             }
             Self::Step { at, amplitude } => {
                 let at = at.of(x.len());
-                fits("a step", at)?;
+                fits("a step", at + 1)?;
                 x[at..].iter_mut().for_each(|v| *v += amplitude);
             }
             Self::Replace {

@@ -133,6 +133,29 @@ fn the_added_ar1_has_its_variance() {
     assert_abs_diff_eq!(variance, 10.0, epsilon = bound);
 }
 
+/// What a second rule adds is as large as what the first does and has no correlation with it: of 100 000 samples with phi = 0.9 as
+/// many as (1 − phi²)/(1 + phi²) of them are independent, 10 500, whose correlation is 0 ± 0.01.
+#[test]
+fn two_ar1_rules_are_independent() {
+    let ar1 = || Operation::Ar1(Process::ar1(0.9, 1.9).unwrap());
+    let first = applied(ar1(), 100_000);
+    let mut second = vec![0.0; first.len()];
+    let both = contamination([ar1(), ar1()]);
+    both.apply(&mut second, X, 2, 100.0, 1).unwrap();
+    second
+        .iter_mut()
+        .zip(&first)
+        .for_each(|(both, a)| *both -= a);
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let correlation = product(&first, &second) / product(&first, &first);
+    assert_abs_diff_eq!(correlation, 0.0, epsilon = 0.04);
+    assert_relative_eq!(
+        product(&second, &second),
+        product(&first, &first),
+        max_relative = 0.06
+    );
+}
+
 #[test]
 fn the_order_is_fixed_and_other_signals_are_untouched() {
     let step = Operation::Step {

@@ -11,7 +11,7 @@ use std::f64::consts::{FRAC_PI_2, LN_2};
 /// The noise of one axis as a stream of samples: of one run, or of eight ([`Synthesizer::lanes`]), each of which has the
 /// numbers that it has alone.
 ///
-/// Every process of the sum draws from a stream of its own, so that adding or removing one changes no
+/// Every process of the sum draws from a stream of its own, of its label after the key's process, so that adding or removing one changes no
 /// other's numbers. The output does not depend on the sizes of the blocks it is asked for.
 ///
 /// FN is a sum of AR1 ([`Ar1Bank::FINE`]). AR1 and GM start stationary; MA1 and QN have a past; RW starts at 0 (its first sample is its first
@@ -55,7 +55,7 @@ impl<S: Streams> Synthesizer<S> {
             block: [S::Sample::from(0.0); BLOCK],
             used: BLOCK,
         };
-        let Some((first, _)) = runs.first() else {
+        let Some((first, StreamKey { process, .. })) = runs.first() else {
             return synthesizer;
         };
         for (i, label) in first.labels().into_iter().enumerate() {
@@ -64,11 +64,10 @@ impl<S: Streams> Synthesizer<S> {
                 .map(|(noise, _)| noise.processes[i].parts(Ar1Bank::FINE))
                 .collect();
             for part in 0..parts[0].len() {
-                let label = match parts[0].len() {
-                    1 => label.clone(),
-                    _ => format!("{label}.{part}"),
+                let process = &match parts[0].len() {
+                    1 => format!("{process}{label}"),
+                    _ => format!("{process}{label}.{part}"),
                 };
-                let process = &*label;
                 let keys = runs.iter().map(|(_, key)| StreamKey { process, ..*key });
                 let of_runs: Vec<&Process> = parts.iter().map(|p| &p[part]).collect();
                 synthesizer.add(&of_runs, S::new(&keys.collect::<Vec<_>>()));

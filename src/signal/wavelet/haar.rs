@@ -211,6 +211,14 @@ impl Curve {
         }
     }
 
+    /// The levels that count in a fit.
+    pub fn counted_levels(&self) -> Vec<u32> {
+        let levels = self.levels.iter().copied();
+        levels
+            .filter(|level| !self.ignored.contains(level))
+            .collect()
+    }
+
     /// Response to quantization noise at a level; none where it is read as it is.
     pub fn response(&self, level: u32) -> Option<&QuantizationResponse> {
         self.quantization
