@@ -391,7 +391,7 @@ impl Comparison {
                 .map(|outage| outage.states[state].ratio_error_pct)
                 .filter(|pct| !pct.is_nan());
             let low = all.clone().reduce(f64::min)?;
-            let [low, high] = [low, all.fold(low, f64::max)].map(|pct| format!("{pct:+.0}"));
+            let [low, high] = [low, all.fold(low, f64::max)].map(|pct| rounded(pct, 0));
             Some(if low == high {
                 format!("{name} {low} %")
             } else {
@@ -674,20 +674,23 @@ fn signed(ratio: &StateRatio) -> String {
         .ci95_pct
         .filter(|ends| ends.iter().all(|x| x.is_finite()))
     else {
-        return format!("{pct:+.shown$}");
+        return rounded(pct, shown);
     };
     let half = (high - low) / 2.0;
     let with_half = shown.min(decimals(half, 1.0));
     if half > WIDE * (100.0 + pct) {
         format!("{pct:+.0} ({low:+.0} to {high:+.0})")
     } else if half < 0.5 * 0.1_f64.powi(with_half as i32) {
-        format!("{pct:+.shown$}")
+        rounded(pct, shown)
     } else {
-        // no sign of a zero
-        let unit = 0.1_f64.powi(with_half as i32);
-        let pct = (pct / unit).round() * unit + 0.0;
-        format!("{pct:+.with_half$} ± {half:.with_half$}")
+        format!("{} ± {half:.with_half$}", rounded(pct, with_half))
     }
+}
+
+/// A percentage with its sign, which a zero has not.
+fn rounded(pct: f64, decimals: usize) -> String {
+    let unit = 0.1_f64.powi(decimals as i32);
+    format!("{:+.decimals$}", (pct / unit).round() * unit + 0.0)
 }
 
 #[cfg(test)]

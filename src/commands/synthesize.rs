@@ -21,8 +21,8 @@ use std::path::{Path, PathBuf};
 /// Synthesise static recordings from a noise model
 ///
 /// Writes replicate_1, replicate_2, … and a manifest.json with the parameters that were drawn. The same seed gives the
-/// same noise with and without contamination, and at any number of threads. Replicate k has that of run k - 1 of
-/// `nav-sim run` with this seed: judge a calibration by runs of another.
+/// same noise with and without contamination, and at any number of threads. Replicate k has the noise of run k - 1 of
+/// `run`: give that another seed.
 #[derive(clap::Args, Debug, Clone)]
 pub struct Synthesize {
     /// Noise model (TOML)

@@ -21,17 +21,20 @@ pub mod trajectory_file;
 
 use std::path::{Path, PathBuf};
 
-/// The file beside another that has its name, less `.toml` or `.json`, and this ending; with none itself.
+/// Endings of outputs that are no part of a name, as the number of m.1 is.
+const ENDINGS: [&str; 4] = ["toml", "json", "html", "svg"];
+
+/// The file beside another that has its name, less one of these endings, and this one; with none itself.
 pub(crate) fn beside(path: &Path, ending: &str) -> PathBuf {
     if ending.is_empty() {
         return path.to_owned();
     }
-    // of m.1 and m.2 the number is no ending
-    let has_ending = path.extension().is_some_and(|e| e == "toml" || e == "json");
-    let name = if has_ending {
-        path.file_stem()
-    } else {
-        path.file_name()
+    let has_ending = path
+        .extension()
+        .is_some_and(|own| ENDINGS.iter().any(|ending| own == *ending));
+    let name = match has_ending {
+        true => path.file_stem(),
+        false => path.file_name(),
     };
     let mut name = name.unwrap_or_default().to_owned();
     name.push(ending);

@@ -122,21 +122,21 @@ pub(super) fn compare(paths: [&Path; 2], context: &Context<'_>) -> Result<PlainA
             Tone::Undecided,
             "not judged: no shared figure has intervals (calibrate writes them)".to_owned(),
         ),
-        (_, []) if judged < rows.len() => (
-            if rows.iter().any(is_central) {
-                Tone::Good
-            } else {
-                Tone::Undecided
-            },
-            format!(
-                "no change seen: {rest} figures within 1.5 half widths of 95 %, {} without intervals",
-                rows.len() - judged
-            ),
-        ),
-        (_, []) => (
-            Tone::Good,
-            format!("no change seen: all {rest} figures within 1.5 half widths of 95 %"),
-        ),
+        (_, []) => {
+            let unknown = match rows.len() - judged {
+                0 => String::new(),
+                n => format!(", {n} without intervals"),
+            };
+            let is_judged = unknown.is_empty() || rows.iter().any(is_central);
+            (
+                if is_judged {
+                    Tone::Good
+                } else {
+                    Tone::Undecided
+                },
+                format!("no change seen: {rest} figures within 1.5 half widths of 95 %{unknown}"),
+            )
+        }
         _ => (
             Tone::Doubtful,
             format!(
